@@ -43,9 +43,9 @@ def cells(what: str, backend: str, vary: tuple[str, ...], seeds: int) -> tuple[f
     """Processor seconds of a cell, and the rows; the first ones, which load, are left out."""
     ready = prepared(Sweep(what, vary, (backend,), seeds=seeds))
     every = list(ready.cells(backend))
-    run_batch(ready.rules, every[:1], False)
+    run_batch(ready, every[:1], False)
     began = time.process_time()
-    rows = run_batch(ready.rules, every[1:], False)
+    rows = run_batch(ready, every[1:], False)
     return (time.process_time() - began) / len(rows), rows
 
 

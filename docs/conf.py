@@ -1,4 +1,4 @@
-"""The documentation: pages by hand, and the path's stations made from runs."""
+"""The documentation: pages by hand, and the lessons of the path made from runs."""
 
 import os
 import re

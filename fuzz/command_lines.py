@@ -94,7 +94,7 @@ def examine(words: list[str], folder: Path) -> str:
 def _furnish(folder: Path) -> None:
     """Files for the commands to work on."""
     run_bounded(command("trace", "record", "hold", "--seconds", "0.05", "-o", "t.npz"), folder)
-    (folder / "idle.py").write_text("def controller(time, data): return None\n")
+    (folder / "idle.py").write_text("def controller(model, data): return None\n")
     (folder / "bad.npz").write_bytes(b"PK\x03\x04garbage")
     (folder / "empty.parquet").touch()
     (folder / "folder.npz").mkdir()

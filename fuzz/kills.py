@@ -51,7 +51,9 @@ def run(seed: int, tries: int) -> Tally:
             _kill(source, target, 0.1 * draw.random())
             tally.tried += 1
             problem = examine(target)
-            if not problem:  # the next write cleans up
+            for file in folder.iterdir():  # what is left for long the next write removes
+                os.utime(file, (0, 0))
+            if not problem:
                 export_csv(trace, target) if target.suffix == ".csv" else write(trace, target)
                 left = {file.name for file in folder.iterdir()} - {f.name for f in _files(target)}
                 problem = f"left behind: {sorted(left)}" if left and os.name == "posix" else ""

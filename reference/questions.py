@@ -83,6 +83,8 @@ _STUB = """
 WRONG, RIGHT = {}, {}
 def wrong(solves, *_, **__): return lambda f: WRONG.setdefault((solves, f.__name__), f)
 def right(solves, *_, **__): return lambda f: RIGHT.setdefault((solves, f.__name__), f)
+def wrong_ones(solves, rows): WRONG.update({(solves, name): f for name, (_, f) in rows.items()})
+def right_ones(solves, rows): RIGHT.update({(solves, name): f for name, f in rows.items()})
 """
 
 
@@ -95,8 +97,8 @@ def student_files(folder: Path) -> Iterator[tuple[str, Path]]:
                       flags=re.MULTILINE)  # fmt: skip
         for attempt in (*exercises.WRONG, *exercises.RIGHT):
             if attempt.function.__module__ == module.__name__:
-                solved, function = attempt.solves, attempt.function.__name__
-                file = folder / f"{solved} {function}.py"
+                solved, function = attempt.solves.removeprefix("demo_"), attempt.function.__name__
+                file = folder / f"{attempt.solves} {function}.py"
                 found = f"({solved!r}, {function!r})"
                 line = f"demo_{solved} = {{**WRONG, **RIGHT}}[{found}]\n"
                 file.write_text(f"{text}\n\n{line}", "utf-8")

@@ -136,7 +136,7 @@ def _options(words: list[str]) -> argparse.Namespace:
     from .commands import lesson
 
     for k, word in enumerate(words[1:], start=1):
-        if words[k - 1] == "lesson":  # a station may be called by its number
+        if words[k - 1] == "lesson":  # one of the path may be called by its number
             words[k] = lesson.by_number(word)
     options = parser.parse_args(words)
     if getattr(options, "run", None) is None:

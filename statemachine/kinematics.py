@@ -19,19 +19,12 @@ from numpy.typing import ArrayLike
 from .errors import BadInputError, ModelError, check_name
 from .installed import require
 from .interface import Array, Model
-from .interface.checks import as_vector, check_entries
+from .interface.checks import as_numbers, as_vector
 from .models import resolve
-from .rotations import matrix_from_quat, xyzw_from_wxyz
+from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz
 from .witness import Segment, WitnessModel, read_file, read_numbers
 
 Kind = Literal["site", "body"]
-
-
-class Pose(NamedTuple):
-    """World poses of one frame: `pos` (…, 3) [m] and `mat` (…, 3, 3)."""
-
-    pos: Array
-    mat: Array
 
 
 class FrameDefinition(NamedTuple):
@@ -112,7 +105,7 @@ class Kinematics:
         self.nq: int = sum(segment.nq for segment in self._segments)
         self.nv: int = sum(segment.nv for segment in self._segments)
 
-    def pose(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Pose:
+    def pose(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Placement:
         """World pose of a site or body: `pos` (3,), `mat` (3, 3).
 
         Args:
@@ -125,9 +118,9 @@ class Kinematics:
             BadInputError: `qpos` has the wrong shape or is not finite.
         """
         positions, matrices = self.poses(as_vector(qpos, (self.nq,), "qpos")[None], name, kind)
-        return Pose(positions[0], matrices[0])
+        return Placement(positions[0], matrices[0])
 
-    def poses(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Pose:
+    def poses(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Placement:
         """World poses of a site or body: `pos` (N, 3), `mat` (N, 3, 3).
 
         Args:
@@ -150,7 +143,7 @@ class Kinematics:
             compute(model, data, configuration)
             positions[i] = pos
             matrices[i] = mat
-        return Pose(positions, matrices)
+        return Placement(positions, matrices)
 
     def jacobian(self, qpos: ArrayLike, name: str, kind: Kind = "site") -> Array:
         """Jacobian (6, nv) of a site or body: d(linear, angular velocity)/d(qvel).
@@ -212,13 +205,8 @@ class Kinematics:
 
     def _configurations(self, qpos: ArrayLike) -> Array:
         """(N, nq) in MuJoCo's layout to (N, nq) in Pinocchio's."""
-        try:
-            ours = np.asarray(qpos, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise BadInputError(f"qpos must be numbers of shape (N, {self.nq})") from error
-        if ours.ndim != 2 or ours.shape[1] != self.nq:
-            raise BadInputError(f"qpos wants shape (N, {self.nq}); got {ours.shape}")
-        check_entries(ours, "qpos")
+        ours = as_numbers(qpos, "qpos")
+        ours = as_vector(ours, (*ours.shape[:1], self.nq), "qpos")
         theirs = np.empty((len(ours), self._model.nq))
         start = 0
         for segment in self._segments:

@@ -7,14 +7,15 @@ in a package of robots ("menagerie:unitree_g1"; see `robot_packages`).
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
-from .errors import ModelFileError, shown, unknown_name
+from .errors import ModelError, ModelFileError, shown, unknown_name
 from .robot_packages import file_of, is_named
 
 _PACKAGE = Path(__file__).resolve().parent
-SUFFIXES = (".xml", ".urdf", ".mjb")
+SUFFIXES = (".xml", ".mjcf", ".urdf", ".mjb")
 # The folder of a public menagerie that holds the counterpart of one of ours.
 _COUNTERPARTS = {"so101": "robotstudio_so101"}
 
@@ -36,7 +37,7 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     """The file of a model.
 
     Args:
-        name: One of `model_names()`, a path to an .xml, .urdf or .mjb file, or
+        name: One of `model_names()`, a path to an .xml, .mjcf, .urdf or .mjb file, or
             "menagerie:NAME" or "robot_descriptions:NAME" of the packages of these names.
         menagerie: A menagerie folder. Given, names are looked up there ("so101/scene"
             as robotstudio_so101/scene.xml) and not among ours.
@@ -143,3 +144,19 @@ def included_file(name: str, main: Path, includer: Path) -> Path | None:
     """
     choices = [file.parent / name for file in (main, includer) if name]
     return next((choice for choice in choices if choice.is_file()), None)
+
+
+def numbers(text: str, count: int, what: str) -> list[float]:
+    """The numbers of an attribute of a model's file; `what` it is, for the message.
+
+    Raises:
+        ModelError: They are not so many, or no finite numbers.
+    """
+    try:
+        found = [float(word) for word in text.split()]
+    except ValueError:
+        found = []
+    if len(found) != count or not all(map(math.isfinite, found)):
+        plural = "s" if count > 1 else ""
+        raise ModelError(f"{what} is {shown(text)}, and should be {count} number{plural}")
+    return found

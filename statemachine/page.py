@@ -8,7 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = Sequence[float] | NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -86,13 +91,21 @@ class Traces:
         across: What the horizontal axis is, with its unit; up: the vertical one.
         curves: (x, y) by name, each a sequence of numbers.
         log: Whether the vertical axis is logarithmic; what is zero has a level below it.
+        sides: Whether the curves are the sides of a comparison, in the order of their styles.
+        tolerance: Of the values; a line, and what is beyond it is filled.
+        floor: (x, y) of the chaos floor, an area.
+        least: What the vertical axis spans at least.
     """
 
     title: str
     across: str
     up: str
-    curves: Mapping[str, tuple[Sequence[float], Sequence[float]]]
+    curves: Mapping[str, tuple[Numbers, Numbers]]
     log: bool = False
+    sides: bool = False
+    tolerance: float | None = None
+    floor: tuple[Numbers, Numbers] | None = None
+    least: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -87,7 +87,7 @@ def rotation(axis: Array, angle: float) -> Array:
 
 
 class Placement(NamedTuple):
-    """A pose: `pos` (3,) [m], `mat` (3, 3)."""
+    """A pose: `pos` (3,) [m], `mat` (3, 3); or many of them, (N, 3) and (N, 3, 3)."""
 
     pos: Array
     mat: Array

@@ -16,7 +16,6 @@ The engine is MuJoCo, used as if only functions reached its world. A backend is 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -41,11 +40,11 @@ class ExampleWorld(HiddenWorld):
         self.memory_layout = (("warmstart", model.nv),)
         self._ctrl = np.zeros(model.nu)
 
-    def place(self, qpos: Array, qvel: Array, memory: Array) -> None:
+    def place(self, qpos: Array, qvel: Array, memory: Any) -> None:
         """Reset, so that nothing of before is left; the command stays."""
         reset(self._model, self._data)
         self._data.qpos, self._data.qvel, self._data.ctrl = qpos, qvel, self._ctrl
-        self.raw.qacc_warmstart[:] = memory
+        (self.raw.qacc_warmstart[:],) = memory
 
     def command(self, ctrl: Array) -> None:
         """Once for all steps until the next command."""
@@ -75,22 +74,9 @@ class ExampleWorld(HiddenWorld):
         self._data.close()
 
     @property
-    def memory(self) -> Array:
+    def memory(self) -> tuple[Array]:
         """Of the last step."""
-        return self.raw.qacc_warmstart.copy()
-
-    @property
-    def blank(self) -> Array:
-        """Of none."""
-        return np.zeros(self._model.nv)
-
-    def packed(self, memory: Array) -> Sequence[Array]:
-        """As a State has it."""
-        return (memory,)
-
-    def unpacked(self, parts: Sequence[Array]) -> Array:
-        """From a State."""
-        return parts[0].copy()
+        return (self.raw.qacc_warmstart.copy(),)
 
 
 class ExampleModel(HiddenModel):

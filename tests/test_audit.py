@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import gc
-import io
 import json
 import math
 import tempfile
 import threading
 import warnings
 from collections.abc import Callable, Iterable
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +28,7 @@ from statemachine.errors import BadInputError, EngineWarning
 from statemachine.installed import require
 from statemachine.interface import JointType
 from statemachine.measures import JointPlaces
+from statemachine.page import Items, Page, Table
 from statemachine.probes import audit
 from statemachine.probes.audit import drivers_of, elsewhere, trials
 from statemachine.probes.audit.conclusions import conclude
@@ -187,11 +186,10 @@ def test_a_call_that_is_harmless_here_moves_falling_boxes(of_pybullet: audit.Aud
         asked = [e for e in engine.findings if e.case == case and e.point.startswith(trials.FALL)]
         assert len(asked) == trials.DROPS
         assert all(each.gap.exact for each in asked)
-    text = _text(of_pybullet)
     off = max(each.gap.length for each in drops)
-    assert f"{call} before each step changes what follows" in text
-    assert f"by up to {1e3 * off:.0f} mm" in text
-    assert "4 boxes fall onto each other" in text
+    tables = [block for block in report.page({"x": of_pybullet}).blocks if isinstance(block, Table)]
+    rows = [row for t in tables if t.headers[1] == "differs at" for row in t.rows]
+    assert [(row[0], row[2]) for row in rows] == [(call, f"{1e3 * off:.0f} mm")]
 
 
 def test_no_call_of_mujoco_moves_falling_boxes(of_mujoco: audit.Audit) -> None:
@@ -572,9 +570,8 @@ def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_process_that_fails_is_one_line() -> None:
-    job = elsewhere.Job(sm.load(SCENE), -1, 10, {}, ())  # no seed
     with pytest.raises(sm.errors.EngineError, match="a fresh process failed: ValueError"):
-        elsewhere.run(job)
+        elsewhere.run(sm.load(SCENE), -1, 10, {}, ())  # no seed
 
 
 # Conclusions follow from findings, and a page from conclusions.
@@ -593,34 +590,41 @@ def test_conclusions_follow_from_findings(of_mujoco: audit.Audit) -> None:
     found = conclude(changed)
     assert found.idle == ("warmstart",)
     other = dataclasses.replace(engine, findings=tuple(changed), conclusion=found)
-    texts = _text(dataclasses.replace(of_mujoco, audited=(other,)))
-    assert "without warmstart nothing differed" in texts
-    assert "without warmstart" not in _text(of_mujoco)
+    changed_page = report.page({"x": dataclasses.replace(of_mujoco, audited=(other,))})
+    assert "warmstart" not in _needed(changed_page)
+    assert any("warmstart" in line for line in _lines(changed_page))
+    assert not any("warmstart" in line for line in _lines(report.page({"x": of_mujoco})))
 
 
-def _text(result: audit.Audit) -> str:
-    from statemachine.report import terminal
+def _needed(page: Page) -> dict[str, tuple[str, ...]]:
+    """What has to be restored, and the cells beside it."""
+    tables = [block for block in page.blocks if isinstance(block, Table)]
+    return {
+        str(row[0]): tuple(row[1:]) for t in tables if t.headers[0] == "left out" for row in t.rows
+    }
 
-    with redirect_stdout(io.StringIO()) as out:
-        terminal.show(report.page({"x": result}))
-    return " ".join(out.getvalue().split())
+
+def _lines(page: Page) -> list[str]:
+    return [line for block in page.blocks if isinstance(block, Items) for line in block.texts]
 
 
 def test_the_page_says_what_suffices(of_mujoco: audit.Audit) -> None:
-    page = _text(of_mujoco)
-    assert "the state that suffices: mjSTATE_INTEGRATION or mj_copyData" in page
-    assert "warmstart (not at motion)" in page
-    assert "time (only at clock)" in page
-    assert "These alone suffice" in page
-    assert "✗" not in page
+    page = report.page({"x": of_mujoco})
+    needed = _needed(page)
+    assert needed["time"][0] == "clock"
+    assert needed["warmstart"][0] == "default, keyframe, limp, limit, clock"
+    assert needed["qpos"][0] == "all"
+    assert needed["ctrl"][0].startswith("none")
+    assert set(needed) == {each.field for each in of_mujoco.audited[0].conclusion.missing}
+    assert page.holds
 
 
 @pytest.mark.slow
 def test_the_page_says_that_nothing_suffices(of_pybullet: audit.Audit) -> None:
-    page = _text(of_pybullet)
-    assert "itself: no candidate suffices" in page
-    assert "what cannot be written acts through contacts" in page
-    assert "✗" not in page
+    page = report.page({"x": of_pybullet})
+    assert _needed(page) == {}
+    assert any("acts through contacts" in line for line in _lines(page))
+    assert page.holds
 
 
 # The command.
@@ -652,7 +656,7 @@ def test_a_broken_promise_is_exit_code_1(
 ) -> None:
     after("_set_state", forget_warm_start)(monkeypatch)
     assert main(["audit", "--steps", "10"]) == 1
-    assert "✗ this interface on mujoco: get_state, set_state" in capsys.readouterr().out
+    assert "yes, broken" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("wrong", [("--steps", "0"), ("--seed=-1",), ("--backend", "mujcoo")])

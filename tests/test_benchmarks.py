@@ -51,9 +51,15 @@ def test_the_budget_is_the_one_that_is_told() -> None:
     asked = {getattr(m, "func", m).__name__: [] for m, *_ in bench.BUDGET}
     for measure, _, budget, _ in bench.BUDGET:
         asked[getattr(measure, "func", measure).__name__].append(budget)
-    assert (asked["step"], asked["emulation"]) == ([1.04, 1.04], [1.2, 1.8])
+    wanted = {
+        "step": [1.04, 1.04],
+        "emulation": [1.2, 1.8],
+        "bulk": [1.005],
+        "control_loop": [1.01],
+        "recording": [1.1],
+        "reading_emulated": [1.5, 1.5],
+    }
+    assert wanted.items() <= asked.items()
     numbers = re.search(r"its budget: (.*?)`python", told)
     assert numbers
     assert re.findall(r"\d\.\d+", numbers[1]) == ["1.04", "1.005", "1.01", "1.10", "1.2", "1.8"]
-    assert (asked["bulk"], asked["control_loop"], asked["recording"]) == ([1.005], [1.01], [1.1])
-    assert asked["reading_emulated"] == [1.5, 1.5]

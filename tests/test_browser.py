@@ -50,15 +50,6 @@ def test_a_good_page_passes_and_has_webgl(tmp_path: Path, server: str) -> None:
         tab.nothing_wrong()
 
 
-def test_two_browsers_at_once_know_nothing_of_each_other(server: str) -> None:
-    with browser() as one, browser() as two:
-        one.goto(f"{server}/good.html")
-        assert two.requests == []
-    with browser() as again:
-        again.goto(f"{server}/good.html")
-        again.nothing_wrong()
-
-
 @pytest.mark.parametrize(
     ("body", "words"),
     [

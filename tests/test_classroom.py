@@ -14,7 +14,7 @@ import pytest
 from statemachine.cli import main
 from statemachine.errors import BadInputError
 from statemachine.grading import classroom
-from statemachine.grading.class_table import ClassEntry, as_csv, few_words, read, write
+from statemachine.grading.class_table import ClassEntry, few_words, read, rows_of
 from statemachine.grading.classroom import (
     Submission,
     enrolled,
@@ -24,13 +24,14 @@ from statemachine.grading.classroom import (
     submission_in,
     submissions,
 )
-from statemachine.grading.exercise import LOOK, ExerciseJudge, Grade, Judgement
-from statemachine.grading.judges import JUDGES
+from statemachine.grading.exercise import LOOK, ExerciseJudge, Grade
+from statemachine.grading.judges import JUDGES, Judgement
 from statemachine.grading.mutants import MUTANTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial
-from statemachine.page import Table, Text
+from statemachine.page import Text
 from statemachine.report import gradescope
 from statemachine.report.classroom import page
+from statemachine.runs.whole import csv_text, replace_csv
 
 from .conftest import ROOT, Cli, written
 
@@ -171,7 +172,7 @@ def test_what_was_skipped_is_a_row_with_the_reason(folder: Path, judged: list[st
     (folder / "ida.py").symlink_to("nowhere.py")
     os.mkfifo(folder / "jo.py")
     entries = judge_all(submissions([folder]), "mujoco")
-    rows = {row["file"]: row for row in csv.DictReader(io.StringIO(as_csv(entries)))}
+    rows = {row["file"]: row for row in csv.DictReader(io.StringIO(csv_text(rows_of(entries))))}
     for name, reason in (
         ("gus.ipynb", "a notebook: save it as a Python file"),
         ("cy", "has one of the functions. mine.ipynb is a notebook"),
@@ -182,10 +183,6 @@ def test_what_was_skipped_is_a_row_with_the_reason(folder: Path, judged: list[st
     ):
         assert reason in rows[name]["remarks"]
         assert (rows[name]["right"], rows[name]["demo_state"]) == ("", "not judged")
-    table = next(block for block in page(entries).blocks if isinstance(block, Table))
-    assert ["gus.ipynb", "?", "a notebook: save it as a Python file, and hand in that"] in [
-        list(row[:3]) for row in table.rows
-    ]
 
 
 @pytest.mark.parametrize(
@@ -233,21 +230,19 @@ def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path
         for k, (name, text) in enumerate(zip(JUDGES, texts, strict=True))
     )
     entry = ClassEntry("ann.py", "1" * 64, marks, "", "mujoco")
-    (row,) = csv.DictReader(io.StringIO(as_csv([entry])))
+    (row,) = csv.DictReader(io.StringIO(csv_text(rows_of([entry]))))
     assert row["remarks"] == (
         "state: ctrl was written; forward: …; replay: not written; "
         "please look at this: it reads a.txt"
     )
     for text in texts:
         assert text in row["details"]
-    write(tmp_path / "t.csv", [entry])
+    replace_csv(tmp_path / "t.csv", rows_of([entry]))
     assert read(tmp_path / "t.csv") == {(entry.sha256, "mujoco"): entry}
-    texts_shown = [block.text for block in page([entry]).blocks if isinstance(block, Text)]
-    assert "ann.py: please look at this: it reads a.txt" in texts_shown
 
 
 def test_a_roster_gives_every_student_a_row(
-    folder: Path, judged: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, judged: list[str], tmp_path: Path
 ) -> None:
     (folder / "Lee_Bo_41017_assignment.py").write_text("return 1\n")
     (folder / "x_41018.py").write_text("return 1\n")
@@ -271,9 +266,6 @@ def test_a_roster_gives_every_student_a_row(
         assert {row["file"] for row in rows[4:]} == {
             "bob", "cy", "dee", "eve.py", "fay.py", "x_41018.py", "x_again_41018.py",
         }  # fmt: skip
-    shown = capsys.readouterr().out
-    assert "Zoë" in shown
-    assert "Zoë could not be judged" not in shown
     with pytest.raises(BadInputError, match=r"the roster nowhere\.csv cannot be read"):
         enrolled([], tmp_path / "nowhere.csv")
 
@@ -347,7 +339,7 @@ def test_functions_that_are_alike_are_told_whatever_is_named_how(
     assert entries["ann"].alike.startswith("100% ")
     assert entries["bob"].alike == ""  # it is not written yet
     assert float(entries["hal.py"].alike.partition("%")[0]) < 50
-    (row,) = (row for row in csv.DictReader(io.StringIO(as_csv([entries["gus.py"]]))))
+    (row,) = (row for row in csv.DictReader(io.StringIO(csv_text(rows_of([entries["gus.py"]])))))
     assert row["alike"] == "100% ann"
 
 
@@ -365,65 +357,49 @@ def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
 
 def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> None:
     table = tmp_path / "grades.csv"
-    first = judge_all(submissions([folder]), "mujoco", table=table)
-    assert sorted(judged) == ["eve.py", "fay.py", "my_solution.py", "step_loop.py"]
+
+    def again(**how: Any) -> list[str]:
+        judged.clear()
+        judge_all(submissions([folder]), "mujoco", table=table, **how)
+        return sorted(judged)
+
+    assert again() == ["eve.py", "fay.py", "my_solution.py", "step_loop.py"]
     text = table.read_text()
     assert text.startswith("\ufefffile,right")  # by which a spreadsheet knows UTF-8
-    judged.clear()
-    again = judge_all(submissions([folder]), "mujoco", table=table)
-    assert judged == []
-    assert again == first
+    assert again() == []
     assert table.read_text() == text
     # What is new or changed, or was judged otherwise, is judged.
     (folder / "eve.py").write_text("return 1\n")
-    judge_all(submissions([folder]), "mujoco", table=table)
-    assert judged == ["eve.py"]
-    judge_all(submissions([folder]), "mujoco", table=table, time_limit=7.0)
-    assert len(judged) == 5
+    assert again() == ["eve.py"]
+    assert len(again(time_limit=7.0)) == 4
     # A helper that a student's file may import is a part of what was judged.
     (folder / "ann" / "helper.py").write_text("X = 2\n")
-    judged.clear()
-    judge_all(submissions([folder]), "mujoco", table=table, time_limit=7.0)
-    assert judged == ["my_solution.py"]
-    # A spreadsheet may have written it with semicolons.
+    assert again(time_limit=7.0) == ["my_solution.py"]
+    # A spreadsheet may have written it with semicolons, or with the ends of lines of Windows.
     rewritten = io.StringIO()
     csv.writer(rewritten, delimiter=";").writerows(csv.reader(io.StringIO(table.read_text())))
     table.write_text(rewritten.getvalue())
-    judged.clear()
-    judge_all(submissions([folder]), "mujoco", table=table, time_limit=7.0)
-    assert judged == []
+    assert again(time_limit=7.0) == []
+    saved = table.read_bytes().replace(b"\n", b"\r\n")
+    for content in (saved, saved.removeprefix(b"\xef\xbb\xbf")):  # with the mark and without
+        table.write_bytes(content)
+        assert again(time_limit=7.0) == []
     # A table that ended in the middle of a file is one with fewer rows.
     rows = text.splitlines(keepends=True)
     table.write_text("".join(rows[:2]))
-    judged.clear()
-    assert judge_all(submissions([folder]), "mujoco", table=table)
-    assert judged
+    assert again()
     table.write_text("name,mark\nann,1\n")
     with pytest.raises(BadInputError, match="not the columns of a table of grades"):
-        judge_all(submissions([folder]), "mujoco", table=table)
+        again()
     assert table.read_text() == "name,mark\nann,1\n"
 
 
 def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -> None:
     evil = written(tmp_path / '=HYPERLINK("x").py', "return 'refuse'\n")
     entries = judge_all([Submission(evil.name, evil)], "mujoco")
-    (row,) = csv.DictReader(io.StringIO(as_csv(entries)))
+    (row,) = csv.DictReader(io.StringIO(csv_text(rows_of(entries))))
     assert row["file"] == f"'{evil.name}"
     assert row["remarks"] == "it is refused"
-
-
-def test_a_table_that_a_spreadsheet_saved_is_resumed(
-    folder: Path, judged: list[str], tmp_path: Path
-) -> None:
-    table = tmp_path / "grades.csv"
-    judge_all(submissions([folder / "ann"]), "mujoco", table=table)
-    saved = table.read_bytes().replace(b"\n", b"\r\n")
-    assert saved.startswith(b"\xef\xbb\xbf")
-    for content in (saved, saved[3:]):  # with the mark of UTF-8 and without
-        table.write_bytes(content)
-        judged.clear()
-        judge_all(submissions([folder / "ann"]), "mujoco", table=table)
-        assert judged == []
 
 
 def test_jobs_must_be_some(folder: Path) -> None:
@@ -471,7 +447,7 @@ def test_a_folder_from_the_command_line(cli: Cli, folder: Path, tmp_path: Path) 
     (folder / "hal.py").write_text("def demo_gravity(model, seconds=4):\n    while True: pass\n")
     table = tmp_path / "grades.csv"
     command = ("check", str(folder), "--csv", str(table), "--time-limit", "2")
-    done = cli(*command, code=0)
+    cli(*command, code=0)
     rows = {
         row["file"]: row
         for row in csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines())
@@ -479,23 +455,9 @@ def test_a_folder_from_the_command_line(cli: Cli, folder: Path, tmp_path: Path) 
     assert [rows[name]["right"] for name in rows] == ["4", "0", "0", "4", "0"]
     assert rows["bob"]["demo_gravity"] == "not written"
     assert rows["fay.py"]["same_as"] == "ann"
-    text = " ".join(table.read_text().split())
-    assert "a loop that does not end?" in text
-    assert "invalid syntax" in text
-    assert "All functions are right in 2 of 5 files." in done.stdout
     again = cli(*command, "--json")
     passed = [sum(f["passed"] for f in e["functions"]) for e in json.loads(again.stdout)]
     assert passed == [4, 0, 0, 4, 0]
-
-
-def test_a_students_folder_from_the_command_line(tmp_path: Path, judged: list[str]) -> None:
-    (tmp_path / "step_loop.py").write_text(SOLUTION.read_text())
-    assert main(["check", str(tmp_path)]) == 0
-    assert judged == ["step_loop.py"]
-    table = tmp_path / "grades.csv"
-    assert main(["check", str(tmp_path), "--csv", str(table)]) == 0
-    (row,) = csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines())
-    assert row["file"] == tmp_path.name
 
 
 @pytest.mark.parametrize("option", ["--csv", "--gradescope"])

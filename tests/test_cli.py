@@ -20,9 +20,11 @@ from rich.cells import cell_len
 from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import ROOT, Cli, need_engine, written
+from .conftest import ROOT, Cli, need_engine, one_line, written
+from .small_models import NAMED_PENDULUM, mjcf
 
 QUICK = {
+    "worlds": ("--most", "4"),
     "speed": ("--steps", "200"),
     "gravity": ("--longer", "0"),
     "replay": ("--steps", "100"),
@@ -48,18 +50,6 @@ def test_every_lesson_runs_and_reads_well_piped(cli: Cli, lesson: str, backend: 
     assert "nan" not in done.stdout.lower().split()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("lesson", LESSONS)
-def test_every_lesson_speaks_json_with_its_provenance(cli: Cli, lesson: str, backend: str) -> None:
-    found = _json(cli, "lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()))
-    made = found[backend]["provenance"]
-    assert made["backend"] == backend
-    assert made["versions"].keys() >= {"statemachine", backend, "numpy", "python"}
-    assert re.fullmatch(r"[0-9a-f]{64}", made["model_sha256"])
-    assert made["model_file"] == LESSONS[lesson].model + ".xml"
-    assert made["timestep"] == 0.005
-
-
 def test_state(cli: Cli) -> None:
     found = _json(cli, "lesson", "state")["mujoco"]
     assert [found[name] for name in ("nq", "nv", "nu", "nbody")] == [13, 12, 6, 10]
@@ -68,9 +58,6 @@ def test_state(cli: Cli) -> None:
     assert (box["qpos_start"], box["qpos_stop"]) == (6, 13)
     assert (box["qvel_start"], box["qvel_stop"]) == (6, 12)
     assert found["keyframe_time"] != 0.0
-    page = cli("lesson", "state").stdout
-    assert "[6:13]" in page
-    assert "[6:12]" in page
 
 
 def test_forward(cli: Cli) -> None:
@@ -81,19 +68,8 @@ def test_forward(cli: Cli) -> None:
     assert found["equal"] == [[1, 2]]
     assert {reading["time"] for reading in found["readings"]} == {0.0}
     # What the page shows when it is asked for is always here.
-    assert max(found["stages"]["lag"]) == pytest.approx(9.95e-3, abs=0.02e-3)
-    assert {each["name"] for each in found["stages"]["changes"]} >= {"qpos", "site_xpos"}
-    page = cli("lesson", "forward").stdout
-    assert "[0.3914 -0.0010 0.2463]" in page
-    assert "270.5 mm" in page
-
-
-def test_forward_with_another_joint_and_no_movement(cli: Cli) -> None:
-    found = _json(cli, "lesson", "forward", "--joint", "gripper", "--value", "0.5")["mujoco"]
-    # The moving jaw does not carry the fingertip, so three readings are equal.
-    assert found["equal"] == [[1, 2], [1, 3], [2, 3]]
-    page = cli("lesson", "forward", "--joint", "gripper", code=0)
-    assert "does not carry it" in page.stdout
+    assert max(found["lag"]["distance"]) == pytest.approx(9.95e-3, abs=0.02e-3)
+    assert {each["name"] for each in found["changes"]} >= {"qpos", "site_xpos"}
 
 
 def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
@@ -102,8 +78,7 @@ def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
         assert re.search(row.replace(" ", r"\s+").replace(".", r"\."), page), row
     found = _json(cli, "lesson", "gravity")["mujoco"]
     off = found["servos_off"]
-    assert found["servo"] is True
-    assert off["ctrl_is_zero"] is True
+    assert off["ctrl_untouched"] is True
     # The floor holds the fallen arm, not damping or dry friction.
     assert off["forces"]["contact"] / off["forces"]["bias"] > 0.95
     assert abs(off["forces"]["friction"]) < 0.052
@@ -112,9 +87,6 @@ def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
     for run in (found["servos_on"], off):
         assert abs(run["forces"]["total"]) < 1e-5
     assert found["servos_on"]["forces"]["contact"] == 0.0
-    said = " ".join(page.split())
-    assert "held by the contact, with 0.6079 N·m against gravity's 0.6168 N·m" in said
-    assert "Damping and dry friction together hold 0.0089 N·m" in said
 
 
 @pytest.mark.slow
@@ -131,15 +103,6 @@ def test_hold(cli: Cli) -> None:
     assert len(found["error"]) == 401
     assert math.degrees(found["error"][-1]) < 1.5
     assert max(map(abs, found["without_contacts"])) > 0
-    page = " ".join(cli("lesson", "hold").stdout.split())
-    assert "wrist_flex, by 0.95°" in page
-    assert "In a run without contacts it is elbow_flex, by 0.02°" in page
-
-
-def test_hold_another_target(cli: Cli) -> None:
-    found = _json(cli, "lesson", "hold", "--target=-0.1,0,0,0,0,0", "--seconds", "1")["mujoco"]
-    assert found["target"][0] == -0.1
-    assert abs(found["qpos"][-1][0] + 0.1) < 0.01
 
 
 def test_replay(cli: Cli) -> None:
@@ -159,14 +122,6 @@ def test_replay_broken(cli: Cli, way: str) -> None:
     assert found["identical"] is False
     assert max(found["difference"]) > 1e-3
     assert found["difference"][-1] > 0.0
-    page = cli("lesson", "replay", "--break", way).stdout
-    assert "How far the two runs are apart" in page
-
-
-def test_speed(cli: Cli) -> None:
-    found = _json(cli, "lesson", "speed", "--steps", "1000")["mujoco"]
-    assert found["simulated"] == pytest.approx(5.0)
-    assert found["bulk_factor"] == pytest.approx(found["simulated"] / found["bulk"])
 
 
 @pytest.mark.slow
@@ -188,8 +143,6 @@ def test_fingertip_certificate(cli: Cli, pinocchio: None) -> None:
     assert found["position_worst"] <= 1e-12
     assert found["rotation_worst"] <= 1e-12
     assert _json(cli, "fingertip", "--poses", "300", "--seed", "3")["mujoco"] == found
-    page = cli("fingertip").stdout
-    assert "✓ agrees with the witness" in page
 
 
 def test_fingertip_of_other_models_and_frames(cli: Cli, pinocchio: None) -> None:
@@ -215,10 +168,10 @@ RENAMED = ('body name="gripper"', 'body name="hand"')
     ("edits", "said"),
     [
         ((TURNED,), ("19.90 mm, 90.00°", "refused")),
-        ((LONGER,), ("DISAGREES", "1.0e-05")),
+        ((LONGER,), ("DISAGREE", "1.0e-05")),
         ((RENAMED,), ()),
         ((RENAMED, MOVED), ("19.90 mm, 0.00°",)),
-        ((RENAMED, MOVED, LONGER), ("not comparable", "DISAGREES")),
+        ((RENAMED, MOVED, LONGER), ("not comparable", "DISAGREE")),
     ],
 )
 def test_fingertip_against_another_arm(
@@ -290,10 +243,8 @@ def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
 def test_every_mistake_is_one_clear_line(cli: Cli, arguments: tuple[str, ...], word: str) -> None:
     if arguments[0] == "fingertip":
         need_engine("pinocchio")
-    done = cli(*arguments, code=2)
-    assert done.stdout == ""
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    assert word in done.stderr
+    done = cli(*arguments)
+    one_line(done, word)
     assert done.stderr.startswith("statemachine")
 
 
@@ -302,9 +253,7 @@ def test_every_mistake_is_one_clear_line(cli: Cli, arguments: tuple[str, ...], w
 )
 def test_malformed_models_are_one_clear_line(cli: Cli, tmp_path: Path, content: str) -> None:
     file = written(tmp_path / "bad.xml", content)
-    done = cli("lesson", "state", "--model", str(file), code=2)
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    assert "bad.xml" in done.stderr
+    one_line(cli("lesson", "state", "--model", str(file)), "bad.xml")
 
 
 def in_a_shell(command: str) -> subprocess.CompletedProcess[str]:
@@ -326,13 +275,7 @@ def test_a_terminal_without_unicode(cli: Cli) -> None:
 
 def test_doctor(cli: Cli) -> None:
     findings = {f["name"]: f for f in json.loads(cli("doctor", "--json").stdout)["findings"]}
-    assert findings.keys() == {
-        "python", "mujoco", "pybullet", "pinocchio", "rendering", "viser", "import name",
-    }  # fmt: skip
-    assert findings["mujoco"]["works"]
-    assert findings["viser"]["optional"]
-    page = cli("doctor").stdout
-    assert max(map(len, page.splitlines())) <= 80
+    assert (findings["mujoco"]["works"], findings["viser"]["optional"]) == (True, True)
 
 
 def test_the_doctor_knows_every_package_of_an_extra(cli: Cli) -> None:
@@ -369,23 +312,14 @@ def test_version(cli: Cli) -> None:
 
 
 def _model(folder: Path, body: str, rest: str = "") -> str:
-    file = written(folder / "robot.xml", f"<mujoco><worldbody>{body}</worldbody>{rest}</mujoco>")
-    return str(file)
-
-
-PENDULUM = (
-    "<body name='p' pos='0 0 1'><joint name='j' axis='0 1 0' {}/>"
-    "<geom name='rod' type='capsule' fromto='0 0 0 0.3 0 0' size='0.02'/>"
-    "<site name='tip' pos='0.3 0 0'/></body>"
-)
+    return str(written(folder / "robot.xml", mjcf(body, rest)))
 
 
 def test_gravity_says_nothing_of_a_joint_that_still_moves(cli: Cli, tmp_path: Path) -> None:
-    file = _model(tmp_path, PENDULUM.format(""))
+    servo = "<actuator><position joint='j' kp='0.1'/></actuator>"
+    file = _model(tmp_path, NAMED_PENDULUM.format(""), servo)
     page = cli("lesson", "gravity", "--model", file, "--joint", "j", "--seconds", "0.2", code=0)
     assert "still moves" in page.stdout
-    assert "✓" not in page.stdout
-    assert "Nothing drives this robot" in " ".join(page.stdout.split())
 
 
 @pytest.mark.slow
@@ -398,9 +332,10 @@ def test_gravity_of_a_slide_and_of_an_equality(cli: Cli, tmp_path: Path) -> None
     joint = "<joint name='j' type='slide' axis='0 0 1'/>"
     body = f"<body name='p'>{joint}<geom size='0.1' mass='1'/></body>"
     rest = "<equality><joint joint1='j'/></equality>"
+    rest += "<actuator><position joint='j' kp='1'/></actuator>"
     file = _model(tmp_path, body, rest)
     page = cli("lesson", "gravity", "--model", file, "--joint", "j")
-    assert "j is held by the equality, with 9.81" in page.stdout
+    assert re.search(r"held by +equality +equality", page.stdout)
     assert "[N]" in page.stdout
     assert "mm" in page.stdout
     assert page.returncode == 0
@@ -415,13 +350,9 @@ def test_a_body_of_the_scene_is_not_taken_for_the_robot(cli: Cli) -> None:
 
 
 def test_hold_of_another_robot_reads_no_torque_as_an_angle(cli: Cli, tmp_path: Path) -> None:
-    file = _model(tmp_path, PENDULUM.format(""), "<actuator><motor joint='j'/></actuator>")
-    done = cli("lesson", "hold", "--model", file, code=0)
-    said = " ".join(done.stdout.split())
-    assert "A motor takes it as a force, and has no goal" in said
-    assert "from its goal" not in said
-    done = cli("lesson", "hold", "--model", file, "--target", "0.1", code=0)
-    assert "None of them is a position servo" in " ".join(done.stdout.split())
+    file = _model(tmp_path, NAMED_PENDULUM.format(""), "<actuator><motor joint='j'/></actuator>")
+    done = cli("lesson", "hold", "--model", file, code=2)
+    assert "statemachine compare hold --model" in done.stderr
 
 
 def test_ctrl_c_ends_a_long_run() -> None:
@@ -460,7 +391,7 @@ def test_output_that_cannot_be_written(command: str) -> None:
         (("lesson", "gravity", "--seconds", "0.1"), ("still moves",)),
         (
             ("lesson", "hold", "--target", "100,0,0,0,0,0"),
-            ("beyond its", "5729.58°", "110.00°"),
+            ("asked for", "5729.58°", "110.00°"),
         ),
         (
             ("lesson", "replay", "--break", "late-ctrl", "--ctrl", "0,-0.6,0.5,1.6,1.57,0.28"),
@@ -502,7 +433,7 @@ def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path
     body = "<geom type='plane' size='1 1 1' friction='.1'/><body pos='0 0 1'><joint name='j'/>"
     body += "<geom size='.1' friction='.1'/><geom pos='1 0 0' size='.1' friction='.9'/></body>"
     file = _model(tmp_path, body)
-    done = cli("lesson", "gravity", "--model", file, "--joint", "j", "--backend", "pybullet")
+    done = cli("lesson", "state", "--model", file, "--backend", "pybullet")
     (line,) = done.stderr.splitlines()
     assert line.startswith("statemachine: PyBullet: friction of ")
     assert ".py" not in line

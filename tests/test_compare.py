@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,15 +25,13 @@ from statemachine.compare import (
 )
 from statemachine.compare.series import normal_forces, total_forces
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
-from statemachine.installed import available
-from statemachine.measures import COUNT, parse_tolerances
-from statemachine.page import Text
+from statemachine.measures import COUNT, QUANTITIES, parse_tolerances, tolerance_of
 from statemachine.report import compare as report
-from statemachine.report import terminal
 from statemachine.runs import Trace, record, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import ROOT, Cli, one_line, written
+from .conftest import ROOT, Cli, one_line
+from .small_models import NAMELESS_JOINTS, STILL, model_of
 
 
 def traced(name: str, **options: Any) -> Trace:
@@ -127,6 +124,15 @@ def test_a_moved_and_turned_fingertip(hold: Trace) -> None:
     assert found["gripperframe, rotation"].rms == pytest.approx(0.1, rel=1e-9)
     # One count of an encoder, over the reach: the arm's is near 0.4 m.
     assert 0.3 < found["gripperframe, position"].tolerance / COUNT < 0.5
+
+
+def test_a_tip_without_a_lever_arm_has_the_tolerance_of_a_slide() -> None:
+    """A site in the origin of a cart is 0 from its foot: rounding must not count."""
+    zero = np.zeros(2)
+    assert tolerance_of("tip", zero, zero, 0.0, 0.01).value == QUANTITIES["slide"].tolerance
+    long = tolerance_of("tip", zero, zero, 0.4, 0.01)
+    assert long.value == pytest.approx(0.4 * COUNT)
+    assert tolerance_of("tip", zero, zero, 0.0, 0.01, {"tip": 1.0}).value == 1.0
 
 
 def test_one_blow_does_not_widen_what_a_force_may_differ(box: Trace) -> None:
@@ -224,13 +230,8 @@ def test_the_whole_force_of_a_contact_is_the_engines(box: Trace) -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-def test_a_force_is_named_and_both_figures_are_given() -> None:
+def test_both_figures_of_a_force_are_given() -> None:
     (one, two), _ = sides_of("hold")
-    (touch,) = touches(one, two)
-    found = report.page(compare(one, two), one, two)
-    text = [b.text for b in found.blocks if isinstance(b, Text)]
-    said = f"presses on floor with {touch.one.force:.1f} N (with friction {touch.one.total:.1f} N)"
-    assert any(said in each for each in text)
     assert "gripper on floor, normal force" in by_name(compare(one, two))
     # The greatest that the course's page shows, and that of the vectors.
     assert normal_forces(one)["gripper on floor"].max() == pytest.approx(351, abs=1)
@@ -240,11 +241,9 @@ def test_a_force_is_named_and_both_figures_are_given() -> None:
 @pytest.mark.usefixtures("bullet")
 def test_the_hold_ends_pressed_on_one_engine_and_free_on_the_other() -> None:
     (one, two), _ = sides_of("hold")
-    (touch,) = touches(one, two)
-    assert touch.one.ends
+    touch: Any = touches(one, two)[0]
+    assert (touch.one.ends, touch.two.ends) == (True, False)
     assert touch.one.force > 10
-    assert not touch.two.ends
-    assert touch.two.last is not None
     assert touch.two.last < 0.5
 
 
@@ -258,15 +257,6 @@ def test_moments_that_both_have_are_compared_and_no_others() -> None:
     assert np.allclose(time, 0.025 * np.arange(41), atol=1e-9)
     with pytest.raises(TraceError, match="moments in common"):
         compare(one, traced("waves", seconds=1.0, options={"timestep": 0.005 * np.pi / 3}))
-
-
-def test_runs_come_together_as_the_timestep_is_halved() -> None:
-    runs = [traced("waves", seconds=2.0, options={"timestep": h}) for h in (2e-3, 1e-3, 5e-4)]
-    gaps = [
-        max(each.max for each in compare(one, two).agreements if each.kind == "joint")
-        for one, two in pairwise(runs)
-    ]
-    assert gaps[0] > 1.8 * gaps[1] > 0  # a first-order integrator, at least
 
 
 def test_what_makes_it_less_than_a_comparison_of_engines_is_said(hold: Trace, box: Trace) -> None:
@@ -290,13 +280,11 @@ def test_traces_of_two_robots_share_nothing(hold: Trace) -> None:
 
 
 def test_joints_without_names_are_each_compared(tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "nameless.xml",
-        "<mujoco><worldbody><body><joint axis='0 1 0'/><geom size='.1'/><body pos='0 0 -1'>"
-        "<joint axis='0 1 0'/><geom size='.1'/></body></body><body pos='3 0 0'><freejoint/>"
-        "<geom size='.1'/></body></worldbody></mujoco>",
+    trace = record(
+        model_of(tmp_path, NAMELESS_JOINTS),
+        None,
+        0.2,
     )
-    trace = record(sm.load(file), None, 0.2)
     qpos = trace.qpos.copy()
     qpos[:, 1] += 0.02
     qpos[:, 3] += 0.003
@@ -437,7 +425,7 @@ def no_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("defaults", ["model", "engine"])
 @pytest.mark.parametrize("name", list(SCENARIOS))
 def test_without_pybullet_its_recorded_run_takes_its_place(
-    no_pybullet: None, name: str, defaults: Any, capsys: pytest.CaptureFixture[str]
+    no_pybullet: None, name: str, defaults: Any
 ) -> None:
     (one, two), said = sides_of(Request((name,), defaults=defaults))
     assert not one.header.recorded
@@ -448,8 +436,7 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
     assert ", recorded" in found.two.label
     if defaults == "model":
         assert found.agrees == (name in ("droop", "fall", "waves"))
-    terminal.show(report.page(found, one, two, said=said))
-    assert "its side is the recorded run" in " ".join(capsys.readouterr().out.split())
+    assert report.page(found, one, two, said=said).blocks
 
 
 def test_what_was_not_recorded_needs_the_engine(no_pybullet: None) -> None:
@@ -466,30 +453,11 @@ def test_the_help_knows_the_experiments() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_command(cli: Cli) -> None:
-    done = cli("compare", "hold")
-    assert (done.returncode, done.stderr) == (1, "")
+    done = cli("compare", "hold", code=1)
     assert max(map(len, done.stdout.splitlines())) <= 80
-    for text in ("wrist_flex", "2.58", "DIFFER", "12-bit encoder", "✗"):
-        assert text in done.stdout
-    if has_witness():
-        assert "a third party was asked where gripperframe is" in " ".join(done.stdout.split())
-    good = cli("compare", "droop", "--json", code=0)
-    result = json.loads(good.stdout)
-    found = result["comparison"]
+    found = json.loads(cli("compare", "droop", "--json", code=0).stdout)["comparison"]
     assert found["agrees"] is True
-    assert found["two"]["provenance"]["versions"]["pybullet"]
     assert {each["verdict"] for each in found["agreements"]} == {"agrees"}
-    if result["witness"] is not None:
-        assert result["witness"]["by"].startswith("pinocchio ")
-
-
-def has_witness() -> bool:
-    return "pinocchio" in available()[0]
-
-
-def test_it_compares_an_engine_with_itself(cli: Cli) -> None:
-    done = cli("compare", "box", "--backends", "mujoco", "mujoco", "--seconds", "0.2", code=0)
-    assert "✓" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -514,15 +482,11 @@ def test_mistakes_are_one_line(words: tuple[str, ...], says: str, here: Cli) -> 
 
 # What does not move at all, and names that a plot could take for formulas.
 
-_STILL = """<mujoco><option gravity="0 0 0"/><worldbody><geom name="$floor$" type="plane"
-size="1 1 .1"/><body name="$\\frac{" pos="0 0 1"><joint name="$x^$_$" type="slide"
-axis="0 0 1"/><geom size=".1"/><site name="a$b$c"/></body></worldbody></mujoco>"""
-
 
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("form", ["html", "plot"])
 def test_a_robot_that_stands_still_agrees_with_itself(form: str, cli: Cli, tmp_path: Path) -> None:
-    (tmp_path / "still.xml").write_text(_STILL)
+    (tmp_path / "still.xml").write_text(STILL)
     out = tmp_path / ("a.html" if form == "html" else "a.svg")
     done = cli("compare", "fall", "--model", tmp_path / "still.xml", f"--{form}", out)
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
@@ -542,9 +506,7 @@ def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
         assert "Traceback" not in done.stderr
         assert (tmp_path / "a.html").stat().st_size > 100_000
     done = cli("trace", "film", tmp_path / "nan.npz", "-o", tmp_path / "a.webp")
-    assert done.returncode != 0
-    assert "no poses of the bodies that are numbers" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    one_line(done, "no poses of the bodies that are numbers", done.returncode)
 
 
 # Mistakes that were met.
@@ -557,7 +519,7 @@ def test_a_file_that_is_no_trace_is_taken_for_no_experiment(here: Cli, tmp_path:
 
 def test_a_model_without_actuators_holds_nothing(here: Cli) -> None:
     urdf = ROOT / "models/so101/so101.urdf"
-    one_line(here("lesson", "hold", "--model", urdf), "so101.urdf has no actuators")
+    one_line(here("lesson", "hold", "--model", urdf), "no position servo drives so101.urdf")
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no /proc")

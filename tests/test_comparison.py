@@ -21,11 +21,12 @@ from statemachine.measures import (
     together,
 )
 from statemachine.report.events import events_of
-from statemachine.report.plot_panels import of_trace
+from statemachine.report.plot import of_trace
 from statemachine.runs import Trace, record, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import lesson_result, written
+from .conftest import lesson_result
+from .small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +61,8 @@ def test_a_recorded_trace_has_the_same_names(trace: Trace) -> None:
     assert set(shipped("hold", "pybullet").touches()) == set(trace.touches())
 
 
-SCENE = """<mujoco><worldbody>
-  <geom name="floor" type="plane" size="1 1 .1"/><geom type="plane" size="1 1 .1" pos="0 0 -1"/>
-  <body name="table"><geom name="top" size=".1"/></body>
-  <body pos="0 0 .5"><freejoint/><geom name="ball" size=".05"/><geom size=".05"/></body>
-  <body name="arm"><joint/><geom size=".05"/>
-    <body name="hand"><joint/><geom name="hand" size=".05"/></body></body>
-</worldbody></mujoco>"""
-
-
 def test_who_comes_first_and_what_has_no_name(tmp_path: Path) -> None:
-    names = ContactNames.of(sm.load(written(tmp_path / "scene.xml", SCENE)))
+    names = ContactNames.of(model_of(tmp_path, HALF_NAMELESS))
     floor, below, top, ball, other, _arm, hand = range(7)
     assert names.geoms(floor, hand) == names.geoms(hand, floor) == "hand on floor"
     assert names.geoms(ball, hand) == "hand on body 2 (ball)"
@@ -89,14 +81,10 @@ def test_pairs_of_two_models_are_called_alike() -> None:
 
 
 def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
-    path = written(
-        tmp_path / "corner.xml",
-        '<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1"/>'
-        '<geom name="wall" type="box" size=".1 1 1" pos="-.149 0 0"/>'
-        '<body name="box" pos="0 0 .049"><freejoint/><geom type="box" size=".05 .05 .05"/></body>'
-        "</worldbody></mujoco>",
+    trace = record(
+        model_of(tmp_path, WALL_AND_FLOOR),
+        seconds=0.05,
     )
-    trace = record(sm.load(path), seconds=0.05)
     pairs = trace.contact_pairs
     assert set(pairs) == {"box on floor", "box on wall"}
     assert sorted(np.concatenate(list(pairs.values())).tolist()) == list(

@@ -19,17 +19,7 @@ from statemachine.interface.checks import HUGE
 from statemachine.report import compare as report
 
 from .conftest import need_engine, written
-
-ROTOR = """<mujoco><option timestep="{timestep}" integrator="implicitfast"/><worldbody>
-  <body><joint name="rotor" axis="0 0 1"/><geom type="cylinder" size=".1 .01"/></body>
-  <body pos="1 0 0"><joint name="rail" type="slide" axis="0 0 1"/><geom size=".1"/></body>
-  <body name="ball" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody>
-  <actuator>{actuator}</actuator></mujoco>"""
-# A post that stands deep in the floor, and turns about nearly the vertical: nothing can lift it.
-STUCK = """<mujoco><option integrator="implicitfast"/><worldbody>
-  <geom type="plane" size="1 1 .1"/><body pos="0 0 .095"><joint axis="0 1e-3 1" damping=".1"/>
-  <geom type="box" size=".1 .1 .1"/><body name="arm" pos="0 0 .3"><joint axis="0 1 0"/>
-  <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body></body></worldbody></mujoco>"""
+from .small_models import ROTOR, STUCK_POST
 
 
 def loaded(folder: Path, text: str, **options: Any) -> sm.Model:
@@ -107,7 +97,7 @@ def explode(model: sm.Model) -> DivergedError:
 
 
 def test_an_explosion_is_raised_early(tmp_path: Path) -> None:
-    model = loaded(tmp_path, STUCK)
+    model = loaded(tmp_path, STUCK_POST)
     error = explode(model)
     assert "went beyond max_qvel, 5e+05, at time" in str(error)
     assert error.quantity == "qvel"
@@ -177,10 +167,6 @@ def test_a_comparison_in_which_a_side_diverges_says_that(
     assert not found["one"]["ended"]
     assert found["two"]["ended"].startswith("qvel[1] (shoulder_lift) = -1.04 went beyond")
     assert {each["verdict"] for each in found["agreements"]} == {"agrees"}
-    assert main(["compare", "hold", "--why"]) == 1
-    text = " ".join(capsys.readouterr().out.split())
-    assert "no cause is named" in text
-    assert "explain" not in text
 
 
 @pytest.mark.usefixtures("bullet")
@@ -199,4 +185,4 @@ def test_both_sides_may_diverge(tmp_path: Path) -> None:
     assert found.two.ended
     headline = report.page(found, one, two).headline
     assert headline is not None
-    assert "ended before their time" in headline.text
+    assert "ended early" in headline.text

@@ -14,34 +14,7 @@ from statemachine import rotations
 from statemachine.drawing import Drawing, Part, Surface, _shapes, drawing_of
 
 from .conftest import written
-
-ALL = """
-<mujoco>
-  <asset>
-    <mesh name="wedge" vertex="0 0 0  1 0 0  0 1 0  0 0 1  0 0 0"/>
-    <hfield name="hill" nrow="3" ncol="4" size="1 2 0.5 0.1"
-            elevation="0 0 0 0  0 1 0.5 0  0 0 0 0"/>
-    <texture name="t" type="2d" builtin="flat" rgb1="0.2 0.4 0.6" width="8" height="8"/>
-    <material name="m" texture="t" rgba="1 0.5 1 0.7"/>
-  </asset>
-  <worldbody>
-    <geom name="ground" type="plane" size="0 0 1"/>
-    <geom name="table" type="plane" size="2 3 1" pos="0 0 1"/>
-    <geom name="hill" type="hfield" hfield="hill"/>
-    <geom name="hidden" type="box" size="1 1 1" group="3"/>
-    <geom name="glass" type="box" size="1 1 1" rgba="1 1 1 0"/>
-    <body name="all" pos="1 2 3" quat="1 1 0 0">
-      <freejoint/>
-      <geom name="ball" type="sphere" size="0.3" pos="1 0 0" rgba="0.1 0.2 0.3 0.4"/>
-      <geom name="egg" type="ellipsoid" size="0.1 0.2 0.3" material="m"/>
-      <geom name="pill" type="capsule" size="0.1" fromto="0 0 0 0 1 0"/>
-      <geom name="can" type="cylinder" size="0.1 0.4" euler="0 90 0"/>
-      <geom name="brick" type="box" size="0.1 0.2 0.3" euler="0 0 90"/>
-      <geom name="wedge" type="mesh" mesh="wedge" pos="0.5 0 0"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
+from .small_models import CLOTH, EVERY_SHAPE, TOUCHING_ONLY, model_of
 
 
 def _volume(shape: Surface | Part) -> float:
@@ -140,7 +113,7 @@ def test_welding_keeps_the_surface_and_drops_what_is_there_twice() -> None:
 
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[sm.Model, Drawing]:
-    model = sm.load(written(tmp_path_factory.mktemp("all") / "all.xml", ALL))
+    model = sm.load(written(tmp_path_factory.mktemp("all") / "all.xml", EVERY_SHAPE))
     return model, drawing_of(model)
 
 
@@ -233,20 +206,11 @@ def test_the_eye_is_where_the_engines_camera_is() -> None:
 
 
 def test_what_only_touches_is_drawn_where_nothing_else_is(tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "m.xml",
-        "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body><freejoint/>"
-        "<geom type='box' size='1 1 1' group='3'/></body></worldbody></mujoco>",
-    )
-    assert [part.kind for part in drawing_of(sm.load(file)).parts] == ["plane", "box"]
+    assert [part.kind for part in drawing_of(model_of(tmp_path, TOUCHING_ONLY)).parts] == [
+        "plane",
+        "box",
+    ]
 
 
 def test_what_is_not_drawn_is_said(tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "m.xml",
-        "<mujoco><worldbody><geom type='sphere' size='1'/>"
-        "<flexcomp name='f' type='grid' count='3 3 1' spacing='1 1 1' dim='2' "
-        "mass='1' radius='.1' rigid='true'/>"
-        "</worldbody></mujoco>",
-    )
-    assert drawing_of(sm.load(file)).left_out == ("flex: 1",)
+    assert drawing_of(model_of(tmp_path, CLOTH)).left_out == ("flex: 1",)

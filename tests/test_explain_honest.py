@@ -6,9 +6,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+import statemachine as sm
 from statemachine.cli import main
+from statemachine.runs import read, record, write
 
 ARM = """
 <mujoco model="arm"><option integrator="implicitfast"/><worldbody>
@@ -98,7 +101,6 @@ def test_engine_settings_do_not_pay_for_another_file(
     ]
     code, found = asked(capsys, "f.py:none", *typed, "--why", "--seconds", "0.6")
     assert code == 1
-    assert found["engines"]["unexplained"] < 0.01  # of the left file on both engines
     assert found["unexplained"] > 0.9
 
 
@@ -113,16 +115,18 @@ def test_an_option_of_an_engine_as_it_comes_counts(
 ) -> None:
     file(folder, "n.xml", actuator="")
     sides = ("n.xml", "n.xml@pybullet:engine", option)
-    _, found = asked(capsys, "f.py:none", *sides, "--why", "--seconds", "0.3", "--no-floor")
-    (rung,) = (each for each in found["engines"]["ladder"] if each["factor"] == name)
-    assert rung["had"][1] == word
+    _, found = asked(capsys, "f.py:none", *sides, "--why", "--seconds", "0.3", "--no-chaos")
+    (row,) = (row for row in found["shares"] if row["name"] == name)
+    assert row["values"][0][2] == word
+    # What the file has none of, as the engine, is no difference.
+    assert not {"armature", "dry friction", "joint limits"} & {r["name"] for r in found["shares"]}
 
 
 def test_what_is_explained_is_what_differs(folder: Path, capsys: Any) -> None:
     """The joint's damping differs by less than a tolerance; the box slides, or does not."""
     file(folder, "l.xml", more=SLIDING.format(".2"), qpos=".8 0 1 .06 1 0 0 0")
     file(folder, "r.xml", damping=".02001", more=SLIDING.format(".6"), qpos=".8 0 1 .06 1 0 0 0")
-    for floor in ((), ("--floor", "0.1deg")):
+    for floor in ((), ("--uncertainty", "0.1deg")):
         code, found = asked(
             capsys, "f.py:none", "l.xml", "r.xml", "--why", "--seconds", "1", *floor
         )
@@ -139,7 +143,7 @@ def test_what_is_explained_is_what_differs(folder: Path, capsys: Any) -> None:
 def test_a_muscle_that_pulls_by_its_bias_has_a_length_range(folder: Path, capsys: Any) -> None:
     for name, lower in (("l.xml", "-.5"), ("r.xml", "-.2")):
         file(folder, name, actuator=MUSCLE.format(lower))
-    code, found = asked(capsys, "f.py:wave", "l.xml", "r.xml", "--why", "--no-floor")
+    code, found = asked(capsys, "f.py:wave", "l.xml", "r.xml", "--why", "--no-chaos")
     (cause,) = found["shares"]
     assert (code, cause["name"]) == (0, "length range of m")
     assert cause["share"] == pytest.approx(1.0)
@@ -149,7 +153,7 @@ def test_a_muscle_that_pulls_by_its_bias_has_a_length_range(folder: Path, capsys
 def test_a_start_at_another_time_is_a_cause(folder: Path, capsys: Any) -> None:
     file(folder, "l.xml")
     file(folder, "r.xml", key='time=".5"')
-    code, found = asked(capsys, "f.py:wave", "l.xml", "r.xml", "--why", "--no-floor")
+    code, found = asked(capsys, "f.py:wave", "l.xml", "r.xml", "--why", "--no-chaos")
     (cause,) = found["shares"]
     assert (code, cause["name"], cause["values"]) == (0, "time of the start", [["time", 0.0, 0.5]])
     assert cause["share"] == pytest.approx(1.0)
@@ -162,23 +166,22 @@ def test_a_sensor_counts_where_a_function_may_read_it(folder: Path, capsys: Any)
     file(folder, "l.xml", sensor=sensor.format(""))
     file(folder, "r.xml", sensor=sensor.format('cutoff=".01"'))
     file(folder, "v.xml", sensor=sensor.format("").replace("jointpos", "jointvel"))
-    code, found = asked(capsys, "f.py:sensed", "l.xml", "r.xml", "--why", "--no-floor")
+    code, found = asked(capsys, "f.py:sensed", "l.xml", "r.xml", "--why", "--no-chaos")
     (cause,) = found["shares"]
     assert (code, cause["name"]) == (0, "cutoff of p")
     assert cause["share"] == pytest.approx(1.0)
-    code, found = asked(capsys, "f.py:sensed", "l.xml", "v.xml", "--why", "--no-floor")
+    code, found = asked(capsys, "f.py:sensed", "l.xml", "v.xml", "--why", "--no-chaos")
     assert code == 1
     assert found["unexplained"] == 1.0
     assert found["shares"][0]["name"] == "sensor of p"
     # By themselves sensors move nothing.
-    code, found = asked(capsys, "f.py:none", "l.xml", "v.xml", "--why", "--no-floor")
+    code, found = asked(capsys, "f.py:none", "l.xml", "v.xml", "--why", "--no-chaos")
     assert (code, found["shares"]) == (0, [])
     assert main(["compare", "--models", "l.xml", "v.xml"]) == 0
     assert "sensor p type" in capsys.readouterr().out
 
 
 def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
-    import statemachine as sm
     from statemachine.compare.matching import match_models
     from statemachine.compare.why.causes import sensors_of
 
@@ -208,3 +211,44 @@ def test_forces_of_a_function_leave_no_open_loop(folder: Path, capsys: Any) -> N
     assert (code, found["commands"]) == (0, "more than ctrl")
     assert main(["compare", *words]) == 0
     assert "There is no open loop" in capsys.readouterr().out
+
+
+def test_recorded_runs_are_explained_by_the_models_that_their_headers_name(
+    folder: Path, capsys: Any
+) -> None:
+    file(folder, "l.xml")
+    file(folder, "r.xml", damping=".2")
+    for side in ("l", "r"):
+        model = sm.load(f"{side}.xml").replace(timestep=0.004)
+        run = record(
+            model,
+            lambda time, _d: [np.sin(6 * time)],
+            0.6,
+            keyframe="k",
+            options={"timestep": 0.004},
+        )
+        write(run, f"{side}.npz")
+        push = record(model, lambda _t, _d: [0.5], 0.6, options={"timestep": 0.004})
+        write(push, f"{side}_push.npz")
+
+    def why(*words: str) -> tuple[int, dict[str, Any]]:
+        code = main(["compare", *words, "--why", "--no-chaos", "--json"])
+        return code, json.loads(capsys.readouterr().out)
+
+    code, found = why("l.npz", "r.npz")
+    assert (code, [row["name"] for row in found["shares"]]) == (0, ["damping of j1"])
+    apart = np.abs(read("l.npz").qpos - read("r.npz").qpos).max()
+    assert found["gap"] == pytest.approx(apart, rel=1e-9)
+    # Two sides of one's own are given the recorded commands.
+    _, same = why("l.npz", "l.xml", "r.xml")
+    assert same["gap"] == pytest.approx(found["gap"], rel=1e-9)
+    # The start and the commands are causes, too.
+    code, found = why("l.npz", "r_push.npz")
+    assert (code, {row["name"] for row in found["shares"]}) == (
+        0,
+        {"damping of j1", "start", "commands"},
+    )
+    assert sum(row["share"] for row in found["shares"]) == pytest.approx(1.0)
+    (folder / "r.xml").unlink()
+    assert main(["compare", "l.npz", "r.npz", "--why"]) == 2
+    assert "r.xml is not here" in capsys.readouterr().err

@@ -17,18 +17,7 @@ import pytest
 from statemachine.models import resolve
 
 from .conftest import need_engine, written
-
-BOX = (
-    '<robot name="b"><link name="base"><inertial><origin xyz="0.1 0 0" rpy="0 0 0.3"/>'
-    '<mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="3"/></inertial>'
-    '<collision><geometry><box size="0.4 0.4 0.4"/></geometry></collision></link></robot>'
-)
-ARM = (
-    '<robot name="a"><link name="world"/><link name="one"><inertial><origin xyz="0.2 0 0"/>'
-    '<mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.03"/>'
-    '</inertial></link><joint name="j" type="continuous"><parent link="world"/>'
-    '<child link="one"/><axis xyz="0 1 0"/>{dynamics}</joint></robot>'
-)
+from .small_models import ARM_URDF, BOX_URDF
 
 
 @pytest.fixture
@@ -68,7 +57,7 @@ def load(pb: Any, client: int, tmp_path: Path) -> Load:
 
 
 def test_bodies_are_damped_until_told_otherwise(pb: Any, client: int, load: Load) -> None:
-    body = load(BOX, fixed=False)
+    body = load(BOX_URDF, fixed=False)
     speeds = []
     for _ in range(2):
         pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
@@ -85,7 +74,7 @@ def test_a_call_that_sets_the_largest_speed_ignores_damping(
     pb: Any, client: int, load: Load, more: dict[str, float]
 ) -> None:
     """One changeDynamics with both leaves the URDF's joint damping on: ours has none to leave."""
-    body = load(ARM.format(dynamics='<dynamics damping="3" friction="0"/>'))
+    body = load(ARM_URDF.format(dynamics='<dynamics damping="3" friction="0"/>'))
     pb.setJointMotorControl2(body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
     still = {"linearDamping": 0, "angularDamping": 0, "jointDamping": 0}
     pb.changeDynamics(body, 0, **still, **more, physicsClientId=client)
@@ -95,7 +84,7 @@ def test_a_call_that_sets_the_largest_speed_ignores_damping(
 
 
 def test_joint_speed_is_clamped_unless_told_otherwise(pb: Any, client: int, load: Load) -> None:
-    body = load(ARM.format(dynamics=""))
+    body = load(ARM_URDF.format(dynamics=""))
     pb.setJointMotorControl2(body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
     pb.changeDynamics(body, 0, linearDamping=0, angularDamping=0, physicsClientId=client)
     found = []
@@ -110,7 +99,7 @@ def test_joint_speed_is_clamped_unless_told_otherwise(pb: Any, client: int, load
 
 def test_a_base_is_its_inertial_frame(pb: Any, client: int, load: Load) -> None:
     """Position of the centre of mass, xyzw, velocities in world axes at the centre of mass."""
-    body = load(BOX, fixed=False)
+    body = load(BOX_URDF, fixed=False)
     pos, quat = pb.getBasePositionAndOrientation(body, client)
     assert np.allclose(pos, (0.1, 0, 0), atol=1e-12)
     assert np.allclose(quat, (0, 0, np.sin(0.15), np.cos(0.15)), atol=1e-12)
@@ -170,13 +159,13 @@ def test_inverse_dynamics_turns_gravity_with_a_base_that_has_mass(
     pb: Any, client: int, load: Load
 ) -> None:
     """Hence the emulated arm stands on a link without mass."""
-    turned = ARM.format(dynamics="").replace(
+    turned = ARM_URDF.format(dynamics="").replace(
         '<link name="world"/>',
         '<link name="world"><inertial><origin xyz="0 0 0" rpy="0 1.5707963 0"/><mass value="1"/>'
         '<inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="3"/></inertial></link>',
     )
     torques = []
-    for name, text in (("a.urdf", ARM.format(dynamics="")), ("b.urdf", turned)):
+    for name, text in (("a.urdf", ARM_URDF.format(dynamics="")), ("b.urdf", turned)):
         body = load(text, name=name)
         pb.setGravity(0, 0, -9.81, client)
         torques.append(
@@ -190,7 +179,7 @@ def test_a_box_on_a_plane_is_found_one_corner_at_a_time(pb: Any, client: int, lo
     """Hence a reset tilts what is free, so that it stands on all its corners at once."""
     shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
     pb.createMultiBody(0, shape, physicsClientId=client)
-    body = load(BOX.replace('0.3"/>', '0"/>'), fixed=False)
+    body = load(BOX_URDF.replace('0.3"/>', '0"/>'), fixed=False)
     pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), (0, 0, 0, 1), client)
     pb.performCollisionDetection(client)
     assert len(pb.getContactPoints(physicsClientId=client)) == 1
@@ -206,7 +195,7 @@ def test_files_are_cached_until_told_otherwise(pb: Any, client: int, load: Load)
     for caching in (1, 0):
         pb.setPhysicsEngineParameter(enableFileCaching=caching, physicsClientId=client)
         for mass in ("2", "5"):
-            text = BOX.replace('mass value="2"', f'mass value="{mass}"')
+            text = BOX_URDF.replace('mass value="2"', f'mass value="{mass}"')
             body = load(text, fixed=False, name=f"cached{caching}.urdf")
             masses.append(pb.getDynamicsInfo(body, -1, client)[0])
     assert masses[2:] == [2, 5]
@@ -215,7 +204,7 @@ def test_files_are_cached_until_told_otherwise(pb: Any, client: int, load: Load)
 
 
 def test_a_body_turns_rightly_up_to_45_degrees_a_step(pb: Any, client: int, load: Load) -> None:
-    body = load(BOX.replace('rpy="0 0 0.3"', 'rpy="0 0 0"'), fixed=False)
+    body = load(BOX_URDF.replace('rpy="0 0 0.3"', 'rpy="0 0 0"'), fixed=False)
     pb.setTimeStep(0.02, client)
     pb.changeDynamics(body, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
     turned = []

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 import statemachine as sm
-from statemachine.compare.forks import forks_for, in_forks
 from statemachine.compare.why import Explanation
 from statemachine.errors import BadInputError
+from statemachine.processes.forks import forks_for, in_forks
 from statemachine.report.as_json import dumps
 
 from .conftest import ROOT
@@ -32,8 +32,7 @@ def _apart(text: str, names: tuple[str, ...] = FEW) -> str:
 
 
 def _figures(found: Explanation) -> str:
-    engines = found.engines and replace(found.engines, provenance=())
-    return dumps(replace(found, took=0.0, provenance=(), engines=engines))
+    return dumps(replace(found, took=0.0, provenance=()))
 
 
 def _feedback(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
@@ -141,7 +140,7 @@ def test_a_run_whose_process_dies_is_a_set_that_cannot_be_run(tmp_path: Path) ->
 @forks
 def test_what_never_ends_in_a_fork_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """As where code waits for threads that did not come along."""
-    monkeypatch.setattr("statemachine.compare.forks._LEAST", 0.5)
+    monkeypatch.setattr("statemachine.processes.forks._LEAST", 0.5)
     here = os.getpid()
 
     def waits() -> int:
@@ -171,7 +170,7 @@ def test_a_function_is_run_here_unless_asked(
         raise AssertionError("forked")
 
     monkeypatch.setattr("statemachine.compare.why.trials.in_forks", never)
-    monkeypatch.setattr("statemachine.compare.forks._PAYS", 1e-9)
+    monkeypatch.setattr("statemachine.processes.forks._PAYS", 1e-9)
     found = explained(tmp_path, ARM, _apart(ARM), seconds=0.1, scenario=replace(SWING, own=True))
     assert found.runs > 10
 

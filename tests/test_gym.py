@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import warnings
 from contextlib import closing
 from typing import Any
@@ -29,7 +27,7 @@ from statemachine.gym.tasks import TASKS, HeldBox, Reach
 from statemachine.gym.vector import ArmVectorEnv
 from statemachine.rendering import renderer_here
 
-from .conftest import ROOT
+from .conftest import ROOT, in_its_own_python
 
 IDS = [task.id for task in TASKS.values()]
 REACH, HELD_BOX = IDS
@@ -63,12 +61,6 @@ def _same(one: Any, two: Any) -> None:
             assert one.tobytes() == two.tobytes()
     else:
         assert one == two
-
-
-def _said(code: str, *words: str) -> str:
-    """What a process of its own prints."""
-    command = [sys.executable, "-c", code, *words]
-    return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
 
 
 @pytest.mark.parametrize("task", IDS)
@@ -175,28 +167,6 @@ def test_the_box_is_held_by_the_action_0_and_dropped_by_open_jaws(backend: str) 
         assert reward == -info["distance"]
         assert not info["is_success"]
         assert not info["diverged"]
-
-
-_BITS = """
-import hashlib, sys, gymnasium, statemachine.gym
-digest = hashlib.sha256()
-for task in ("Reach", "HeldBox"):
-    env = gymnasium.make(f"statemachine/{task}-v0", backend=sys.argv[1])
-    env.action_space.seed(5)
-    digest.update(env.reset(seed=5)[0].tobytes())
-    for _ in range(30):
-        seen, *_, ended, out, _ = env.step(0.2 * env.action_space.sample())
-        digest.update(seen.tobytes())
-    env.close()
-print(digest.hexdigest())
-"""
-
-
-@pytest.mark.slow
-def test_the_same_seed_gives_the_same_bits_in_another_process(backend: str) -> None:
-    said = [_said(_BITS, backend) for _ in range(2)]
-    assert said[0] == said[1]
-    assert len(said[0].strip()) == 64
 
 
 def test_what_was_before_decides_nothing(backend: str) -> None:
@@ -354,6 +324,7 @@ def test_an_episode_is_the_same_however_the_next_one_starts(mode: str) -> None:
         ({"backend": "mujcoo"}, r"no backend named 'mujcoo'.*Did you mean"),
         ({"backend": "mujcoo", "num_envs": 2}, "no backend named"),
         ({"task": "reech"}, r"no task named 'reech'.*'reach'"),
+        ({"task": ["reach"]}, "no task named"),
         ({"autoreset_mode": "Never", "num_envs": 2}, "no autoreset mode named 'Never'"),
         ({"frame_skip": 0}, "frame_skip must be a whole number"),
         ({"num_envs": 0}, "num_envs must be a whole number"),
@@ -410,25 +381,10 @@ def test_without_gymnasium_the_extra_is_named() -> None:
         "try:\n    import statemachine.gym\n"
         "except ImportError as error:\n    print(type(error).__name__, error)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
-    )
+    done = in_its_own_python(code, ROOT)
     assert done.stdout.strip() == (
         "MissingEngineError the tasks need Gymnasium: pip install 'statemachine-sim[gym]'"
     )
-
-
-def test_help_knows_nothing_of_it() -> None:
-    code = (
-        "import sys, statemachine.cli as cli\n"
-        "try:\n    cli.main(['--help'])\nexcept SystemExit:\n    pass\n"
-        "heavy = ('gymnasium', 'statemachine.gym')\n"
-        "print([name for name in sys.modules if name.startswith(heavy)])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
-    )
-    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_what_is_closed_says_so_and_starts_nothing() -> None:
@@ -448,5 +404,3 @@ def test_seeds_may_be_an_array_of_numbers() -> None:
         listed, _ = envs.reset(seed=[3, 4])
         as_array, _ = envs.reset(seed=np.array([3, 4]))
         assert np.array_equal(listed, as_array)
-    with pytest.raises(UnknownNameError, match="no task named"):
-        gymnasium.make(REACH, task=["reach"])

@@ -17,33 +17,13 @@ from statemachine.rotations import matrix_from_quat
 from statemachine.runs.provenance import model_digest
 
 from .conftest import opened, written
+from .small_models import ATTACHED, BODY, EVERY_JOINT, STAND
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
 
-BODY = '<inertial mass="1" pos="0.1 0 0" diaginertia="1 1 1"/>'
-# Every kind of joint, two in one body, an offset axis, a branch, and nothing aligned.
-ZOO = f"""
-<mujoco>
-  <worldbody>
-    <body name="root" pos="0.1 0.2 0.3" euler="10 20 30">{BODY}<freejoint name="free"/>
-      <body name="b" pos="0.1 0.2 0.3" quat="0.5 0.5 -0.5 0.5">{BODY}
-        <joint name="ball" type="ball"/><site name="s" pos="1 2 3" euler="1 2 3"/>
-        <body name="z" pos="0 0 1">{BODY}<joint name="slide" type="slide" axis="1 1 0"/>
-          <site name="deep" pos="0.1 0 0"/></body>
-      </body>
-      <body name="a" pos="0 1 0">{BODY}
-        <joint name="x" axis="0 1 0" pos="0.1 0 0.2"/><joint name="y" axis="0 0 1"/>
-        <site name="t" pos=".1 .2 .3"/>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-
 
 def _write(folder: Path, text: str, name: str = "robot.xml") -> Path:
-    path = written(folder / name, text)
-    return path
+    return written(folder / name, text)
 
 
 def _against_mujoco(model: sm.Model, qpos: np.ndarray, site: str) -> float:
@@ -72,7 +52,7 @@ def test_arm_agrees_at_any_pose(qpos: np.ndarray) -> None:
 
 @pytest.mark.parametrize("site", ["s", "t", "deep"])
 def test_every_kind_of_joint_agrees(tmp_path: Path, site: str) -> None:
-    model = sm.load(_write(tmp_path, ZOO))
+    model = sm.load(_write(tmp_path, EVERY_JOINT))
     for seed in range(5):
         qpos = np.random.default_rng(seed).normal(size=model.nq)
         assert _against_mujoco(model, qpos, site) < 1e-12
@@ -183,7 +163,7 @@ def test_bad_input_is_refused() -> None:
 
 
 def test_a_zero_quaternion_is_refused(tmp_path: Path) -> None:
-    kinematics = sm.Kinematics(_write(tmp_path, ZOO))
+    kinematics = sm.Kinematics(_write(tmp_path, EVERY_JOINT))
     with pytest.raises(BadInputError, match="zero"):
         kinematics.pose(np.zeros(kinematics.nq), "s")
 
@@ -360,22 +340,6 @@ def test_the_same_numbers_give_the_same_places(tmp_path: Path, trap: str) -> Non
     assert _poses_agree(model, same) < 1e-12
 
 
-ATTACHED = """<mujoco model="arm"><compiler angle="radian" eulerseq="{order}"/>
-<default><joint axis="0 1 0" ref="0.2"/><site pos="0 0 0.1"/>
-<default class="wrist"><joint axis="1 0 0" pos="0.01 0 0"/></default></default>
-<worldbody>
-<body name="base" pos="0.1 0 0.2" euler="0.3 0.2 0.1" childclass="wrist">
-<geom size=".05"/><joint name="a"/>
-<body name="hand" pos="0.3 0 0"><geom size=".05"/><joint name="b"/><site name="tip" euler="1 2 3"/>
-<body name="finger" pos="0 0.1 0" euler="0 0 0.4"><geom size=".02"/><joint name="c"/>
-<site name="nail"/></body></body></body>
-<body name="other" pos="1 0 0" euler="0 0.5 0"><geom size=".05"/><joint name="o"/></body>
-</worldbody></mujoco>"""
-STAND = """<mujoco><compiler angle="degree"/><default><joint axis="0 0 1"/>
-<default class="tilted"><joint axis="0 1 1"/></default></default>
-<asset><model {name} file="parts/arm.xml"/></asset><worldbody>
-<body name="stand" pos="0 0 1" euler="0 0 30" childclass="tilted"><geom size=".1"/><joint name="s"/>
-{inside}</body>{beside}</worldbody></mujoco>"""
 TWO_ARMS = """<attach model="arm" body="base" prefix="left-"/><frame pos="0 .5 0" euler="90 0 0">
 <attach model="arm" body="base" prefix="right-"/></frame>"""
 
@@ -440,9 +404,30 @@ def test_what_was_done_to_the_text_is_told(tmp_path: Path) -> None:
         "mixed euler angles": "euler in another order written as axes: 1",
         "several roots, some of them free": "root bodies put below one body that stands still: 3",
         "a site of a body that stands still on a jointed one": "written as bodies: 1",
+        "a root with a pose": "places of root bodies without a joint kept by a body around them: 1",
+        "a root with a quaternion": "places of root bodies without a joint",
     }.items():
         assert said in " ".join(sm.Kinematics(_write(tmp_path, TRAPS[trap])).prepared), trap
-    assert sm.Kinematics("so101").prepared == ()
+    (said,) = sm.Kinematics("so101").prepared  # its baseframe
+    assert "sites of the world or a root body without a joint" in said
+
+
+def test_a_place_that_pinocchio_drops_is_said_to_be_kept(tmp_path: Path) -> None:
+    """UR5e and Allegro: Pinocchio alone puts them elsewhere by the place of their root body."""
+    file = _write(tmp_path, _robot("pos='0.3 0 1.2'"))
+    import pinocchio
+
+    raw = pinocchio.buildModelFromMJCF(str(file))
+    data = raw.createData()
+    pinocchio.framesForwardKinematics(raw, data, pinocchio.neutral(raw))
+    alone = data.oMf[raw.getFrameId("s")].translation
+    ours = sm.Kinematics(file)
+    assert ours.pose(np.zeros(ours.nq), "s").pos - alone == pytest.approx([0.3, 0.0, 1.2])
+    places, sites = ours.prepared
+    assert (places[-1], sites[-1]) == ("1", "1")
+    assert "low" not in [frame.name for frame in raw.frames]  # the site that is kept
+    still = sm.Kinematics(_write(tmp_path, _robot("pos='0 0 0'")))
+    assert still.prepared == (sites,)
 
 
 def test_included_files_are_found_as_mujoco_finds_them(tmp_path: Path) -> None:
@@ -493,6 +478,8 @@ def test_a_urdf_with_a_floating_link_and_meshes_elsewhere(tmp_path: Path) -> Non
     )
     model = sm.load(_write(tmp_path, text.format(""), "r.urdf"))
     own = sm.Kinematics(_write(tmp_path, text.format(mesh), "m.urdf"), model.joint_names)
+    (said,) = own.prepared
+    assert "floating joints" in said
     with sm.make_data(model) as data:
         for seed in range(4):
             data.qpos = np.random.default_rng(seed).normal(size=model.nq)

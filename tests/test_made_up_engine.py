@@ -91,6 +91,7 @@ LESSONS = [
     ("replay", "--steps", "100"),
     ("time",),
     ("speed", "--steps", "200"),
+    ("worlds", "--most", "2"),
     _slow("questions"),
 ]
 
@@ -104,12 +105,6 @@ def test_every_lesson_runs_on_it(capsys: Output, lesson: tuple[str, ...]) -> Non
 @pytest.mark.usefixtures("engine")
 def test_a_lesson_as_json(capsys: Output) -> None:
     assert list(json.loads(said(capsys, "lesson", "hold", *ON, "--json"))) == [NAME]
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("engine")
-def test_a_lesson_on_all_engines(capsys: Output) -> None:
-    assert NAME in said(capsys, "lesson", "hold", "--backend", "all")
 
 
 @pytest.mark.usefixtures("engine")
@@ -135,14 +130,6 @@ def test_a_comparison_finds_that_it_is_the_same(capsys: Output, words: tuple[str
     assert all(Path(word).stat().st_size for word in words if word.startswith("hold."))
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("engine")
-@pytest.mark.usefixtures("bullet")
-def test_why_it_parts_from_another_engine(capsys: Output) -> None:
-    words = ("--backends", "pybullet", NAME, *SHORT, "--defaults", "engine", "--why")
-    assert NAME in said(capsys, "compare", "hold", *words)
-
-
 @pytest.mark.usefixtures("engine")
 def test_what_it_makes_of_a_file_is_not_known(capsys: Output) -> None:
     for words in ((f"so101@{NAME}", "so101"), ("so101", *BESIDE)):
@@ -150,9 +137,22 @@ def test_what_it_makes_of_a_file_is_not_known(capsys: Output) -> None:
         assert "cannot be read here; known: mujoco, pybullet" in line
 
 
-@pytest.mark.usefixtures("room")
-def test_what_it_makes_of_a_file_its_room_tells(capsys: Output) -> None:
-    assert NAME in said(capsys, "compare", "--models", f"so101@{NAME}", "so101")
+@pytest.mark.usefixtures("room", "bullet", "pinocchio")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("compare", "--models", f"so101@{NAME}", "so101"),
+        ("compare", "--models", "so101", *BESIDE),
+        ("fingertip", *ON, "--poses", "5"),
+        _slow("lesson", "hold", "--backend", "all"),
+        _slow("compare", "hold", "--backends", "pybullet", NAME, *SHORT, "--defaults", "engine",
+              "--why"),
+        _slow("doctor"),
+    ],
+    ids=" ".join,
+)  # fmt: skip
+def test_what_is_said_of_it(capsys: Output, words: tuple[str, ...]) -> None:
+    assert NAME in said(capsys, *words)
 
 
 @pytest.mark.usefixtures("engine")
@@ -199,16 +199,6 @@ def test_what_it_takes_for_granted_is_not_asked(capsys: Output, words: tuple[str
     assert "not asked" in said(capsys, "conventions", *words, *ON)
 
 
-@pytest.mark.usefixtures("room")
-def test_two_engines_are_compared_by_what_their_rooms_tell(capsys: Output) -> None:
-    assert NAME in said(capsys, "compare", "--models", "so101", *BESIDE)
-
-
-@pytest.mark.usefixtures("engine", "pinocchio")
-def test_its_fingertip_has_a_witness(capsys: Output) -> None:
-    assert NAME in said(capsys, "fingertip", *ON, "--poses", "5")
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_exercises_are_judged_on_it(capsys: Output) -> None:
@@ -231,9 +221,3 @@ def test_it_is_viewed(capsys: Output) -> None:
     pytest.importorskip("viser")
     assert "http://" in said(capsys, "view", *ON, "--seconds", "0.3")
     assert "http://" in said(capsys, "view", *ON, "--ghost", "mujoco", "--seconds", "0.3")
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("engine")
-def test_the_doctor_has_a_line_for_it(capsys: Output) -> None:
-    assert NAME in said(capsys, "doctor")

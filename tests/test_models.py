@@ -11,9 +11,13 @@ import pytest
 
 import statemachine as sm
 from statemachine import backends, errors
+from statemachine.compare import parse_sides
+from statemachine.engines.mujoco.description import read_file
 from statemachine.models import models_dir, resolve
+from statemachine.robots import find
 
 from .conftest import registered, written
+from .small_models import MOTORS, PACKAGED_URDF, model_of
 
 
 def test_names() -> None:
@@ -59,6 +63,15 @@ def test_no_such_model(kind: type[Exception], names: list[str]) -> None:
             resolve(name)
 
 
+def test_an_mjcf_may_say_so_in_its_name(tmp_path: Path) -> None:
+    text = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
+    file = written(tmp_path / "robot.mjcf", text)
+    assert sm.load(file).path == file
+    assert [found.name for found in find([tmp_path])] == ["robot.mjcf"]
+    assert parse_sides([f"{file}@mujoco"])[0].path == file
+    assert read_file(file, "robot").format == "MJCF"
+
+
 def test_a_folder_or_another_suffix_is_no_model(tmp_path: Path) -> None:
     folder = tmp_path / "robot.xml"
     folder.mkdir()
@@ -85,11 +98,15 @@ def test_malformed_files(tmp_path: Path, content: str, capfd: pytest.CaptureFixt
 
 
 def test_a_file_with_a_unicode_name_and_spaces(tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "Ärm № 1.xml",
-        "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>",
+    assert (
+        sm.load(
+            written(
+                tmp_path / "Ärm № 1.xml",
+                "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>",
+            )
+        ).nq
+        == 1
     )
-    assert sm.load(file).nq == 1
 
 
 def test_a_model_survives_a_pickle(backend: str) -> None:
@@ -121,12 +138,7 @@ def test_gains_and_ranges_are_the_servos(tmp_path: Path) -> None:
     assert np.allclose(model.actuator_kv, 2.731)
     assert np.allclose(model.actuator_forcerange, [-2.94, 2.94])
     assert model.actuator_jntid.tolist() == [0, 1, 2, 3, 4, 5]
-    file = written(
-        tmp_path / "motor.xml",
-        "<mujoco><worldbody><body><joint name='j'/><geom size='1'/></body></worldbody>"
-        "<actuator><motor joint='j'/><velocity joint='j' kv='2'/></actuator></mujoco>",
-    )
-    model = sm.load(file)
+    model = model_of(tmp_path, MOTORS)
     assert np.isnan(model.actuator_kp).all()
     assert np.isinf(model.actuator_ctrlrange).all()
     assert not model.jnt_limited.any()
@@ -156,13 +168,6 @@ def test_a_model_without_anything_steps(tmp_path: Path) -> None:
         assert data.time == pytest.approx(3 * model.timestep)
 
 
-_IN_A_PACKAGE = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
-<visual><geometry><mesh filename="package://robot/meshes/look.dae"/></geometry></visual>
-<collision><geometry><mesh filename="package://robot/meshes/{name}"/></geometry></collision></link>
-<joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>"""
-
-
 @pytest.mark.parametrize("where", ["robot/urdf", "robot"])
 def test_meshes_of_ros_packages_are_found_in_the_folders_above(tmp_path: Path, where: str) -> None:
     meshes = tmp_path / "robot" / "meshes"
@@ -171,10 +176,10 @@ def test_meshes_of_ros_packages_are_found_in_the_folders_above(tmp_path: Path, w
     (meshes / "a & b.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in corners))
     file = tmp_path / where / "robot.urdf"
     file.parent.mkdir(exist_ok=True)
-    file.write_text(_IN_A_PACKAGE.format(name="a &amp; b.obj"))
+    file.write_text(PACKAGED_URDF.format(name="a &amp; b.obj"))
     model = sm.load(file)
     assert model.nq == 1
     assert model.compiled.nmesh == 1
-    file.write_text(_IN_A_PACKAGE.format(name="none.obj"))
+    file.write_text(PACKAGED_URDF.format(name="none.obj"))
     with pytest.raises(errors.ModelError, match=r"none\.obj"):
         sm.load(file)

@@ -18,16 +18,8 @@ import statemachine as sm
 from statemachine.backends import _mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
-from .conftest import ROOT, opened, written
-
-SLIDE = (
-    "<mujoco><worldbody><body><joint type='slide'/><geom size='.1'/></body></worldbody></mujoco>"
-)
-BOXES = "".join(
-    f"<body pos='{0.05 * (k % 6)} {0.05 * (k // 6)} .05'><freejoint/>"
-    "<geom type='box' size='.06 .06 .06'/></body>"
-    for k in range(18)
-)
+from .conftest import ROOT, opened
+from .small_models import SLIDE, TWO_SLIDES, crowded, model_of
 
 
 @pytest.fixture(autouse=True)
@@ -36,16 +28,6 @@ def _handler() -> Iterator[None]:
     before = mujoco.get_mju_user_warning()
     yield
     mujoco.set_mju_user_warning(before)
-
-
-def _crowded(folder: Path) -> sm.Model:
-    """A model that has not enough memory for its contacts, of which MuJoCo warns."""
-    file = written(
-        folder / "crowded.xml",
-        "<mujoco><size memory='300K'/><worldbody><geom type='plane' size='5 5 1'/>"
-        f"{BOXES}</worldbody></mujoco>",
-    )
-    return sm.load(file)
 
 
 def _step_raw_to_nan() -> list[str]:
@@ -191,7 +173,7 @@ def test_three_threads_that_diverge_at_once_each_hear_of_their_own() -> None:
 
 
 def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) -> None:
-    model, calm = _crowded(tmp_path), sm.load("so101/scene")
+    model, calm = crowded(tmp_path, 18, "300K"), sm.load("so101/scene")
     with sm.make_data(model) as data, sm.make_data(calm) as other:
         with pytest.warns(EngineWarning, match="memory|full|buffer") as given:
             sm.step(model, data, 2)
@@ -212,7 +194,7 @@ def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) 
 
 
 def test_forward_warns_too(tmp_path: Path) -> None:
-    model = _crowded(tmp_path)
+    model = crowded(tmp_path, 18, "300K")
     with sm.make_data(model) as data, pytest.warns(EngineWarning):
         sm.forward(model, data)
 
@@ -234,14 +216,7 @@ def test_the_first_entry_inside_a_bulk_step_is_named_where_it_is_known(
     foreign: bool, nstep: int, alone: bool, tmp_path: Path
 ) -> None:
     """The one that grows faster is bad first; with its text, or as the only one, it is known."""
-    file = written(
-        tmp_path / "two.xml",
-        "<mujoco><option gravity='0 0 0'/><worldbody>"
-        "<body><joint name='a' type='slide'/><geom size='.1' mass='1'/></body>"
-        "<body pos='9 0 0'><joint name='b' type='slide' axis='1 0 0'/><geom size='.1' mass='1'/>"
-        "</body></worldbody></mujoco>",
-    )
-    with opened(sm.load(file)) as (model, data):
+    with opened(model_of(tmp_path, TWO_SLIDES)) as (model, data):
         if foreign:
             mujoco.set_mju_user_warning(lambda text: None)
         data.qvel[:] = 9e9, 9.5e9

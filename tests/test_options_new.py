@@ -5,6 +5,7 @@ What they do to a motion is checked by `statemachine.conformance.options`, on ev
 
 from __future__ import annotations
 
+import pickle
 import warnings
 from pathlib import Path
 from typing import Any
@@ -16,23 +17,16 @@ import pytest
 import statemachine as sm
 from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
+from statemachine.interface import Array
 
-from .conftest import written
+from .small_models import CART, model_of
 
-CART = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body name="cart">
-<joint name="rail" type="slide" axis="1 0 0"/><joint name="other" type="slide" axis="0 1 0"/>
-<geom size=".1" mass="2"/></body></worldbody>
-<actuator>{actuators}</actuator></mujoco>"""
 SERVO = '<position name="servo" joint="rail" kp="100" kv="20"/>'
 MOTOR = '<motor name="motor" joint="other"/>'
 
 
-def loaded(tmp_path: Path, text: str, backend: str = "mujoco") -> Any:
-    return sm.load(written(tmp_path / "model.xml", text), backend=backend)
-
-
 def cart(tmp_path: Path, actuators: str, backend: str = "mujoco") -> Any:
-    return loaded(tmp_path, CART.format(actuators=actuators), backend)
+    return model_of(tmp_path, CART.format(actuators=actuators), backend=backend)
 
 
 def test_a_replaced_model_is_as_if_compiled_with_that_mass() -> None:
@@ -126,7 +120,7 @@ def test_pybullet_says_which_frictions_it_cannot_have() -> None:
 def test_friction_without_effect_is_refused(tmp_path: Path) -> None:
     """The file overrides that of every contact."""
     option = '<option><flag override="enable"/></option>'
-    model = loaded(
+    model = model_of(
         tmp_path, CART.format(actuators="").replace("<worldbody>", option + "<worldbody>")
     )
     with pytest.raises(UnsupportedError, match="overrides the friction"):
@@ -144,7 +138,7 @@ DELAYED = CART.format(
 @pytest.mark.parametrize(("kept", "late"), [(9, 4), (2, 2)])
 def test_a_delay_of_the_file_is_kept(tmp_path: Path, backend: str, kept: int, late: int) -> None:
     """7 ms are 4 steps of 2 ms; where the file keeps two commands, the older of them acts."""
-    model = loaded(tmp_path, DELAYED.format(kept=kept, interp="zoh"), backend)
+    model = model_of(tmp_path, DELAYED.format(kept=kept, interp="zoh"), backend=backend)
     np.testing.assert_allclose(model.actuator_delay, [late * 0.002, 0])
     with sm.make_data(model) as data:
         data.ctrl[:] = 1
@@ -156,10 +150,67 @@ def test_a_delay_of_the_file_is_kept(tmp_path: Path, backend: str, kept: int, la
     assert all(other for _, other in moved)
 
 
+LATE = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body>
+<joint name="j" axis="0 1 0" damping="0.1"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
+</body></worldbody>
+<actuator><position joint="j" kp="20" kv="1" delay="0.05" nsample="5"/></actuator>
+<keyframe><key name="home" qpos="0.5" ctrl="0.5"/></keyframe></mujoco>"""
+
+
+def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, backend: str) -> None:
+    """Reset to a keyframe, MuJoCo finds 0 in the buffer; the option finds the keyframe's ctrl."""
+    raw = mujoco.MjModel.from_xml_string(LATE)
+    data = mujoco.MjData(raw)
+    mujoco.mj_resetDataKeyframe(raw, data, 0)
+    path = np.zeros((30, 1))
+    for row in path:
+        mujoco.mj_step(raw, data)
+        row[:] = data.qpos
+    assert np.degrees(0.5 - path.min()) > 15  # it falls back for five steps
+    model = model_of(tmp_path, LATE, "late.xml", backend=backend)
+
+    def ours(model: sm.Model) -> Array:
+        with sm.make_data(model) as own:
+            sm.reset(model, own, keyframe="home")
+            return run_rows(model, own, 30)
+
+    assert np.abs(ours(model) - path).max() < (1e-9 if backend == "pybullet" else 1e-15)
+    # What is made of it starts in the same way, and what the option asks for is held.
+    assert np.abs(ours(model.replace(damping=0.1)) - path).max() < 1e-9
+    assert np.abs(ours(model.with_compiled(model.compiled)) - path).max() < 1e-9
+    late = model.replace(latency=0.05)
+    for held in (
+        late,
+        late.replace(damping=0.1),
+        late.with_compiled(late.compiled),
+        pickle.loads(pickle.dumps(late)),
+        sm.load(model.path, backend, latency=0.05),
+    ):
+        assert np.abs(ours(held) - 0.5).max() < 0.03
+    cases: list[tuple[dict[str, Any], Array]] = [({}, path), ({"latency": [0.05]}, ours(late))]
+    for options, of in cases:
+        with worlds.make_worlds(model, 1, **options) as many:
+            worlds.reset(many, keyframe=0)
+            rows = []
+            for _ in range(30):
+                worlds.step(many)
+                rows.append(many.qpos[0].copy())
+        assert np.abs(np.array(rows) - of).max() < 1e-9
+
+
+def run_rows(model: sm.Model, data: sm.Data, steps: int) -> Array:
+    """Positions (steps, nq) after each step."""
+    rows = np.zeros((steps, model.nq))
+    for row in rows:
+        sm.step(model, data)
+        row[:] = data.qpos
+    return rows
+
+
 @pytest.mark.usefixtures("bullet")
 def test_an_interpolated_delay_is_refused_on_pybullet(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedError, match="interpolated latency"):
-        loaded(tmp_path, DELAYED.format(kept=9, interp="linear"), "pybullet")
+        model_of(tmp_path, DELAYED.format(kept=9, interp="linear"), backend="pybullet")
 
 
 def test_latency_follows_the_timestep(backend: str) -> None:

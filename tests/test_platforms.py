@@ -10,7 +10,6 @@ import re
 import subprocess
 import sys
 import tomllib
-import unicodedata
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import SimpleNamespace
@@ -75,18 +74,14 @@ def asked(platform: str, python: str, lines: Iterable[str]) -> dict[str, Require
     return {r.name: r for r in found}
 
 
-def _resolve(
-    platform: str, python: str, name: str | None = None
-) -> subprocess.CompletedProcess[str]:
-    """The versions that an installer would take there, from wheels alone; of us or of another."""
+def _resolve(platform: str, python: str) -> subprocess.CompletedProcess[str]:
+    """The versions of ours that an installer would take there, from wheels alone."""
     command = (
         "uv", "pip", "compile", "-q", "--no-header", "--no-annotate", "--only-binary", ":all:",
-        "--python-platform", platform, "--python-version", python,
-        "-" if name else ROOT / "pyproject.toml",
+        "--python-platform", platform, "--python-version", python, ROOT / "pyproject.toml",
     )  # fmt: skip
     done = subprocess.run(
         [sys.executable, "-m", *map(str, command)],
-        input=name,
         capture_output=True,
         text=True,
         check=False,
@@ -142,25 +137,6 @@ def test_what_is_installed_needs_no_compiler(platform: str, python: str) -> None
         assert found[name] == version or not version
 
 
-@pytest.mark.slow
-@pytest.mark.network
-@pytest.mark.parametrize(("platform", "python"), [(LINUX_ARM, "3.12"), (WINDOWS, "3.14")])
-def test_where_pybullet_is_not_asked_for_it_has_no_wheel(platform: str, python: str) -> None:
-    """When one comes, the table can say so."""
-    for name in ENGINES["pybullet"].distributions:
-        done = _resolve(platform, python, name)
-        assert done.returncode != 0, done.stdout
-
-
-@pytest.mark.slow
-@pytest.mark.network
-def test_intel_macs_are_not_promised() -> None:
-    """README says that MuJoCo has no wheel there; when it has, the table can say so."""
-    done = _resolve("x86_64-apple-darwin", "3.11")
-    assert done.returncode != 0
-    assert "mujoco" in done.stderr
-
-
 @pytest.fixture
 def without_pybullet(tmp_path: Path) -> dict[str, str]:
     """An environment in which PyBullet is not there, whatever this machine has."""
@@ -179,7 +155,6 @@ def without_pybullet(tmp_path: Path) -> dict[str, str]:
 
 def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str]) -> None:
     done = cli("lesson", "gravity", "--backend", "pybullet", **without_pybullet, code=3)
-    assert not done.stdout
     (line,) = done.stderr.splitlines()
     here = installed.wheel_here(ENGINES["pybullet"])
     assert (f"pip install {here.requirement} " if here else "no wheel for") in line
@@ -274,25 +249,3 @@ def test_all_goes_on_with_the_engines_that_are_there(
     assert "pybullet is not installed here" in line
     told = cli("lesson", "state", "--backend", "all", "--json", **without_pybullet)
     assert list(json.loads(told.stdout)) == ["mujoco"]
-
-
-@pytest.mark.slow
-def test_the_doctor_calls_it_optional(cli: Cli, without_pybullet: dict[str, str]) -> None:
-    done = cli("doctor", "--json", **without_pybullet, code=0)
-    (finding,) = (f for f in json.loads(done.stdout)["findings"] if f["name"] == "pybullet")
-    assert not finding["works"]
-    assert re.search("pip install|no wheel", finding["found"])
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("bullet")
-def test_with_it_every_lesson_speaks_of_both(cli: Cli) -> None:
-    for lesson in ("state", "forward", "hold", "gravity"):
-        done = cli("lesson", lesson, "--backend", "all", code=0)
-        assert not done.stderr
-        # Differences come last, but for what to do next.
-        after = done.stdout.partition("Where they differ, and by how much")[2]
-        assert "pybullet against mujoco" in after
-        assert "✓" not in after
-        for line in done.stdout.splitlines():
-            assert len([char for char in line if not unicodedata.combining(char)]) <= 80

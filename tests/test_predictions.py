@@ -64,7 +64,7 @@ def test_nobody_there_to_answer(cli: Cli, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
-def test_a_station_at_a_terminal_is_recorded(tmp_path: Path) -> None:
+def test_a_lesson_at_a_terminal_is_recorded(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     typed = [("Your prediction", "c\n")]
     seen = _at_a_terminal("lesson", "state", "--record", str(file), typed=typed)

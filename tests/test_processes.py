@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import pickle
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -46,20 +46,6 @@ def test_other_processes_continue_with_the_same_bits(backend: str) -> None:
         sm.set_state(model, data, state)
         here = _swing(model, data, 200)
     assert futures[0] == futures[1] == here
-
-
-@pytest.mark.slow
-def test_threads_continue_with_the_same_bits(backend: str) -> None:
-    model, state = _mid_contact(backend)
-
-    def work(_: int) -> sm.State:
-        with sm.make_data(model) as data:
-            sm.set_state(model, data, state)
-            return _swing(model, data, 300)
-
-    with ThreadPoolExecutor(4) as pool:
-        ends = list(pool.map(work, range(8)))
-    assert len(set(ends)) == 1
 
 
 @pytest.mark.slow

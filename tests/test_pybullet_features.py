@@ -13,14 +13,8 @@ import statemachine as sm
 from statemachine.errors import UnsupportedError
 
 from .conftest import need_engine, written
+from .small_models import FEATURED
 
-ARM = """<mujoco><option {option}/><worldbody>{more}
-  <body pos="0 0 2"><joint name="a" axis="0 1 0"/>
-  <geom name="upper" type="capsule" fromto="0 0 0 .3 0 0" size=".02" {geom}/>
-  <body pos=".3 0 0"><joint name="b" axis="0 1 0" {joint}/>
-  <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body></body></worldbody>
-  <actuator>{actuator}<position name="servo" joint="b" kp="10" kv="1" ctrlrange="-1 1"/></actuator>
-  </mujoco>"""
 FLOOR = '<geom name="floor" type="plane" size="2 2 .1"/>'
 BALL = '<body pos="1 0 .5"><joint type="ball" name="ball"/><geom size=".1"/></body>'
 PID = '<pid name="p" joint="a" kp="20" kv="2"/>'
@@ -68,7 +62,7 @@ def both(folder: Path, changes: dict[str, str], **options: Any) -> tuple[sm.Mode
     need_engine("pybullet")
     given = dict.fromkeys(("more", "geom", "joint", "actuator"), "")
     given |= {"option": 'integrator="implicitfast"'} | changes
-    path = written(folder / "model.xml", ARM.format(**given | {"more": FLOOR + given["more"]}))
+    path = written(folder / "model.xml", FEATURED.format(**given | {"more": FLOOR + given["more"]}))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         two = sm.load(path, backend="pybullet", **options)

@@ -11,7 +11,8 @@ import pytest
 import statemachine as sm
 from statemachine.errors import EngineWarning, UnsupportedError
 
-from .conftest import need_engine, started, written
+from .conftest import need_engine, started
+from .small_models import loaded
 
 IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
 FLOOR = '<geom name="floor" type="plane" size="1 1 .1"/>'
@@ -24,10 +25,8 @@ def _engine() -> None:
 
 def both(folder: Path, body: str, option: str = IMPLICIT, rest: str = "") -> list[sm.Model]:
     """The model on MuJoCo and on PyBullet."""
-    file = written(
-        folder / "m.xml", f"<mujoco>{option}<worldbody>{body}</worldbody>{rest}</mujoco>"
-    )
-    return [sm.load(file, backend=backend) for backend in ("mujoco", "pybullet")]
+    backends = ("mujoco", "pybullet")
+    return [loaded(folder, body, rest, option=option, backend=name) for name in backends]
 
 
 def chain(joint: str, count: int = 3, height: float = 1.0) -> str:
@@ -57,26 +56,46 @@ def apart(models: list[sm.Model], steps: int, qpos: float, ctrl: float = 0.0) ->
     return float(np.abs(paths[0] - paths[1]).max())
 
 
-def test_strong_dry_friction_in_joints_that_pull_at_each_other(tmp_path: Path) -> None:
-    """Without armature, friction of one joint moves the next: a plain sweep diverges here."""
-    assert apart(both(tmp_path, chain('frictionloss="1"')), 300, 0.3) < 1e-9
+def driven(kind: str, joints: int = 3, gains: str = "") -> str:
+    """An actuator on each of the first joints of a chain."""
+    inside = "".join(f'<{kind} joint="j{k}" {gains}/>' for k in range(joints))
+    return f"<actuator>{inside}</actuator>"
 
 
-def test_limits_under_a_stiff_servo(tmp_path: Path) -> None:
-    """Constraints feel the explicit inertia, velocities the implicit one."""
-    servos = "".join(f'<position joint="j{k}" kp="50" kv="5"/>' for k in range(3))
-    models = both(
-        tmp_path,
-        chain('range="-20 30" limited="true" armature=".01" damping=".1"'),
-        rest=f"<actuator>{servos}</actuator>",
-    )
-    assert apart(models, 300, 0.0, ctrl=2.0) < 1e-8
+WIDTHLESS = 'range="-20 10" limited="true" damping=".01" solimplimit=".1 .9 0 .5 2"'
+LIMITED = 'range="-20 30" limited="true" armature=".01" damping=".1"'
+WEAK = 'actuatorfrcrange="-.1 .1" armature=".01"'
+# A joint, the mass of a link, actuators, steps, qpos, ctrl, and how far apart the engines may be.
+CHAINS = {
+    # Without armature, friction of one joint moves the next: a plain sweep diverges here.
+    "strong dry friction": ('frictionloss="1"', ".1", "", 300, 0.3, 0.0, 1e-9),
+    # What counts as a change of friction is measured by the friction, not in N·m.
+    "light joints": ('frictionloss=".0005"', ".001", "", 200, 0.3, 0.0, 1e-9),
+    "lighter joints": ('frictionloss=".000005"', ".00001", "", 200, 0.3, 0.0, 1e-9),
+    # Constraints feel the explicit inertia, velocities the implicit one.
+    "limits under a servo": (
+        LIMITED, ".1", driven("position", 3, 'kp="50" kv="5"'), 300, 0.0, 2.0, 1e-8,
+    ),
+    "limits without a width": (WIDTHLESS, ".1", "", 300, 0.0, 0.0, 1e-6),
+    # MuJoCo's actuatorfrcrange, which is the effort of a URDF.
+    "the force limit": (WEAK, ".1", driven("motor", 1, 'gear="3"'), 100, 0.0, -1.0, 1e-9),
+    # Its kv is then no part of the implicit inertia: it would slow a joint that is held.
+    "a servo beyond it": (
+        WEAK, ".1", driven("position", 1, 'kp="50" kv="3"'), 300, 0.0, 1.5, 1e-9,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_chain_moves_as_on_mujoco(tmp_path: Path, name: str) -> None:
+    joint, mass, actuators, steps, qpos, ctrl, most = CHAINS[name]
+    text = chain(joint).replace('mass=".1"', f'mass="{mass}"')
+    assert apart(both(tmp_path, text, rest=actuators), steps, qpos, ctrl) < most
 
 
 def test_a_limit_acts_from_its_margin_on(tmp_path: Path) -> None:
     text = chain('range="-20 30" limited="true" margin=".1" armature=".01" damping=".1"')
-    motors = "".join(f'<motor joint="j{k}"/>' for k in range(3))
-    models = both(tmp_path, text, rest=f"<actuator>{motors}</actuator>")
+    models = both(tmp_path, text, rest=driven("motor"))
     assert apart(models, 300, 0.0, ctrl=0.5) < 1e-8
     assert apart([models[0], both(tmp_path, text.replace("margin", "user"))[1]], 300, 0.0) > 1e-3
 
@@ -84,15 +103,11 @@ def test_a_limit_acts_from_its_margin_on(tmp_path: Path) -> None:
 @pytest.mark.parametrize("flag", ["", '<flag eulerdamp="disable"/>'])
 def test_the_integrator_of_the_file(tmp_path: Path, flag: str) -> None:
     """Under Euler a servo's kv is explicit, and joint damping is not, or is."""
-    servos = "".join(f'<position joint="j{k}" kp="5" kv=".1"/>' for k in range(3))
+    servos = driven("position", 3, 'kp="5" kv=".1"')
     option = f'<option timestep="0.005" integrator="Euler">{flag}</option>'
-    models = both(
-        tmp_path, chain('armature=".02" damping=".05"'), option, f"<actuator>{servos}</actuator>"
-    )
+    models = both(tmp_path, chain('armature=".02" damping=".05"'), option, servos)
     assert apart(models, 200, 0.2) < 1e-9
-    fast = both(
-        tmp_path, chain('armature=".02" damping=".05"'), rest=f"<actuator>{servos}</actuator>"
-    )
+    fast = both(tmp_path, chain('armature=".02" damping=".05"'), rest=servos)
     assert apart([models[0], fast[0].replace(timestep=0.005)], 200, 0.2) > 1e-5
 
 
@@ -115,9 +130,9 @@ def test_light_joints_before_a_heavy_motor_rest_on_the_floor(tmp_path: Path, arm
     text = chain('damping=".02"', height=0.1)
     for k, value in enumerate(armature.split()):
         text = text.replace(f'name="j{k}"', f'name="j{k}" armature="{value}"')
-    servos = "".join(f'<position joint="j{k}" kp="20" kv=".5"/>' for k in range(3))
+    servos = driven("position", 3, 'kp="20" kv=".5"')
     option = '<option timestep="0.005" integrator="implicitfast"/>'
-    _, model = both(tmp_path, FLOOR + text, option, f"<actuator>{servos}</actuator>")
+    _, model = both(tmp_path, FLOOR + text, option, servos)
     with sm.make_data(model) as data:
         data.ctrl[:] = 0.8
         sm.step(model, data, 1500)
@@ -235,7 +250,10 @@ def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:
     )
     with pytest.warns(EngineWarning) as told:
         both(tmp_path, bodies)
-    assert any("friction of b0 and b1 is" in str(warning.message) for warning in told)
+    (text,) = [str(warning.message) for warning in told]
+    assert "friction of b0 and b1 is" in text
+    # Each of the six pairs has three frictions: the first three are named, the others counted.
+    assert (text.count("friction of"), text.count(" more")) == (3, 1)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sm.load("so101/scene_box", backend="pybullet")
@@ -309,7 +327,7 @@ def test_what_a_hull_is_not_is_said(tmp_path: Path) -> None:
     )
     with pytest.warns(EngineWarning) as told:
         both(tmp_path, body, rest=plate)
-    text = str(told[0].message)
+    text = " ".join(str(warning.message) for warning in told)
     assert "ellipsoids touch as hulls, which are up to 0.45 mm off (egg)" in text
     assert "1 hulls are too thin to be made smaller by the engine's margin" in text
     assert "up to 0.75 mm too large (plate)" in text
@@ -350,30 +368,6 @@ def test_a_reset_forgets_what_the_links_of_one_arm_touched() -> None:
             sm.step(model, data, 300)
             ends.append(data.qpos.copy())
     assert np.array_equal(*ends)
-
-
-@pytest.mark.parametrize("scale", [1e-2, 1e-4])
-def test_friction_of_light_joints_too(tmp_path: Path, scale: float) -> None:
-    """What counts as a change of friction is measured by the friction, not in N·m."""
-    text = chain(f'frictionloss="{0.05 * scale}"').replace('mass=".1"', f'mass="{0.1 * scale}"')
-    assert apart(both(tmp_path, text), 200, 0.3) < 1e-9
-
-
-def test_the_force_limit_of_a_joint(tmp_path: Path) -> None:
-    """MuJoCo's actuatorfrcrange, which is the effort of a URDF."""
-    models = both(
-        tmp_path,
-        chain('actuatorfrcrange="-.1 .1" armature=".01"'),
-        rest='<actuator><motor joint="j0" gear="3"/></actuator>',
-    )
-    assert apart(models, 100, 0.0, ctrl=-1.0) < 1e-9
-
-
-def test_a_servo_beyond_the_force_limit_of_its_joint_has_no_damping(tmp_path: Path) -> None:
-    """Its kv is then no part of the implicit inertia: it would slow a joint that is held."""
-    servo = '<actuator><position joint="j0" kp="50" kv="3"/></actuator>'
-    text = chain('actuatorfrcrange="-.1 .1" armature=".01"')
-    assert apart(both(tmp_path, text, rest=servo), 300, 0.0, ctrl=1.5) < 1e-9
 
 
 def test_a_joint_on_its_limit_is_no_slower(tmp_path: Path) -> None:
@@ -418,8 +412,3 @@ def test_a_body_of_two_frictions_is_named(tmp_path: Path) -> None:
     )
     with pytest.warns(EngineWarning, match=r"not 0\.05 for some"):
         both(tmp_path, body)
-
-
-def test_limits_without_a_width(tmp_path: Path) -> None:
-    joint = 'range="-20 10" limited="true" damping=".01" solimplimit=".1 .9 0 .5 2"'
-    assert apart(both(tmp_path, chain(joint)), 300, 0.0) < 1e-6

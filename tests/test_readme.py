@@ -14,8 +14,8 @@ import pytest
 
 from statemachine.grading.judges import JUDGES
 from statemachine.grading.mutants.faults import FAULTS
-from statemachine.lessons import STATIONS
-from statemachine.lessons.questions import _ASKED
+from statemachine.lessons import PATH
+from statemachine.lessons.questions import ASKED
 from statemachine.probes.conventions import QUESTIONS
 
 from .conftest import ROOT, Cli, need_engine, opened, written
@@ -207,11 +207,11 @@ def test_what_is_counted() -> None:
     word = dict(enumerate(names.split(), start=1))
     counted = {
         "README.md": (
-            f"{word[len(STATIONS)]} stations",
-            f"{word[len(_ASKED)]} questions",
+            f"{word[len(PATH)]} lessons",
+            f"{word[len(ASKED)]} questions",
             f"{word[len(JUDGES)]} functions",
         ),
-        "docs/lessons.md": (f"{word[len(STATIONS)]} stations", f"{word[len(_ASKED)]} questions"),
+        "docs/lessons.md": (f"{word[len(PATH)]} lessons", f"{word[len(ASKED)]} questions"),
         "docs/exercises.md": (
             f"{word[len(JUDGES)]} functions",
             f"fault is put into the arm, one at a time, {word[len(FAULTS)]} in all",

@@ -1,4 +1,4 @@
-"""Every station has a picture of the robot, words for it, and a command that shows it live."""
+"""Every lesson of the path has a picture of the robot, its words, and a command to see it live."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 import statemachine as sm
 from statemachine import cli
 from statemachine.errors import MissingEngineError
-from statemachine.lessons import STATIONS
+from statemachine.lessons import PATH
 from statemachine.lessons.pictures import PICTURES, with_picture
 from statemachine.page import Page, Printed, Question, RobotPicture, Text
 from statemachine.report import markdown as md
@@ -21,14 +21,14 @@ from statemachine.report.quiz import Reader
 from .rendering import rendering_environment
 
 
-def test_every_station_has_one() -> None:
-    assert list(PICTURES) == [lesson.name for lesson in STATIONS]
+def test_every_lesson_of_the_path_has_one() -> None:
+    assert list(PICTURES) == [lesson.name for lesson in PATH]
 
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_it_is_of_the_lesson_s_model_and_says_what_is_to_be_seen(name: str) -> None:
     picture = PICTURES[name]
-    (lesson,) = [lesson for lesson in STATIONS if lesson.name == name]
+    (lesson,) = [lesson for lesson in PATH if lesson.name == name]
     assert picture.model == lesson.model
     assert len(picture.words) > 40
     model = sm.load(picture.model)

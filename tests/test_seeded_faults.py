@@ -75,10 +75,6 @@ def keyframe_forgets_ctrl(self: MujocoData, right: Callable[..., None], key: int
     self.raw.ctrl[:] = 0
 
 
-def keyframe_forgets_the_commands_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mujoco_backend, "hold", lambda raw, history, ctrl: None)
-
-
 @replaced(MujocoData, "_set_state")
 def state_forgets_the_commands(self: MujocoData, right: Callable[..., None], state: State) -> None:
     kept = self.raw.history.copy()
@@ -94,21 +90,6 @@ def state_forgets_the_warm_start(
     self.raw.qacc_warmstart[:] = 0
 
 
-@replaced(Alarms, "clear")
-def recovery_leaves_the_counters(self: Alarms, right: Callable[[], None]) -> None:
-    pass
-
-
-@replaced(Alarms, "attend")
-def warnings_are_ignored(self: Alarms, right: Callable[[], None]) -> None:
-    pass
-
-
-@replaced(MujocoData, "qfrc_contact")
-def contact_force_is_the_whole_constraint(self: MujocoData, right: Callable[[], Any]) -> Any:
-    return self.qfrc_constraint
-
-
 @replaced(MujocoData, "contacts")
 def contact_normal_the_other_way(self: MujocoData, right: Callable[[], Any]) -> Any:
     found = right()
@@ -120,16 +101,6 @@ def _damp_bodies(raw: Any, by: float) -> None:
 
 
 free_body_damped = mutants.compiled(partial(_damp_bodies, by=0.4), partial(_damp_bodies, by=0))
-
-
-def options_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        MujocoModel, "_replace", lambda self, _options: MujocoModel(self.raw, self.path, 1)
-    )
-
-
-def replace_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_edits.copy, "copy", lambda raw: raw)
 
 
 def changes_with(*names: str) -> Patch:
@@ -202,12 +173,15 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
         {"restored_futures_agree", "forward_depends_on_the_state_alone"},
     ),
     "recovery leaves the counters": (
-        recovery_leaves_the_counters,
+        replaced(Alarms, "clear")(lambda self, right: None),
         {"divergence_is_caught_every_time"},
     ),
-    "warnings are ignored": (warnings_are_ignored, {"not_finite_in_place_is_caught"}),
+    "warnings are ignored": (
+        replaced(Alarms, "attend")(lambda self, right: None),
+        {"not_finite_in_place_is_caught"},
+    ),
     "contact is the whole constraint": (
-        contact_force_is_the_whole_constraint,
+        replaced(MujocoData, "qfrc_contact")(lambda self, right: self.qfrc_constraint),
         {"forces_balance_at_rest"},
     ),
     "contact normal the other way": (
@@ -224,8 +198,14 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
     "no replay": (mutants.no_replay, {"replay_is_bit_identical"}),
     "free body damped": (free_body_damped, {"free_body_velocity_conventions"}),
     "joints shifted": (mutants.joints_shifted, {"the_witness_agrees"}),
-    "options ignored": (options_ignored, {"options_do_what_they_say"}),
-    "replace works in place": (replace_in_place, {"options_do_what_they_say"}),
+    "options ignored": (
+        around(MujocoModel, "_replace")(lambda right, self, _: MujocoModel(self.raw, self.path, 1)),
+        {"options_do_what_they_say"},
+    ),
+    "replace works in place": (
+        around(_edits.copy, "copy")(lambda right, raw: raw),
+        {"options_do_what_they_say"},
+    ),
     "inertia stays with the old mass": (
         changes_with("body_inertia"),
         {"mass_scales_weight_and_inertia"},
@@ -237,7 +217,7 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
     ),
     "latency is ignored": (changes_with("actuator_delay"), {"latency_delays_a_command"}),
     "before a keyframe there was no command": (
-        keyframe_forgets_the_commands_before,
+        around(mujoco_backend, "hold")(lambda right, *_: None),
         {"a_keyframe_holds_under_latency"},
     ),
     "state forgets the commands on their way": (

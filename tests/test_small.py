@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 import pickle
 
@@ -16,12 +15,7 @@ from statemachine import errors, rotations
 from statemachine.interface.checks import as_vector
 from statemachine.report.as_json import dumps
 
-from .conftest import ROOT, opened
-
-CORE = (
-    "errors.py", "rotations.py", "interface", "installed.py", "models.py", "witness",
-    "kinematics.py", "backends",
-)  # fmt: skip
+from .conftest import opened
 
 angles = st.floats(-3.0, 3.0)
 quats = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
@@ -108,16 +102,3 @@ def test_json_has_no_nan() -> None:
     assert dumps({"a": float("nan"), "b": np.array([1.0, np.inf])}) == dumps(
         {"a": None, "b": [1.0, None]}
     )
-
-
-def test_the_core_does_not_import_what_stands_on_it() -> None:
-    above = {
-        "calls", "cli", "commands", "conformance", "conventions", "engines",
-        "grading", "lessons", "report", "scenarios", "staleness",
-    }  # fmt: skip
-    package = ROOT / "statemachine"
-    for name in CORE:
-        for file in [package / name] if name.endswith(".py") else (package / name).glob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text())):
-                if isinstance(node, ast.ImportFrom):
-                    assert not above & set((node.module or "").split(".")), file

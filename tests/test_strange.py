@@ -14,6 +14,7 @@ import statemachine as sm
 from statemachine.errors import EngineWarning, ModelError, StateMachineError
 
 from .conftest import in_its_own_python, opened, written
+from .small_models import model_of
 
 _BODY = (
     '<body name="arm"{body}><joint name="lift"{joint}/><geom name="part" size="0.1"{geom}/></body>'
@@ -109,7 +110,7 @@ def test_a_negative_number_that_engines_take_is_told(
 
 @pytest.mark.parametrize("text", UNUSUAL)
 def test_an_unusual_number_is_taken(text: str, backend: str, tmp_path: Path) -> None:
-    with opened(sm.load(written(tmp_path / "m.xml", text), backend=backend)) as (model, data):
+    with opened(model_of(tmp_path, text, backend=backend)) as (model, data):
         sm.step(model, data, 20)
         assert np.isfinite(data.qpos).all()
 

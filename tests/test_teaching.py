@@ -108,28 +108,17 @@ def test_a_kit_is_not_made_of_files_that_were_worked_in(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "exercises").mkdir()
-    text, said = (ROOT / "exercises" / "step_loop.py").read_text(), ""
-    solved = text.replace("raise NotImplementedError(", "return (", 1)
-    for content, fine in ((text, True), (solved, False)):
-        (tmp_path / "exercises" / "step_loop.py").write_text(content)
-        monkeypatch.setattr(make_kits, "ROOT", tmp_path)
-        monkeypatch.setattr(make_kits, "_changed", lambda _: False)
-        if fine:
-            assert make_kits._template("step_loop.py") == text.encode()
-        else:
-            with pytest.raises(SystemExit, match="restore it first") as refused:
-                make_kits._template("step_loop.py")
-            said = str(refused.value)
-    git = ["git", "-c", "user.name=x", "-c", "user.email=x@x"]
-    (tmp_path / "exercises" / "step_loop.py").write_text(text)
-    for command in (["init", "-q"], ["add", "."], ["commit", "-qm", "x"]):
-        subprocess.run([*git, *command], cwd=tmp_path, check=True)
-    (tmp_path / "exercises" / "step_loop.py").write_text(solved)
-    subprocess.run([*git, "add", "."], cwd=tmp_path, check=True)
-    for command in re.findall(r"(?:tried|then): ([^;]+)", said):
-        subprocess.run(command.split(), cwd=tmp_path, check=True)
-    assert (tmp_path / "exercises" / "step_loop.py").read_text() == text
-    assert (tmp_path / "my_step_loop.py").read_text() == solved
+    file, text = (
+        tmp_path / "exercises" / "step_loop.py",
+        (ROOT / "exercises/step_loop.py").read_text(),
+    )
+    monkeypatch.setattr(make_kits, "ROOT", tmp_path)
+    monkeypatch.setattr(make_kits, "_changed", lambda _: False)
+    file.write_text(text)
+    assert make_kits._template("step_loop.py") == text.encode()
+    file.write_text(text.replace("raise NotImplementedError(", "return (", 1))
+    with pytest.raises(SystemExit, match="restore it first"):
+        make_kits._template("step_loop.py")
 
 
 def _zip(folder: Path, built: Path) -> Path:
@@ -150,7 +139,7 @@ def test_the_mistakes_of_the_teachers_page_are_those_that_are_caught() -> None:
         assert fault in FAULTS
 
 
-def test_what_to_remember_is_of_the_stations() -> None:
+def test_what_to_remember_is_of_the_lessons() -> None:
     assert tuple(OURS) == CONCEPTS
     assert {lesson for lesson, _ in REMEMBER} <= set(LESSONS)
 

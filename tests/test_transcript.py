@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from statemachine.grading.answers import Answer, Thing, plain
-from statemachine.grading.transcript import decode, encode
+from statemachine.grading.answers import Answer, Thing, decode, encode
 from statemachine.grading.watch import EngineRun, Inputs
 
 
 def _answer() -> Answer:
     row = np.array([1.5, np.nan, -0.0])
-    run = EngineRun(0, True, row, row, row[:0], 0.5, row, row, 1.5, 3, None)
-    inputs = Inputs(0, row, row, row[:1])
+    inputs = Inputs(0, row, row, row[:1], 0.5)
+    run = EngineRun(True, inputs, Inputs(0, row, row, row[:0], 1.5), 3, None)
     result = (
         [True, None, "text", 3, 2.5, float("inf")],
         {"joint": (slice(0, None), slice(1, 2, None))},
@@ -40,7 +39,7 @@ def test_an_answer_comes_back_as_it_was() -> None:
     assert _text(back) == text
     assert back.result[1] == _answer().result[1]
     assert (back.result[2].dtype, back.result[2].shape) == (np.float32, (2, 3))
-    assert back.runs[0].qpos.tobytes() == _answer().runs[0].qpos.tobytes()
+    assert back.runs[0].start.qpos.tobytes() == _answer().runs[0].start.qpos.tobytes()
 
 
 def test_no_object_gets_through() -> None:
@@ -51,7 +50,8 @@ def test_no_object_gets_through() -> None:
         def __repr__(self) -> str:
             return "x" * 1000
 
-    value = plain([Any3(), {1: 2j}, np.array([1j]), np.array(["a"]), 10**30, {1, 2}])
+    odd = [Any3(), {1: 2j}, np.array([1j]), np.array(["a"]), 10**30, {1, 2}]
+    value = decode(json.loads(_text(Answer(odd)))).result
     things, numbers = value[:1] + value[2:], value[1]
     assert [type(thing) for thing in things] == [Thing] * 5
     assert numbers == {"an int: 1": Thing("a complex: 2j")}

@@ -14,7 +14,8 @@ from statemachine.errors import BadInputError, EngineError, UnknownNameError
 from statemachine.interface import worlds as interface_worlds
 from statemachine.worlds import LogUniform, Uniform, draw, make_worlds
 
-from .conftest import ROOT, opened, written
+from .conftest import ROOT, opened
+from .small_models import SLEEPY, loaded, model_of
 
 FIELDS = ("qpos", "qvel", "ctrl", "time")
 FACTS = (
@@ -128,48 +129,12 @@ def test_no_world_has_a_compiled_model_of_its_own(box: Any) -> None:
 
 
 def test_a_model_without_actuators(tmp_path: Any) -> None:
-    path = written(
-        tmp_path / "ball.xml",
-        "<mujoco><option><flag gravity='disable'/></option><worldbody><body><freejoint/>"
-        "<geom size='.1'/></body></worldbody></mujoco>",
-    )
-    model = sm.load(path)
+    flag = "<option><flag gravity='disable'/></option>"
+    model = loaded(tmp_path, "<body><freejoint/><geom size='.1'/></body>", flag)
     gravity = [[0, 0, -9.81], [0, 0, -1.62]]
     with make_worlds(model, 2, gravity=gravity, timestep=[0.01, 0.02]) as many:
         worlds.step(many, 10)
         np.testing.assert_allclose(many.qvel[:, 2], [-0.981, -0.324], rtol=1e-12)
-
-
-def test_a_state_moves_to_a_data_of_the_worlds_model(box: Any) -> None:
-    """Commands on their way, too, of which each world has room for as many as the slowest."""
-    options: dict[str, Any] = {"latency": [0.0, 0.03, 0.1], "kp": [500.0, 900.0, 998.0]}
-    with make_worlds(box, 3, **options) as many:
-        worlds.reset(many, keyframe=0)
-        for k in range(8):
-            many.ctrl[:, 0] = 0.1 * k
-            worlds.step(many, 3)
-        for i in range(3):
-            state, model = worlds.get_state(many, i), many.model_of(i)
-            with sm.make_data(model) as data:
-                sm.set_state(model, data, state)
-                sm.step(model, data, 30)
-                worlds.step(many, 30, ids=[i])
-                np.testing.assert_array_equal(many.qpos[i], data.qpos)
-                np.testing.assert_array_equal(many.qvel[i], data.qvel)
-                worlds.set_state(many, i, sm.get_state(model, data))
-                assert many.time[i] == data.time
-
-
-SLEEPY = """
-<mujoco><option timestep="0.002"><flag sleep="enable"/></option><worldbody>
-  <geom type="plane" size="2 2 .1"/>
-  <body pos="0 0 .12"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
-  <body pos="1 1 .12"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
-  <body pos=".5 0 .5"><joint name="a" axis="0 1 0" damping=".5"/><geom size=".05" pos=".1 0 0"/>
-    <body pos=".2 0 0"><joint name="b" axis="0 1 0" damping=".3"/>
-      <geom size=".05" pos=".1 0 0"/></body></body></worldbody>
-  <actuator><position kp="20" joint="a"/><position kp="10" joint="b"/></actuator></mujoco>
-"""
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -186,8 +151,10 @@ def test_worlds_of_any_latency_live_as_data_of_replaced_models(
     model = box
     options: dict[str, Any] = {"latency": rng.uniform(0, 0.05, (3, 6))}
     if scene == "asleep":
-        (tmp_path / "asleep.xml").write_text(SLEEPY)
-        model, options = sm.load(tmp_path / "asleep.xml"), {"latency": rng.uniform(0, 0.05, 3)}
+        model, options = (
+            model_of(tmp_path, SLEEPY),
+            {"latency": rng.uniform(0, 0.05, 3)},
+        )
     elif "times" in scene:
         model = model.replace(latency=0.02)
         options |= {"timestep": [0.004, 0.002, 0.003], "substeps": [2] * 3}
@@ -253,18 +220,6 @@ def test_worlds_that_do_not_fit_are_refused(box: Any, monkeypatch: Any) -> None:
     with pytest.raises(EngineError, match="20000 commands that its latency keeps"):
         make_worlds(box, 2, latency=[0, 2], timestep=[1e-4] * 2)
     make_worlds(box, 10).close()
-
-
-def test_a_subset_reset_to_a_keyframe_holds_under_latency(box: Any) -> None:
-    with make_worlds(box, 3, latency=[0.1] * 3) as many:
-        many.ctrl[:] = 0.5
-        worlds.step(many, 30)
-        kept = many.qpos[1].copy()
-        worlds.reset(many, ids=[0, 2], keyframe=0)
-        start = many.qpos.copy()
-        worlds.step(many, 20, ids=[0, 2])
-        np.testing.assert_allclose(many.qpos[[0, 2], :6], start[[0, 2], :6], atol=0.01)
-        np.testing.assert_array_equal(many.qpos[1], kept)
 
 
 def test_what_cannot_differ_is_refused(box: Any) -> None:

@@ -9,20 +9,21 @@ import importlib
 import importlib.metadata
 import inspect
 import os
+import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal, Protocol, cast
 
-from ..errors import BadInputError, MissingEngineError, check_name
+from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
+from ..measures import ContactNames, overlaps
+from ..measures.text import few
 from ..models import resolve
 from ._hidden_data import HiddenData, HiddenModel
 from ._hidden_world import HiddenWorld, Moment
 from .binary import is_binary, read_binary
 
 __all__ = [
-    "Backend",
     "HiddenData",
     "HiddenModel",
     "HiddenWorld",
@@ -32,6 +33,7 @@ __all__ = [
     "backend_names",
     "load",
     "loaders",
+    "overlaps_at_start",
     "register",
 ]
 
@@ -47,18 +49,9 @@ class Loader(Protocol):
     def __call__(self, path: os.PathLike[str], defaults: Literal["model", "engine"]) -> Model: ...
 
 
-@dataclass(frozen=True)
-class Backend:
-    """Where a backend lives: "package.module:function", and the engine it needs."""
-
-    loader: str
-    engine: str | None = None
-
-
-_BACKENDS: dict[str, Backend] = {
-    name: Backend(f"{__name__}.{name}_backend:load", engine=name)
-    for name, engine in ENGINES.items()
-    if engine.runs
+# Where each is, as "package.module:function"; ours go by the names of their engines.
+_BACKENDS: dict[str, str] = {
+    name: f"{__name__}.{name}_backend:load" for name, engine in ENGINES.items() if engine.runs
 }
 
 
@@ -74,7 +67,8 @@ def backend_engine(name: str) -> str | None:
     Raises:
         UnknownNameError: There is no such backend.
     """
-    return _find(name).engine
+    _find(name)
+    return name if name in ENGINES else None
 
 
 def register(name: str, loader: str) -> None:
@@ -93,14 +87,13 @@ def register(name: str, loader: str) -> None:
     module, _, function = loader.partition(":")
     if not (module and function):
         raise BadInputError(f"loader must read 'package.module:function'; got {loader!r}")
-    if _BACKENDS.get(name, Backend(loader)) != Backend(loader):
+    if _BACKENDS.setdefault(name, loader) != loader:
         raise BadInputError(f"there is a backend named {name!r} already; choose another name")
-    _BACKENDS[name] = Backend(loader)
 
 
 def loaders() -> dict[str, str]:
     """The backends of other packages that are known so far, as `register` takes them."""
-    return {name: entry.loader for name, entry in _BACKENDS.items() if entry.engine is None}
+    return {name: loader for name, loader in _BACKENDS.items() if name not in ENGINES}
 
 
 def load(
@@ -113,6 +106,8 @@ def load(
     **options: Any,
 ) -> Model:
     """Compile a model's file into a Model. The slow part, done once.
+
+    Shapes that are more than 1 mm inside each other at the start are an EngineWarning.
 
     Args:
         model: A name ("so101/scene_box") or a path; see `models.resolve`.
@@ -133,26 +128,44 @@ def load(
         ModelFileError: The file is not there.
         ModelError: The engine cannot read the file, or it is a binary model of others.
     """
-    entry = _find(backend)
+    place = _find(backend)
     check_name("defaults", defaults, ("model", "engine"))
     path = resolve(model, menagerie)
     if trust_binary and is_binary(path):
         read_binary(path, trust=True)  # the loader knows its bytes then
-    if entry.engine:
-        require(entry.engine)
-    module, _, function = entry.loader.partition(":")
+    if backend in ENGINES:
+        require(backend)
+    module, _, function = place.partition(":")
     try:
         loader = cast("Callable[..., Model]", getattr(importlib.import_module(module), function))
     except (ImportError, AttributeError) as error:
         raise_if_interrupted(error)
         raise MissingEngineError(
-            f"backend {backend!r} cannot be loaded from {entry.loader!r}: {error}", engine=backend
+            f"backend {backend!r} cannot be loaded from {place!r}: {error}", engine=backend
         ) from error
     if not options:
-        return loader(path, defaults=defaults)
-    if "options" in inspect.signature(loader).parameters:
-        return loader(path, defaults=defaults, options=options)
-    return loader(path, defaults=defaults).replace(**options)
+        loaded = loader(path, defaults=defaults)
+    elif "options" in inspect.signature(loader).parameters:
+        loaded = loader(path, defaults=defaults, options=options)
+    else:
+        loaded = loader(path, defaults=defaults).replace(**options)
+    if pairs := few(overlaps_at_start(loaded)):
+        text = f"{path.name}: shapes are inside each other at the start: {pairs}"
+        warnings.warn(text, EngineWarning, stacklevel=2)
+    return loaded
+
+
+def overlaps_at_start(model: Model) -> list[str]:
+    """Shapes that start inside each other, as `measures.overlaps` has them.
+
+    The start is that of all experiments: the keyframe "home" if there is one, else the default
+    state. Nothing is said of a Model that does not start from a compiled one.
+    """
+    if model.compiled is None:
+        return []
+    from .compiled import contacts_at_start
+
+    return overlaps(ContactNames.of(model), *contacts_at_start(model.compiled))
 
 
 def on_default(model: Model) -> Model:
@@ -165,7 +178,7 @@ def on_default(model: Model) -> Model:
     return model if model.backend == DEFAULT else load(model.path)
 
 
-def _find(name: str) -> Backend:
+def _find(name: str) -> str:
     known = isinstance(name, str) and name in _BACKENDS
     if not known:
         _discover()
@@ -176,4 +189,4 @@ def _find(name: str) -> Backend:
 def _discover() -> None:
     """Add the backends that installed packages declare; our own names stay ours."""
     for entry in importlib.metadata.entry_points(group="statemachine.backends"):
-        _BACKENDS.setdefault(entry.name, Backend(entry.value))
+        _BACKENDS.setdefault(entry.name, entry.value)

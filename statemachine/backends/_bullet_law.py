@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from operator import ge, le
 from typing import Any
@@ -34,40 +33,33 @@ import numpy as np
 from ..interface import Array
 from . import _dense as dense
 from ._bullet_client import pb
-from ._bullet_world import Tree
+from ._bullet_world import Tree, World
 
 _OFF = mujoco.mjtDisableBit
-_PIVOTS, _SWEEPS, _SETTLED = 30, 500, 1e-9
 _TINY = 1e-300  # for a power that is too small for a float
 _STEADY = 1e-5  # of the largest friction: a change of it that is worth the whole solution
 _EXPLICIT = (int(mujoco.mjtIntegrator.mjINT_EULER), int(mujoco.mjtIntegrator.mjINT_RK4))
 
 
-@dataclass(slots=True)
-class Solution:
-    """What one step was driven with; arrays (n,) in the order of the tree's joints."""
-
-    qpos: Sequence[float]
-    qvel: Sequence[float]
-    speed: Array
-    bias: Array
-    mass: Array
-    actuator: Array
-    passive: Array
-    friction: Array
-    limit: Array
-    acceleration: Array
-
-
 class Law:
-    """The constants of one tree of joints, and the solution of a step."""
+    """One tree of joints in a stepped world, and the law that drives it.
 
-    def __init__(self, raw: mujoco.MjModel, tree: Tree) -> None:
+    Attributes:
+        tree: The tree.
+        angles, speed: (n,) positions and velocities, as the engine has them.
+        friction: (n,) the dry friction of the last step [N·m or N].
+    """
+
+    def __init__(self, raw: mujoco.MjModel, world: World, tree: Tree, ghost: World) -> None:
+        """Of a tree in a world that is stepped; the ghost has the true arm."""
+        twin = next(other for other in ghost.trees if other.root == tree.root)
+        self._ghost, self._true = ghost.client, twin.body
+        self._client, self._body, self.tree = world.client, tree.body, tree
         off = {name: bool(raw.opt.disableflags & int(bit)) for name, bit in _FLAGS.items()}
         dofs = tree.dofs
         joints = raw.dof_jntid[dofs]
-        self.timestep = h = float(raw.opt.timestep)
-        self.armature = raw.dof_armature[dofs]
+        self._timestep = h = float(raw.opt.timestep)
+        self._armature = raw.dof_armature[dofs]
         damping = raw.dof_damping[dofs] * (not off["damper"])
         stiffness = raw.jnt_stiffness[joints] * (not off["spring"])
         rest = stiffness * raw.qpos_spring[tree.qpos]
@@ -77,7 +69,7 @@ class Law:
         damped_later = 0.0 if euler and off["eulerdamp"] else h
         # The inertia that constraints feel, and the one that velocities are found with.
         self._inertia = np.array(
-            [np.diag(self.armature), np.diag(self.armature + damped_later * damping)]
+            [np.diag(self._armature), np.diag(self._armature + damped_later * damping)]
         )
         self._zeros, self._nothing = [0.0] * len(dofs), np.zeros(len(dofs))
         feedback = self._take_actuators(raw, joints, off)
@@ -126,7 +118,7 @@ class Law:
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
         feedback = [bias[:, k, None] * self._gear.T for k in (1, 2)]
-        later = 0.0 if raw.opt.integrator in _EXPLICIT else self.timestep
+        later = 0.0 if raw.opt.integrator in _EXPLICIT else self._timestep
         self._slope = -later * self._gear**2 * bias[:, 2]
         self._unsaturated = self._with_slope(np.ones(len(ids)))
         limited = raw.actuator_forcelimited[ids].astype(bool)
@@ -142,42 +134,82 @@ class Law:
         found[1] += np.diag(dense.times(self._slope, free))
         return found
 
-    def aim(self, ctrl: Array) -> Array:
-        """What a command (nu,) of the whole model, within range, adds to each actuator's force."""
-        return self._gain * ctrl[self._ids]
+    def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
+        """Start from a state; contact and friction (n,) are those of the step before it."""
+        self._take(qpos[self.tree.qpos].tolist(), qvel[self.tree.qvel].tolist())
+        self._contact, self.friction = contact, friction
 
-    def solve(
-        self,
-        ghost: tuple[int, int],
-        q: Sequence[float],
-        v: Sequence[float],
-        x: Array,
-        aim: Array,
-        contact: Array,
-        friction: Array,
-        afresh: bool = False,
-    ) -> Solution:
-        """The forces of a step and the acceleration (n,) that they give.
+    def read(self) -> None:
+        """Take over what the engine made of the last step."""
+        states = pb.getJointStates(self._body, self.tree.joints, self._client)
+        q, v, _, _ = zip(*states, strict=True)
+        self._take(q, v)
+        self._contact = None
+
+    def _take(self, q: Sequence[float], v: Sequence[float]) -> None:
+        self._q, self._v = q, v
+        self._x = x = np.array([*q, *v, 1.0])
+        self.angles, self.speed = x[: len(q)], x[len(q) : -1]
+
+    @property
+    def contact(self) -> Array:
+        """(n,) the generalised force of contacts during the last step [N·m or N]."""
+        if self._contact is None:
+            q, v, speed = self._start
+            rate = ((self.speed - speed) / self._timestep).tolist()
+            needed = pb.calculateInverseDynamics(self._body, q, v, rate, 0, self._client)
+            self._contact = np.array(needed) - self._torque
+        return self._contact
+
+    def forces(self) -> dict[str, Array]:
+        """Accelerations and forces of the last step, by their names in the contract."""
+        bias, actuator, passive, friction, limit = self._parts
+        total = actuator + passive + friction + limit + self.contact
+        factor = dense.factored(self._mass + np.diag(self._armature))
+        return {
+            "qacc": dense.solved(factor, total - bias),
+            "qfrc_bias": bias,
+            "qfrc_actuator": actuator,
+            "qfrc_passive": passive,
+            "qfrc_friction": friction,
+            "qfrc_limit": limit,
+            "qfrc_contact": self.contact,
+        }
+
+    def command(self, ctrl: Array) -> None:
+        """Take a new command (nu,) of the whole model, within range."""
+        self._aim = self._gain * ctrl[self._ids]
+
+    def drive(self, afresh: bool = False) -> None:
+        """Give the engine the torque of the next step.
 
         Args:
-            ghost: PyBullet's body and client of the true arm.
-            q: Positions.
-            v: Velocities.
-            x: Both in one array (2·n + 1,), and a one.
-            aim: Of the command.
-            contact: (n,) observed in the last step.
-            friction: (n,) of the last step.
             afresh: Solve for friction whole, not from the last step's.
         """
-        body, client = ghost
-        n = len(q)
+        contact, q, v = self.contact, self._q, self._v
+        self._start = q, v, self.speed
+        acceleration = self._solve(contact, afresh).tolist()
+        needed = pb.calculateInverseDynamics(self._body, q, v, acceleration, 0, self._client)
+        self._torque = np.array(needed) - contact
+        pb.setJointMotorControlArray(
+            self._body,
+            self.tree.joints,
+            pb.TORQUE_CONTROL,
+            forces=self._torque.tolist(),
+            physicsClientId=self._client,
+        )
+
+    def _solve(self, contact: Array, afresh: bool) -> Array:
+        """The acceleration (n,) of a step, and what makes it up in `_mass` and `_parts`."""
+        q, v, x, friction = self._q, self._v, self._x, self.friction
+        n, body, client = len(q), self._true, self._ghost
         rows = pb.calculateMassMatrix(body, q, 0, client)
         # Faster than np.array, as several lines here are than what is shorter.
-        mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
+        self._mass = mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
         bias = np.array(pb.calculateInverseDynamics(body, q, v, self._zeros, 0, client))
         speed = x[n:-1]
         linear = dense.times(self._linear, x)
-        passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + aim
+        passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + self._aim
         force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
         actuator = force if self._straight else dense.times(self._gear, force)
         inertia = self._unsaturated
@@ -212,8 +244,8 @@ class Law:
         if solve:
             friction, limit = self._constrained(explicit, others, q, speed, friction, hit)
             others = others + limit
-        acceleration = dense.solved(implicit, others + friction)
-        return Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration)
+        self.friction, self._parts = friction, (bias, actuator, passive, friction, limit)
+        return dense.solved(implicit, others + friction)
 
     def _constrained(
         self,
@@ -242,7 +274,7 @@ class Law:
         right = goal - sign * dense.solved(factor, others.copy())[at]
         force = np.zeros(len(at))
         force[:rubbing] = friction[rubs]
-        force = _pivoted(matrix, right, least, most, force)
+        force = dense.pivoted(matrix, right, least, most, force)
         friction, limit = np.zeros(n), np.zeros(n)
         friction[rubs], limit[hit] = force[:rubbing], (sign * force)[rubbing:]
         return friction, limit
@@ -256,43 +288,6 @@ class Law:
         impedance = _impedance(curve, gap)
         goal = -damping * side * speed - stiffness * impedance * gap
         return side, _softness(impedance, weight), goal, 0.0, math.inf
-
-
-def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Array) -> Array:
-    """F with matrix·F = right where it is between its bounds, and beyond them nowhere.
-
-    At its lower bound a row may have matrix·F > right, at its upper one <. Rows change
-    between free and bounded until none has to; where that goes round in circles,
-    projected Gauss-Seidel ends it, for the matrix is positive definite.
-    """
-    force = np.minimum(np.maximum(start, least), most)
-    free = (force > least) & (force < most) | (least == 0) & (most > 0)
-    for _ in range(_PIVOTS):
-        if free.all():
-            force = dense.solved(dense.factored(matrix.copy()), right.copy())
-            if ((least <= force) & (force <= most)).all():
-                return force
-        else:
-            inside, held = free.nonzero()[0], (~free).nonzero()[0]
-            rows = inside[:, None]
-            bound = dense.times(matrix[rows, held], force[held])
-            factor = dense.factored(matrix[rows, inside])
-            force[inside] = dense.solved(factor, right[inside] - bound)
-        outside = free & ((force < least) | (force > most))
-        force = np.minimum(np.maximum(force, least), most)
-        miss = dense.times(matrix, force) - right
-        back = ~free & (least < most) & np.where(force <= least, miss < 0, miss > 0)
-        if not (outside.any() or back.any()):
-            return force
-        free = free & ~outside | back
-    for _ in range(_SWEEPS):
-        before = force.copy()
-        for k in range(len(force)):
-            new = force[k] - (dense.dot(matrix[k], force) - right[k]) / matrix[k, k]
-            force[k] = min(max(new, least[k]), most[k])
-        if np.abs(force - before).max() < _SETTLED * np.abs(force).max():
-            break
-    return force
 
 
 _FLAGS = {

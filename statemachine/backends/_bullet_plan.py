@@ -1,16 +1,23 @@
-"""A compiled model as PyBullet's worlds want it: texts, surfaces, and how much padding."""
+"""A compiled model as PyBullet's worlds want it: texts, surfaces, hulls, and how much padding.
+
+MuJoCo collides a mesh as its convex hull, which the compiled model has. So PyBullet gets that hull
+as an OBJ file, whatever file the mesh came from, if any; an ellipsoid becomes a hull as well.
+PyBullet puts a margin of 1 mm around each hull, and takes it off again (`collisionMargin=0`) only
+where the hull is all that a free body has, and is not turned in it. So hulls are made smaller by
+it: their faces are then where they belong, and their edges are rounded.
+"""
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ..interface import Array
 from . import _bullet_urdf as urdf
-from ._bullet_hulls import HULLS, Hull
 from ._bullet_surfaces import Surfaces
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -22,6 +29,17 @@ _YIELDS = 0.02
 MOST_PARTS = 120
 
 
+Faces = NDArray[np.int64]  # (m, 3) numbers of vertices
+
+_MESH, ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
+HULLS = (_MESH, ELLIPSOID)
+MARGIN = 1e-3  # [m] PyBullet's, around each hull that it reads from a file
+_THINNEST = 0.25  # a hull is made smaller by this part of its smallest width at most
+# An icosahedron that is divided three times: 642 vertices.
+_SPHERE = """<mujoco><asset><mesh name="ball" builtin="sphere" params="3"/></asset><worldbody>
+<geom type="mesh" mesh="ball"/></worldbody></mujoco>"""
+
+
 class Plan:
     """A compiled model, and what follows from it for every world.
 
@@ -29,12 +47,14 @@ class Plan:
         raw: The compiled model.
         surfaces: What can touch what; nothing where contacts are off.
         names: What everything is called in a URDF.
+        ghost: See `_bullet_ghost`; None until it is needed.
     """
 
     def __init__(self, raw: mujoco.MjModel) -> None:
         self.raw = raw
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
+        self.ghost: Any = None
         self._described: dict[tuple[int, str], tuple[str, dict[str, str]]] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -80,23 +100,13 @@ class Plan:
         geoms = (geom for solid in self.surfaces.solids for geom in solid.geoms)
         return {g: Hull(self.raw, g) for g in geoms if int(self.raw.geom_type[g]) in HULLS}
 
-    def _room_for_tips(self, root: int) -> bool:
+    def _describe(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
         raw = self.raw
         sites = int(np.count_nonzero(raw.body_rootid[raw.site_bodyid] == root))
-        return urdf.parts(raw, root) + sites <= MOST_PARTS
-
-    def _hull_geoms(self, kind: str) -> frozenset[int]:
-        """Geoms that are read as hulls; as it comes, meshes come from their files."""
-        if kind != "engine":
-            return frozenset(self.hulls if kind == "stepped" else ())
-        raw = self.raw
-        meshes = {geom: int(raw.geom_dataid[geom]) for geom in self.hulls}
-        return frozenset(
-            geom for geom, mesh in meshes.items() if mesh < 0 or raw.mesh_pathadr[mesh] < 0
-        )
-
-    def _describe(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
-        raw, hulls = self.raw, self._hull_geoms(kind)
+        hulls = set(self.hulls if kind != "ghost" else ())
+        if kind == "engine":  # as it comes, meshes come from their files
+            meshes = {geom: int(raw.geom_dataid[geom]) for geom in hulls}
+            hulls = {g for g, mesh in meshes.items() if mesh < 0 or raw.mesh_pathadr[mesh] < 0}
         dialect = urdf.Dialect(
             capsules=True,
             looks=False,
@@ -104,8 +114,8 @@ class Plan:
             dynamics=kind == "engine",
             anchored=bool(root) and not floats(raw, root),
             padding=self.padding if kind == "stepped" else None,
-            tips=kind != "stepped" and self._room_for_tips(root),
-            hulls=hulls,
+            tips=kind != "stepped" and urdf.parts(raw, root) + sites <= MOST_PARTS,
+            hulls=frozenset(hulls),
         )
         files = {
             urdf.hull_file(geom): self.hulls[geom].obj(smaller=kind == "stepped")
@@ -133,7 +143,6 @@ def _padding(raw: mujoco.MjModel) -> Array:
         qpos = raw.qpos0.copy()
         qpos[raw.jnt_qposadr[scalar]] = random.uniform(low, high)[scalar]
         poses.append(qpos)
-    worst = 0.0
     for qpos in poses if share.any() else []:
         data.qpos[:] = qpos
         mujoco.mj_kinematics(raw, data)
@@ -141,31 +150,119 @@ def _padding(raw: mujoco.MjModel) -> Array:
         mujoco.mj_crb(raw, data)
         whole = np.zeros((raw.nv, raw.nv))
         mujoco.mj_fullM(raw, data, whole)
-        padded = whole - np.diag(raw.dof_armature) + _padding_at(raw, data, share)
-        worst = max(worst, float(np.linalg.eigvals(np.linalg.solve(whole, padded)).real.max()))
-        while worst > _BEARABLE:  # in halves, until this pose bears it too
-            share, worst = share / 2, 0.0
-            padded = whole - np.diag(raw.dof_armature) + _padding_at(raw, data, share)
-            worst = float(np.linalg.eigvals(np.linalg.solve(whole, padded)).real.max())
+        bare = whole - np.diag(raw.dof_armature)
+        # In halves, until this pose bears it too.
+        while _worst(whole, bare + _padding_at(raw, data, share)) > _BEARABLE:
+            share = share / 2
     return share
+
+
+def _worst(whole: Array, padded: Array) -> float:
+    """The largest eigenvalue of whole⁻¹·padded."""
+    return float(np.linalg.eigvals(np.linalg.solve(whole, padded)).real.max())
 
 
 def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array:
     """What the padding adds to the mass matrix (nv, nv) in a pose."""
     total = np.zeros((raw.nv, raw.nv))
-    for j in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)):
+    for j in [j for body in range(raw.nbody) for j in urdf.axes(raw, body)]:
         dof, body = int(raw.jnt_dofadr[j]), int(raw.jnt_bodyid[j])
-        turning = np.zeros((3, raw.nv))
-        mujoco.mj_jac(raw, data, None, turning, data.xipos[body], body)
-        total += share[dof] * turning.T @ urdf.padding_shape(data.xaxis[j]) @ turning
-    for j in np.flatnonzero(raw.jnt_type == _SLIDE):
-        dof, body = int(raw.jnt_dofadr[j]), int(raw.jnt_bodyid[j])
-        moving = np.zeros((3, raw.nv))
-        mujoco.mj_jac(raw, data, moving, None, data.xipos[body], body)
-        total += share[dof] * moving.T @ moving
+        moving, turning = np.zeros((2, 3, raw.nv))
+        mujoco.mj_jac(raw, data, moving, turning, data.xipos[body], body)
+        slides = raw.jnt_type[j] == _SLIDE
+        shape = urdf.padding_shape(data.xaxis[j])
+        own = moving.T @ moving if slides else turning.T @ shape @ turning
+        total += share[dof] * own
     return total
 
 
 def floats(raw: mujoco.MjModel, root: int) -> bool:
     """Whether a tree is a free body."""
     return bool(raw.body_jntnum[root]) and not urdf.axes(raw, root)
+
+
+class Hull:
+    """The hull of a mesh or an ellipsoid, in the geom's own frame.
+
+    Attributes:
+        allowance: How much smaller it can be made [m]: the margin, or what its thickness allows.
+    """
+
+    def __init__(self, raw: mujoco.MjModel, geom: int) -> None:
+        self._vertices, self._faces = _solid(raw, geom)
+        self._planes = normals, offsets = _planes(self._vertices, self._faces)
+        widths = offsets - (self._vertices @ normals.T).min(axis=0)
+        self.allowance = min(MARGIN, round(_THINNEST * float(widths.min()), 10))
+
+    def obj(self, smaller: bool) -> str:
+        """OBJ of it [m].
+
+        Args:
+            smaller: Whether to take PyBullet's margin off.
+        """
+        vertices = self._vertices
+        if smaller:
+            vertices = _inset(vertices, *self._planes, self.allowance)
+        # Rounded: the last bits of NumPy's sums are those of the processor.
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in (np.round(vertices, 10) + 0.0).tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (self._faces + 1).tolist()]
+        return "\n".join([*lines, ""])
+
+
+def roughness(size: Array) -> float:
+    """How far the hull of an ellipsoid of semi-axes (3,) is from it at most [m]."""
+    ball, _ = _sphere()
+    return float((np.linalg.norm(ball, axis=1).max() - 1) * size.max())
+
+
+def _solid(raw: mujoco.MjModel, geom: int) -> tuple[Array, Faces]:
+    """Vertices (n, 3) [m] and triangles (m, 3), which turn outwards."""
+    if raw.geom_type[geom] == ELLIPSOID:
+        ball, faces = _sphere()
+        return ball * raw.geom_size[geom], faces
+    return _mesh_hull(raw, int(raw.geom_dataid[geom]))
+
+
+def _mesh_hull(raw: mujoco.MjModel, mesh: int) -> tuple[Array, Faces]:
+    start, count = int(raw.mesh_vertadr[mesh]), int(raw.mesh_vertnum[mesh])
+    vertices = np.array(raw.mesh_vert[start : start + count], dtype=np.float64)
+    # Vertices, triangles, two tables of vertices, one of edges, and the triangles by vertex.
+    graph = raw.mesh_graph[raw.mesh_graphadr[mesh] :]
+    corners, triangles = int(graph[0]), int(graph[1])
+    kept = graph[2 + corners : 2 + 2 * corners]
+    end = 2 + 3 * corners + 6 * triangles
+    faces = graph[end - 3 * triangles : end].reshape(-1, 3)
+    places = np.zeros(count, dtype=int)
+    places[kept] = np.arange(corners)
+    return vertices[kept], places[faces]
+
+
+@cache
+def _sphere() -> tuple[Array, Faces]:
+    """Vertices (n, 3) and triangles (m, 3) about a unit sphere, as far in as out of it."""
+    vertices, faces = _mesh_hull(mujoco.MjModel.from_xml_string(_SPHERE), 0)
+    depth = np.linalg.norm(vertices[faces].mean(axis=1), axis=1).min()
+    return vertices * (2 / (1 + depth)), faces
+
+
+def _planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
+    """Outward normals (m, 3) of the faces, and how far along them the faces are [m]."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1)
+    flat = length < 1e-12 * length.max()  # a sliver, which has no direction
+    normals = normals[~flat] / length[~flat, None]
+    normals *= np.sign(np.einsum("ij,ij->i", normals, a[~flat] - vertices.mean(axis=0)))[:, None]
+    return normals, np.einsum("ij,ij->i", normals, a[~flat])
+
+
+def _inset(vertices: Array, normals: Array, offsets: Array, distance: float) -> Array:
+    """Vertices of a hull whose planes are a distance [m] further in, as well as they allow."""
+    scale = float(np.abs(vertices).max())
+    moved = vertices.copy()
+    for k, vertex in enumerate(vertices):
+        meeting = normals[np.abs(normals @ vertex - offsets) < 1e-9 * scale + 1e-12]
+        if len(meeting):  # where more than three planes meet, as near to all as it goes
+            step = np.linalg.lstsq(meeting, np.full(len(meeting), -distance), rcond=1e-6)[0]
+            moved[k] += step * min(1.0, 4 * distance / max(float(np.linalg.norm(step)), 1e-300))
+    return moved

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
-from ._bullet_hulls import ELLIPSOID, HULLS, MARGIN, roughness
+from ..measures.text import few
 from ._bullet_law import in_force
-from ._bullet_plan import MOST_PARTS, Plan, floats
+from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, floats, roughness
 from ._bullet_surfaces import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_urdf import parts, roots, tree
 
@@ -49,10 +49,8 @@ def check(plan: Plan, backend: str) -> None:
         for kind, feature, which, says in rows
         for k in np.flatnonzero(which).tolist()
     ]
-    found += [
-        ("contact masks within a body", f"of {pair} some geoms meet and some do not")
-        for pair in plan.surfaces.mixed
-    ]
+    if pairs := few(plan.surfaces.mixed):
+        found.append(("contact masks within a body", f"of {pairs} some geoms meet and some do not"))
     if not found:
         return
     feature, reason = found[0]
@@ -210,9 +208,7 @@ def softness(plan: Plan) -> str:
     touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
     own = (raw.geom_solref != _SOLREF).any(axis=1) | (raw.geom_solimp != _SOLIMP).any(axis=1)
     geoms = np.flatnonzero(own & touching).tolist() if plan.surfaces.solids else []
-    named = [str(_name(raw, "geom", geom)) for geom in geoms]
-    rest = f", and {len(named) - 3} more" if len(named) > 3 else ""
-    return ", ".join(named[:3]) + rest
+    return few([str(_name(raw, "geom", geom)) for geom in geoms])
 
 
 def _hull_differences(plan: Plan) -> list[str]:
@@ -238,10 +234,9 @@ def _hull_differences(plan: Plan) -> list[str]:
 
 
 def _list(raw: mujoco.MjModel, kind: str, values: Array) -> str:
-    """Elements whose value is not zero, the largest first, as "a 0.5, b 0.1, and 3 more"."""
+    """Elements whose value is not zero, the largest first, as "a 0.5, b 0.1 and 3 more"."""
     order = [int(k) for k in np.argsort(-np.abs(values), kind="stable") if values[k]]
-    named = [f"{_name(raw, kind, k)} {values[k]:.3g}" for k in order[:2]]
-    return ", ".join(named) + (f", and {len(order) - 2} more" if len(order) > 2 else "")
+    return few([f"{_name(raw, kind, k)} {values[k]:.3g}" for k in order], most=2)
 
 
 def _name(raw: mujoco.MjModel, kind: str, number: int) -> Any:

@@ -12,7 +12,9 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import mujoco
 import numpy as np
@@ -23,6 +25,7 @@ from . import _dense as dense
 
 _BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE)
 _CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+_PRIMITIVES = {_BOX: "box", _SPHERE: "sphere", _CAPSULE: "capsule", _CYLINDER: "cylinder"}
 _MESH, _PLANE = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_PLANE)
 UNLIMITED = 1e9  # a range or a force where there is none: PyBullet wants a number
 _LONGEST = 200  # PyBullet cuts names at 1,023 bytes
@@ -97,19 +100,19 @@ def write(
         names: Those of the model, where they are known already.
     """
     names = names or Names(raw)
-    name = raw.names[: raw.names.index(b"\0")].decode() or "robot"
-    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>"]
+    robot = Element("robot", name=raw.names[: raw.names.index(b"\0")].decode() or "robot")
     on_world = bool(axes(raw, root)) or dialect.anchored
     if on_world:
-        lines.append(_bare_link("world", 0.0, np.zeros((3, 3))))
+        robot.append(_bare_link("world", 0.0, np.zeros((3, 3))))
     for body in tree(raw, root):
-        lines += _link(raw, body, dialect, names)
+        robot.append(_link(raw, body, dialect, names))
         if body != root or on_world:
-            lines += _joints(raw, body, root, dialect, names)
+            robot.extend(_joints(raw, body, root, dialect, names))
     for site in range(raw.nsite if dialect.tips else 0):
         if raw.body_rootid[raw.site_bodyid[site]] == root and root:
-            lines += _tip(raw, site, names)
-    return "\n".join([*lines, "</robot>", ""])
+            robot.extend(_tip(raw, site, names))
+    ElementTree.indent(robot)
+    return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n'
 
 
 class Names:
@@ -174,65 +177,64 @@ def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, 
     return 0.0, size * padding_shape(axis)
 
 
-def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Iterator[str]:
+def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Element:
     anchor, joints = _anchor(raw, body), axes(raw, body)
     frame = matrix_from_quat(raw.body_iquat[body])
     mass, inertia = float(raw.body_mass[body]), np.diag(raw.body_inertia[body])
     if joints:
         extra, around = _padding(raw, joints[-1], dialect)
         mass, inertia = mass + extra, inertia + dense.product(dense.product(frame.T, around), frame)
-    yield f"  <link name={quoteattr(names.links[body])}>"
-    yield "    <inertial>"
-    yield f"      {_origin(raw.body_ipos[body] - anchor, frame)}"
-    yield f'      <mass value="{_number(mass)}"/>'
-    yield f"      {_inertia(inertia)}"
-    yield "    </inertial>"
+    link = _element(
+        "link",
+        _element(
+            "inertial",
+            _origin(raw.body_ipos[body] - anchor, frame),
+            _element("mass", value=mass),
+            _inertia(inertia),
+        ),
+        name=names.links[body],
+    )
     for geom in range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body]):
         touches = raw.geom_contype[geom] or raw.geom_conaffinity[geom]
         if dialect.solids if touches else dialect.looks:
-            yield from _geom(raw, geom, anchor, "collision" if touches else "visual", dialect)
-    yield "  </link>"
+            link.extend(_geom(raw, geom, anchor, "collision" if touches else "visual", dialect))
+    return link
 
 
 def _geom(
-    raw: mujoco.MjModel, geom: int, anchor: Array, element: str, dialect: Dialect
-) -> Iterator[str]:
+    raw: mujoco.MjModel, geom: int, anchor: Array, tag: str, dialect: Dialect
+) -> Iterator[Element]:
     pos, mat = raw.geom_pos[geom] - anchor, matrix_from_quat(raw.geom_quat[geom])
     size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
-    around = f'radius="{_number(size[0])}"'
-    along = f'{around} length="{_number(2 * size[1])}"'
-    shapes = {
-        _BOX: f'<box size="{_numbers(2 * size)}"/>',
-        _SPHERE: f"<sphere {around}/>",
-        _CYLINDER: f"<cylinder {along}/>",
-        _CAPSULE: f"<{'capsule' if dialect.capsules else 'cylinder'} {along}/>",
-    }
-    solids: list[tuple[Array, str]] = []
+    shape = _PRIMITIVES.get(kind, "")
+    solids: list[tuple[Array, Element]] = []
     if geom in dialect.hulls:
-        solids.append((pos, f'<mesh filename="{hull_file(geom)}"/>'))
-    elif kind in shapes:
-        solids.append((pos, shapes[kind]))
-        if kind == _CAPSULE and not dialect.capsules:
-            end = size[1] * mat[:, 2]
-            solids += [(pos - end, shapes[_SPHERE]), (pos + end, shapes[_SPHERE])]
+        solids.append((pos, _element("mesh", filename=hull_file(geom))))
+    elif kind == _BOX:
+        solids.append((pos, _element(shape, size=2 * size)))
+    elif kind == _SPHERE:
+        solids.append((pos, _element(shape, radius=size[0])))
+    elif shape:
+        ends = kind == _CAPSULE and not dialect.capsules
+        shape = "cylinder" if ends else shape
+        solids.append((pos, _element(shape, radius=size[0], length=2 * size[1])))
+        for side in (-1, 1) if ends else ():
+            ball = _element("sphere", radius=size[0])
+            solids.append((pos + side * size[1] * mat[:, 2], ball))
     elif kind == _MESH:
         mesh = int(raw.geom_dataid[geom])
         # MuJoCo moved the mesh to its centre and axes; the file has it where it was.
         # Rounded, so that a look that was never moved is at 0 0 0 and not at 1e-17.
         mat = np.round(dense.product(mat, matrix_from_quat(raw.mesh_quat[mesh]).T), 12)
         pos = np.round(pos - dense.times(mat, raw.mesh_pos[mesh]), 12)
-        scale = _numbers(raw.mesh_scale[mesh])
-        file = quoteattr(_mesh_file(raw, mesh, dialect.folder))
-        solids.append((pos, f'<mesh filename={file} scale="{scale}"/>'))
+        file = _mesh_file(raw, mesh, dialect.folder)
+        solids.append((pos, _element("mesh", filename=file, scale=raw.mesh_scale[mesh])))
     elif kind != _PLANE:  # which URDF does not know
         raise ValueError(f"geom {geom} has no counterpart in URDF")
     name = raw.geom(geom).name
     for k, (where, solid) in enumerate(solids):
-        label = f" name={quoteattr(name)}" if name and not k else ""  # each name once
-        yield f"    <{element}{label}>"
-        yield f"      {_origin(where, mat)}"
-        yield f"      <geometry>{solid}</geometry>"
-        yield f"    </{element}>"
+        label = {"name": name} if name and not k else {}  # each name once
+        yield _element(tag, _origin(where, mat), _element("geometry", solid), **label)
 
 
 def hull_file(geom: int) -> str:
@@ -248,7 +250,7 @@ def _mesh_file(raw: mujoco.MjModel, mesh: int, folder: Path | None) -> str:
 
 def _joints(
     raw: mujoco.MjModel, body: int, root: int, dialect: Dialect, names: Names
-) -> Iterator[str]:
+) -> Iterator[Element]:
     """The joints between a body and its parent, with massless links between them."""
     upper = int(raw.body_parentid[body])
     parent = "world" if body == root else names.links[upper]
@@ -257,7 +259,7 @@ def _joints(
     joints = axes(raw, body)
     if not joints:
         where, name = _origin(place, turn), names.fixed[body]
-        yield from _joint(name, "fixed", parent, names.links[body], where, [])
+        yield _joint(name, "fixed", parent, names.links[body], where)
         return
     place = place + dense.times(turn, raw.jnt_pos[joints[0]])
     for joint in joints:
@@ -276,18 +278,17 @@ def _joints(
             if dialect.dynamics
             else (1, -1)
         )
-        bounds = "" if kind == "continuous" else f'lower="{_number(low)}" upper="{_number(high)}" '
+        bounds = {} if kind == "continuous" else {"lower": low, "upper": high}
         dof = int(raw.jnt_dofadr[joint])
-        damping, friction = raw.dof_damping[dof], raw.dof_frictionloss[dof]
         extra = [
-            f'    <axis xyz="{_numbers(raw.jnt_axis[joint])}"/>',
-            f'    <limit {bounds}effort="{_number(_effort(raw, joint))}" velocity="100.0"/>',
+            _element("axis", xyz=raw.jnt_axis[joint]),
+            _element("limit", **bounds, effort=_effort(raw, joint), velocity=100.0),
         ]
         if dialect.dynamics:
-            numbers = f'damping="{_number(damping)}" friction="{_number(friction)}"'
-            extra.append(f"    <dynamics {numbers}/>")
+            damping, friction = raw.dof_damping[dof], raw.dof_frictionloss[dof]
+            extra.append(_element("dynamics", damping=damping, friction=friction))
         where = _origin(*_at_zero(raw, joint, place, turn))
-        yield from _joint(names.joints[joint], kind, parent, child, where, extra)
+        yield _joint(names.joints[joint], kind, parent, child, where, *extra)
         if joint != joints[-1]:
             parent, turn = child, np.eye(3)
             place = raw.jnt_pos[joint + 1] - raw.jnt_pos[joint]
@@ -309,14 +310,10 @@ def _at_zero(raw: mujoco.MjModel, joint: int, place: Array, turn: Array) -> tupl
 
 
 def _joint(
-    name: str, kind: str, parent: str, child: str, origin: str, extra: list[str]
-) -> Iterator[str]:
-    yield f'  <joint name={quoteattr(name)} type="{kind}">'
-    yield f"    {origin}"
-    yield f"    <parent link={quoteattr(parent)}/>"
-    yield f"    <child link={quoteattr(child)}/>"
-    yield from extra
-    yield "  </joint>"
+    name: str, kind: str, parent: str, child: str, origin: Element, *extra: Element
+) -> Element:
+    ends = _element("parent", link=parent), _element("child", link=child)
+    return _element("joint", origin, *ends, *extra, name=name, type=kind)
 
 
 def _effort(raw: mujoco.MjModel, joint: int) -> float:
@@ -329,28 +326,27 @@ def _effort(raw: mujoco.MjModel, joint: int) -> float:
     return float(max(forces, default=UNLIMITED))
 
 
-def _tip(raw: mujoco.MjModel, site: int, names: Names) -> Iterator[str]:
+def _tip(raw: mujoco.MjModel, site: int, names: Names) -> Iterator[Element]:
     body, name = int(raw.site_bodyid[site]), names.tips[site]
     mat = matrix_from_quat(raw.site_quat[site])
     yield _bare_link(name, 0.0, np.zeros((3, 3)))
     where = _origin(raw.site_pos[site] - _anchor(raw, body), mat)
-    yield from _joint(names.tips_fixed[site], "fixed", names.links[body], name, where, [])
+    yield _joint(names.tips_fixed[site], "fixed", names.links[body], name, where)
 
 
-def _bare_link(name: str, mass: float, inertia: Array) -> str:
+def _bare_link(name: str, mass: float, inertia: Array) -> Element:
     """A link without geoms, whose centre of mass is its frame."""
-    inside = f'<inertial><mass value="{_number(mass)}"/>{_inertia(inertia)}</inertial>'
-    return f"  <link name={quoteattr(name)}>\n    {inside}\n  </link>"
+    inside = _element("inertial", _element("mass", value=mass), _inertia(inertia))
+    return _element("link", inside, name=name)
 
 
-def _inertia(tensor: Array) -> str:
-    entries = (("xx", 0, 0), ("xy", 0, 1), ("xz", 0, 2), ("yy", 1, 1), ("yz", 1, 2), ("zz", 2, 2))
-    words = (f'i{name}="{_number(tensor[i, j])}"' for name, i, j in entries)
-    return f"<inertia {' '.join(words)}/>"
+def _inertia(tensor: Array) -> Element:
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = tensor
+    return _element("inertia", ixx=xx, ixy=xy, ixz=xz, iyy=yy, iyz=yz, izz=zz)
 
 
-def _origin(pos: Array, mat: Array) -> str:
-    return f'<origin xyz="{_numbers(pos)}" rpy="{_numbers(_rpy(mat))}"/>'
+def _origin(pos: Array, mat: Array) -> Element:
+    return _element("origin", xyz=pos, rpy=_rpy(mat))
 
 
 def _rpy(mat: Array) -> Array:
@@ -366,10 +362,12 @@ def _rpy(mat: Array) -> Array:
     return np.array([roll, pitch, yaw])
 
 
-def _numbers(values: Array) -> str:
-    return " ".join(map(_number, values))
-
-
-def _number(value: float) -> str:
-    """Shortest text that reads back as the same float64; no negative zero."""
-    return repr(float(value) + 0.0)
+def _element(tag: str, *inside: Element, **attributes: Any) -> Element:
+    """An element; a number is the shortest text that reads back as the same float64."""
+    element = Element(tag)
+    for name, value in attributes.items():
+        if not isinstance(value, str):  # no negative zero
+            value = " ".join(map(repr, (np.atleast_1d(value) + 0.0).tolist()))  # noqa: PLW2901
+        element.set(name, value)
+    element.extend(inside)
+    return element

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
@@ -180,15 +180,7 @@ class World:
         self.trees.append(tree)
         if kind == "engine":
             return
-        for link in range(-1, pb.getNumJoints(body, self.client)):
-            pb.changeDynamics(
-                body,
-                link,
-                linearDamping=0,
-                angularDamping=0,
-                maxJointVelocity=UNCLAMPED,
-                physicsClientId=self.client,
-            )
+        self.change_all(body, linearDamping=0, angularDamping=0, maxJointVelocity=UNCLAMPED)
         for index in tree.joints:  # each comes with a motor that holds it
             pb.setJointMotorControl2(
                 body, index, pb.VELOCITY_CONTROL, force=0, physicsClientId=self.client
@@ -215,27 +207,50 @@ class World:
             body, link = (self._planes[solid.geoms[0]], -1) if solid.plane else links[solid.body]
             yield body, link, solid
 
+    def joints(self) -> Iterator[tuple[int, int, int]]:
+        """PyBullet's body and index of each joint, and its degree of freedom."""
+        for tree in self.trees:
+            for index, dof in zip(tree.joints, tree.dofs.tolist(), strict=False):
+                yield tree.body, index, dof
+
+    def links(self) -> Iterator[tuple[int, int, int]]:
+        """PyBullet's body and link, and MuJoCo's body, of all that has a mass."""
+        for tree in self.trees:
+            for b, link in tree.links.items():
+                yield tree.body, link, b
+
     def soften(self) -> None:
         """Let contacts yield to their own force, and push apart slowly what overlaps."""
         pb.setPhysicsEngineParameter(
             globalCFM=self._plan.softness, contactERP=_PUSHES, physicsClientId=self.client
         )
 
+    def change(self, body: int, link: int, **settings: Any) -> None:
+        """Change what the engine keeps of a link, by its own names."""
+        pb.changeDynamics(body, link, physicsClientId=self.client, **settings)
+
+    def change_all(self, body: int, **settings: Any) -> None:
+        """The same of the base and all links of a body."""
+        for link in range(-1, pb.getNumJoints(body, self.client)):
+            self.change(body, link, **settings)
+
+    def rub(self, slide: Array, spin: Array, roll: Array) -> None:
+        """Set the frictions (nsolid,) of all that can touch."""
+        for k, (body, link, _) in enumerate(self.solids()):
+            self.change(
+                body,
+                link,
+                lateralFriction=float(slide[k]),
+                spinningFriction=float(spin[k]),
+                rollingFriction=float(roll[k]),
+            )
+
     def _take_surfaces(self) -> None:
         """Softness and friction of links, and which of them meet."""
         self.soften()
         known = self._surfaces
-        links = []
-        for k, (body, link, _) in enumerate(self.solids()):
-            links.append((body, link))
-            pb.changeDynamics(
-                body,
-                link,
-                lateralFriction=float(known.slide[k]),
-                spinningFriction=float(known.spin[k]),
-                rollingFriction=float(known.roll[k]),
-                physicsClientId=self.client,
-            )
+        self.rub(known.slide, known.spin, known.roll)
+        links = [(body, link) for body, link, _ in self.solids()]
         for (i, j), meet in known.pairs.items():
             if not meet:  # the others do, as they were loaded
                 (body_a, link_a), (body_b, link_b) = links[i], links[j]
@@ -291,16 +306,6 @@ class World:
                     physicsClientId=self.client,
                 )
 
-    def put_joints(self, qpos: Array) -> None:
-        """Set the positions of joints, in a world that is never stepped."""
-        for tree in self.trees:
-            pb.resetJointStatesMultiDof(
-                tree.body,
-                tree.joints,
-                [[q] for q in qpos[tree.qpos].tolist()],
-                physicsClientId=self.client,
-            )
-
     def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
         body, qpos, qvel = tree.body, qpos[tree.qpos], qvel[tree.qvel]
         centre, axes = self._frames[body]
@@ -344,14 +349,16 @@ class World:
         spin = turned((-x, -y, -z, w), spin)
         return [px, py, pz, w, x, y, z], [vx, vy, vz, *spin]
 
-    def link_states(self, tree: Tree, links: Mapping[int, int]) -> tuple[Array, Array]:
-        """Centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of a tree's links."""
-        if not links:
-            return np.empty((0, 3)), np.empty((0, 4))
-        found = pb.getLinkStates(
-            tree.body, list(links.values()), computeForwardKinematics=1, physicsClientId=self.client
-        )
-        return np.array([state[0] for state in found]), np.array([state[1] for state in found])
+    def read(self) -> tuple[Array, Array]:
+        """What the engine tells of positions (nq,) and velocities (nv,)."""
+        qpos, qvel = np.zeros(self._raw.nq), np.zeros(self._raw.nv)
+        for tree in self.trees:
+            if tree.joints:
+                states = pb.getJointStates(tree.body, tree.joints, self.client)
+                qpos[tree.qpos], qvel[tree.qvel] = [s[0] for s in states], [s[1] for s in states]
+            if tree.free:
+                qpos[tree.qpos], qvel[tree.qvel] = self.read_free(tree)
+        return qpos, qvel
 
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""

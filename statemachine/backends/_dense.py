@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..interface import Array
 
 _TINY = 1e-15  # smallest pivot
+_PIVOTS, _SWEEPS, _SETTLED = 30, 500, 1e-9
 
 
 def times(matrix: Array, vector: Array) -> Array:
@@ -54,3 +55,40 @@ def inverse_rows(factor: Array, rows: NDArray[np.intp]) -> Array:
     for row in found:
         solved(factor, row)
     return found
+
+
+def pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Array) -> Array:
+    """F with matrix·F = right where it is between its bounds, and beyond them nowhere.
+
+    At its lower bound a row may have matrix·F > right, at its upper one <. Rows change
+    between free and bounded until none has to; where that goes round in circles,
+    projected Gauss-Seidel ends it, for the matrix is positive definite.
+    """
+    force = np.minimum(np.maximum(start, least), most)
+    free = (force > least) & (force < most) | (least == 0) & (most > 0)
+    for _ in range(_PIVOTS):
+        if free.all():
+            force = solved(factored(matrix.copy()), right.copy())
+            if ((least <= force) & (force <= most)).all():
+                return force
+        else:
+            inside, held = free.nonzero()[0], (~free).nonzero()[0]
+            rows = inside[:, None]
+            bound = times(matrix[rows, held], force[held])
+            factor = factored(matrix[rows, inside])
+            force[inside] = solved(factor, right[inside] - bound)
+        outside = free & ((force < least) | (force > most))
+        force = np.minimum(np.maximum(force, least), most)
+        miss = times(matrix, force) - right
+        back = ~free & (least < most) & np.where(force <= least, miss < 0, miss > 0)
+        if not (outside.any() or back.any()):
+            return force
+        free = free & ~outside | back
+    for _ in range(_SWEEPS):
+        before = force.copy()
+        for k in range(len(force)):
+            new = force[k] - (dot(matrix[k], force) - right[k]) / matrix[k, k]
+            force[k] = min(max(new, least[k]), most[k])
+        if np.abs(force - before).max() < _SETTLED * np.abs(force).max():
+            break
+    return force

@@ -156,15 +156,29 @@ def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
     return raw
 
 
-def put(raw: mujoco.MjModel, name: str, value: Any) -> None:
-    """Write one entry of `changes` into a compiled model."""
-    option = name.removeprefix("opt.")
-    if option == name:
-        getattr(raw, name)[:] = value
-    elif np.ndim(value):
-        getattr(raw.opt, option)[:] = value
+def put(raw: mujoco.MjModel, name: str, value: Any, index: tuple[Any, ...] = ()) -> None:
+    """Write into a compiled model.
+
+    Args:
+        raw: The compiled model.
+        name: Of an array, or of an option as "opt.timestep".
+        value: What is to stand there.
+        index: Where in an array; or which bit of a set of flags.
+    """
+    holder, field = held(raw, name)
+    now = getattr(holder, field)
+    if np.ndim(now):
+        now[index] = value
+    elif index:
+        setattr(holder, field, now | index[0] if value else now & ~index[0])
     else:
-        setattr(raw.opt, option, value)
+        setattr(holder, field, value)
+
+
+def held(raw: mujoco.MjModel, name: str) -> tuple[Any, str]:
+    """Whose attribute an array or option of a compiled model is, and its name there."""
+    holder, _, field = name.rpartition(".")
+    return (getattr(raw, holder) if holder else raw), field
 
 
 def step_length(timestep: float, substeps: int, options: Mapping[str, Any]) -> float:

@@ -16,7 +16,7 @@ from ..errors import BadInputError, DivergedError, EngineError
 from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Ints, Model, State
 from ..interface.checks import HUGE, check_entries, check_writable
 from ..interface.options import unsupported
-from ._hidden_world import HiddenWorld, LookAhead, Moment, bounded
+from ._hidden_world import HiddenWorld, LookAhead, Memory, Moment, bounded
 
 
 class HiddenModel(Model):
@@ -65,7 +65,8 @@ class Machine:
         self._model, self._substeps = model, model.substeps
         self._bounds = np.full(model.nq, HUGE), np.minimum(model.max_qvel, HUGE)
         self._fastest = float(self._bounds[1].min(initial=HUGE))
-        self.world = self._told(model._open_world())
+        self.world = model._open_world()
+        self._blank = tuple(np.zeros(size) for _, size in self.world.memory_layout)
         self.qpos, self.qvel = np.zeros(model.nq), np.zeros(model.nv)
         self.ctrl = np.zeros(model.nu)
         self._late = np.rint(model.actuator_delay / self.world.timestep).astype(np.int64)
@@ -73,20 +74,16 @@ class Machine:
         self._used = False
         self.reset(None)
 
-    def _told(self, world: HiddenWorld) -> HiddenWorld:
-        """A world that knows the smallest bound of a velocity."""
-        world.fastest = self._fastest
-        return world
-
     def reset(self, key: int | None) -> None:
         """Be in the default state, or in a keyframe's."""
         if key is None:
             still, silent = np.zeros(len(self.qvel)), np.zeros(len(self.ctrl))
-            self.restart(0.0, Moment(self.world.qpos0, still, silent, self.world.blank))
+            self.restart(0.0, Moment(self.world.qpos0, still, silent, self._blank))
         else:
             frame = self._model.keyframes[key]
-            start = Moment(frame.qpos, frame.qvel, frame.ctrl, self.world.blank)
-            self.restart(frame.time, start)
+            start = Moment(frame.qpos, frame.qvel, frame.ctrl, self._blank)
+            silent = np.zeros((self._longest, len(self.ctrl)))
+            self.restart(frame.time, start, None if self._model._holds_start else silent)
 
     def restart(self, time: float, start: Moment, given: Array | None = None) -> None:
         """Take a state whole; nothing of before has any part in what follows.
@@ -97,7 +94,7 @@ class Machine:
             given: The commands before it; by default they were that of the state.
         """
         if self._used:
-            self.world = self._told(self.world.renewed())
+            self.world = self.world.renewed()
             self._used = False
         self.time = time
         self.qpos[:], self.qvel[:], self.ctrl[:] = start.qpos, start.qvel, start.ctrl
@@ -108,7 +105,7 @@ class Machine:
         self._lives = False
         self.derived: dict[str, Any] = {}
 
-    def _place(self, memory: Any) -> None:
+    def _place(self, memory: Memory) -> None:
         # Until all is in its place the world is astray, and `_memory` says what it is to know.
         self._astray, self._lives, self._memory = True, False, memory
         qpos, qvel = self.qpos.copy(), self.qvel.copy()
@@ -145,7 +142,7 @@ class Machine:
             check_entries(self.qpos, "qpos", self._model._coordinate_name)
             check_entries(self.qvel, "qvel", self._model._coordinate_name)
             self._model._check_quaternions(self.qpos)
-            self._place(world.blank)
+            self._place(self._blank)
         elif self._astray:
             self._place(self._memory)
         self._used, start = True, world.memory
@@ -155,7 +152,7 @@ class Machine:
             if steps > 1:
                 for _ in range(steps - 1):
                     time, given = self._once(time, given)
-                    if world.diverging():
+                    if world.diverging(self._fastest):
                         self._diverge(time)
                 before, memory = world.read(), world.memory
             time, given = self._once(time, given)
@@ -213,7 +210,7 @@ class Machine:
     def present(self) -> Moment:
         """All that decides the next engine step, with the command that acts in it."""
         if self._written:  # what the world remembers belongs to another state
-            memory = self.world.blank
+            memory = self._blank
         else:
             memory = self._memory if self._astray else self.world.memory
         ctrl = self._model._acting("ctrl", acting(self.ctrl, self.given, self._late))
@@ -294,17 +291,13 @@ class HiddenData(Data):
             self._refuse_if_troubled()
         return self._machine.time
 
-    def _derive(self, name: str) -> Array:
-        if self._trouble:
-            self._refuse_if_troubled()
+    def _derive(self, name: str) -> Any:
         if name in self._machine.world.untold:
-            raise unsupported(self._home, "forces by part")
+            raise unsupported(self._home, "contacts" if name == "contacts" else "forces by part")
         return self._machine.derive(name)
 
     def _find_contacts(self) -> Contacts:
-        if "contacts" in self._machine.world.untold:
-            raise unsupported(self._home, "contacts")
-        return self._machine.derive("contacts")
+        return HiddenData._derive(self, "contacts")  # one reading, for who watches both
 
     def _recompute(self) -> None:
         self._machine.forward()
@@ -313,9 +306,9 @@ class HiddenData(Data):
         self._machine.reset(key)
 
     def _get_state(self) -> State:
-        now, world = self._machine.present(), self._machine.world
+        now = self._machine.present()
         inputs = [self._machine.time], now.qpos, now.qvel, self._machine.ctrl
-        parts = [*inputs, *world.packed(now.memory), self._machine.given.ravel()]
+        parts = [*inputs, *now.memory, self._machine.given.ravel()]
         blob = np.concatenate(parts).tobytes()
         model, (fingerprint, layout) = self._home, self._layout
         return State(model.backend, model.engine_version, fingerprint, layout, blob)
@@ -324,8 +317,7 @@ class HiddenData(Data):
         for name in INPUTS:
             check_entries(self._home._acting(name, state[name]), name, self._home._coordinate_name)
         self._home._check_quaternions(state["qpos"])
-        world = self._machine.world
-        memory = world.unpacked([state[name] for name, _ in world.memory_layout])
+        memory = [state[name] for name, _ in self._machine.world.memory_layout]
         start = Moment(state["qpos"], state["qvel"], state["ctrl"], memory)
         given = self._machine.given
         if given.size:

@@ -19,6 +19,7 @@ from ..interface.checks import HUGE
 
 _MANY = HUGE * HUGE
 Read = Callable[[str], Any]
+Memory = Sequence[Array]  # of the lengths in `HiddenWorld.memory_layout`
 
 
 @dataclass(slots=True)
@@ -33,7 +34,7 @@ class Moment:
     qpos: Array
     qvel: Array
     ctrl: Array
-    memory: Any
+    memory: Memory
 
 
 class HiddenWorld(ABC):
@@ -45,11 +46,10 @@ class HiddenWorld(ABC):
         engine: Name of the engine, for messages.
         errors: What the engine raises when it gives up.
         untold: Names of `records.DERIVED`, and "contacts", that this engine does not tell.
-        memory_layout: Name and length of each array of `packed`, which a State then has.
+        memory_layout: Name and length of each array of `memory`, which a State then has.
         timestep: Simulated time of one engine step [s].
         qpos0: (nq,) positions of the default state.
         raw: The engine's own object, which `Data.raw` gives.
-        fastest: The smallest `max_qvel` of the Model [rad/s or m/s]; the Data sets it.
     """
 
     engine: str
@@ -59,12 +59,11 @@ class HiddenWorld(ABC):
     timestep: float
     qpos0: Array
     raw: Any
-    fastest: float = HUGE
     # Held while a world that several Data share is used. One for all Models.
     lock = threading.RLock()
 
     @abstractmethod
-    def place(self, qpos: Array, qvel: Array, memory: Any) -> None:
+    def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         """Take a state, so that what follows depends on nothing that was before.
 
         The command stays. What a call that was interrupted left behind is undone here.
@@ -72,7 +71,7 @@ class HiddenWorld(ABC):
         Args:
             qpos: (nq,) [rad or m], MuJoCo's conventions; finite, no quaternion is zero.
             qvel: (nv,) [rad/s or m/s].
-            memory: Of the step before that state.
+            memory: Of the step before that state; zeros where there was none.
         """
 
     @abstractmethod
@@ -125,13 +124,16 @@ class HiddenWorld(ABC):
         """
         return {}
 
-    def diverging(self) -> bool:
+    def diverging(self, fastest: float) -> bool:
         """A quick look between the engine steps of a call: is a coordinate NaN or beyond its bound?
 
         If so, all are read, and the first that is raises DivergedError. All are looked at at
         the end of a call, so that this may look at some.
+
+        Args:
+            fastest: The smallest `max_qvel` of the Model [rad/s or m/s].
         """
-        return not bounded(*self.read(), self.fastest)
+        return not bounded(*self.read(), fastest)
 
     def renewed(self) -> HiddenWorld:
         """The world in which the state is overwritten: another, where `place` leaves traces.
@@ -141,22 +143,9 @@ class HiddenWorld(ABC):
         return self
 
     @property
-    def memory(self) -> Any:
-        """What the engine remembers of its last step, beside qpos, qvel and ctrl."""
-        return None
-
-    @property
-    def blank(self) -> Any:
-        """That of a state without a step before it: fresh, or written to."""
-        return None
-
-    def packed(self, memory: Any) -> Sequence[Array]:
-        """A memory as arrays of `memory_layout`."""
+    def memory(self) -> Memory:
+        """What the engine remembers of its last step, beside qpos, qvel and ctrl: new arrays."""
         return ()
-
-    def unpacked(self, parts: Sequence[Array]) -> Any:
-        """The other way round."""
-        return None
 
 
 def _renew() -> None:
@@ -183,28 +172,23 @@ class LookAhead:
         return LookAhead, (self._open,)
 
     def at(self, moment: Moment) -> dict[str, Any]:
-        """Contacts and forces of a moment."""
+        """Contacts, forces and poses of a moment, all that the engine tells."""
+        values = dict[str, Any]()
+
+        def read(name: str) -> Any:
+            if name in POSES and name not in values:
+                values.update(world.kinematics(moment.qpos, name))
+            if name not in values:
+                values.update(world.derive(name, moment, read))
+            return values[name]
+
         with HiddenWorld.lock:
-            self.world = self._open() if self.world is None else self.world.renewed()
-            return values_of(self.world, moment)
-
-
-def values_of(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
-    """What a world tells of a moment, but for what kinematics alone gives."""
-    world.look(moment)
-    values = dict[str, Any]()
-
-    def read(name: str) -> Any:
-        if name in POSES and name not in values:
-            values.update(world.kinematics(moment.qpos, name))
-        if name not in values:
-            values.update(world.derive(name, moment, read))
-        return values[name]
-
-    for name in ("contacts", *DERIVED):
-        if name not in world.untold:
-            read(name)
-    return values
+            self.world = world = self._open() if self.world is None else self.world.renewed()
+            world.look(moment)
+            for name in ("contacts", *DERIVED):
+                if name not in world.untold:
+                    read(name)
+        return values
 
 
 def bounded(qpos: Array, qvel: Array, fastest: float) -> bool:

@@ -21,8 +21,8 @@ _NOTES = {
     ),
     "latency": Behaviour(
         "native",
-        "the engine's own delay of an actuator, in whole engine steps; before a keyframe the "
-        "command was that of the keyframe, where the engine has zero",
+        "the engine's own delay of an actuator, in whole engine steps; with the option latency the "
+        "command before a keyframe was that of the keyframe, where a file's own delay finds zero",
     ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),

@@ -224,7 +224,7 @@ class MujocoWorlds(Worlds):
     def _reset(self, ids: Ints, key: int | None) -> None:
         if len(ids):
             self._batch.reset(ids, -1 if key is None else key, _NO_STAGE)
-            if self._history is not None:  # as of a Data: the command before was that of the start
+            if self._history is not None and self._base._holds_start:  # as of a Data
                 history = self._history[ids]
                 kept = None if self._kept is None else self._kept[ids]
                 hold(self._base.raw, history, self.ctrl[ids], kept)

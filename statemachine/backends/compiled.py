@@ -26,7 +26,7 @@ import mujoco
 import numpy as np
 
 from ..errors import EngineWarning, ModelError, shown
-from ..interface import Array, JointType, Keyframe
+from ..interface import Array, Ints, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
 from ..models import mesh_file
 from ._delays import delay_steps, from_binary, with_room
@@ -37,10 +37,12 @@ __all__ = [
     "check_numbers",
     "compile_file",
     "compiler_warnings",
+    "contacts_at_start",
     "edited",
     "facts",
     "fastest",
     "gravity",
+    "read_spec",
     "step_length",
     "with_room",
 ]
@@ -96,7 +98,8 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
         if binary is not None:
             raw = from_binary(binary)
         else:
-            raw = _with_packages(Path(text)) or mujoco.MjModel.from_xml_path(text)
+            spec = _with_packages(Path(text))
+            raw = spec.compile() if spec else mujoco.MjModel.from_xml_path(text)
     except (ValueError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
@@ -104,6 +107,21 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
     if doubtful := "; ".join(_doubtful(raw)):
         warnings.warn(f"{text}: {doubtful}", EngineWarning, stacklevel=4)
     return raw
+
+
+def contacts_at_start(raw: mujoco.MjModel) -> tuple[Ints, Array]:
+    """Geoms (n, 2) and distances (n,) [m] of contacts in the keyframe "home", or at first."""
+    try:
+        with compiler_warnings():
+            data = mujoco.MjData(raw)
+            key = mujoco.mj_name2id(raw, mujoco.mjtObj.mjOBJ_KEY, "home")
+            if key >= 0:
+                mujoco.mj_resetDataKeyframe(raw, data, key)
+            for stage in ("kinematics", "comPos", "flex", "collision"):
+                getattr(mujoco, f"mj_{stage}")(raw, data)
+    except (MemoryError, mujoco.FatalError):  # who makes a Data is told of it
+        return np.empty((0, 2), np.int64), np.empty(0)
+    return data.contact.geom.reshape(-1, 2).astype(np.int64), np.array(data.contact.dist)
 
 
 def check_numbers(raw: mujoco.MjModel, name: str) -> None:
@@ -128,7 +146,16 @@ def check_numbers(raw: mujoco.MjModel, name: str) -> None:
 _PACKAGE = re.compile(r"(?<=[\"'])package://[^\"']*")
 
 
-def _with_packages(path: Path) -> mujoco.MjModel | None:
+def read_spec(path: Path) -> mujoco.MjSpec:
+    """An MJCF or a URDF file before it is compiled.
+
+    Raises:
+        ValueError: MuJoCo cannot read it.
+    """
+    return _with_packages(path) or mujoco.MjSpec.from_file(str(path))
+
+
+def _with_packages(path: Path) -> mujoco.MjSpec | None:
     """A URDF whose meshes are in ROS packages, which MuJoCo does not look for; None of others."""
     if path.suffix.lower() != ".urdf":
         return None
@@ -147,7 +174,7 @@ def _with_packages(path: Path) -> mujoco.MjModel | None:
 
     spec = mujoco.MjSpec.from_string(_PACKAGE.sub(found, text))
     spec.modelfiledir = str(path.parent.resolve())
-    return spec.compile()
+    return spec
 
 
 def _problems(raw: mujoco.MjModel) -> Iterator[str]:

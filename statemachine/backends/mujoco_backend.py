@@ -121,7 +121,7 @@ class MujocoModel(Model):
 
     def with_compiled(self, compiled: mujoco.MjModel) -> MujocoModel:
         check_numbers(compiled, str(self.path))
-        return MujocoModel(compiled, self.path, self.substeps)
+        return MujocoModel(compiled, self.path, self.substeps)._started_as(self, {})
 
     def _make_data(self) -> MujocoData:
         try:
@@ -163,7 +163,7 @@ class MujocoModel(Model):
         # As `_replace` has it, so that a timestep is the same to the last bit.
         raw.opt.timestep = step_length(self.timestep, count, {})
         raw, arrays = varied(raw, given)
-        return MujocoModel(raw, self.path, count), arrays
+        return MujocoModel(raw, self.path, count)._started_as(self, options), arrays
 
     def _check_friction(self, options: Mapping[str, Any]) -> None:
         """Raise UnsupportedError where the friction of geoms would be without effect."""
@@ -259,7 +259,8 @@ class MujocoData(Data):
             mujoco.mj_resetData(self._home.raw, self.raw)
         else:
             mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
-            hold(self._home.raw, self.raw.history, self.raw.ctrl)
+            if self._home._holds_start:
+                hold(self._home.raw, self.raw.history, self.raw.ctrl)
         self._alarms.clear()
 
     def _get_state(self) -> State:

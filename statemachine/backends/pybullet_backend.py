@@ -28,12 +28,12 @@ from ..interface import (
 )
 from ..interface.checks import HUGE
 from ..interface.options import checked_options
+from ..measures.text import few
 from . import _bullet_urdf as urdf
 from ._bullet_client import MOST_CLIENTS
-from ._bullet_driven import DrivenWorld
+from ._bullet_driven import Act, DrivenWorld
 from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored, softness
-from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._hidden_data import HiddenModel
 from .compiled import (
@@ -169,16 +169,17 @@ def load(
     plan = Plan(raw)
     check(plan, "pybullet")
     model = PybulletModel(plan, Path(path), substeps, defaults, checked.get("max_qvel"))
-    World(plan, model._shared.kind).close()  # what PyBullet cannot read shows now
+    World(plan, model._kind).close()  # what PyBullet cannot read shows now
     if defaults == "model":
-        _tell([*ignored(plan), *plan.surfaces.differences], stacklevel=4)
-    return model
+        _tell(plan, ignored(plan), stacklevel=4)
+    return model._started_as(model, checked)
 
 
-def _tell(differences: list[str], stacklevel: int) -> None:
-    """Warn of what is not as the model has it."""
-    if differences:
-        warnings.warn(f"PyBullet: {'; '.join(differences)}", EngineWarning, stacklevel=stacklevel)
+def _tell(plan: Plan, settings: list[str], stacklevel: int) -> None:
+    """Warn of what is not as the model has it: settings, and friction of the first few pairs."""
+    rubbing = few(plan.surfaces.differences, between="; ")
+    if differences := "; ".join(filter(None, [*settings, rubbing])):
+        warnings.warn(f"PyBullet: {differences}", EngineWarning, stacklevel=stacklevel)
 
 
 class PybulletModel(HiddenModel):
@@ -189,11 +190,13 @@ class PybulletModel(HiddenModel):
     Attributes:
         plan: The compiled model, and what follows from it for every world.
         defaults: As `load` was told: "engine" for PyBullet as it comes.
+        acts: What is set in every world that is opened.
     """
 
     plan: Plan
     defaults: Literal["model", "engine"]
-    _shared: Shared
+    acts: tuple[Act, ...]
+    _kind: Literal["stepped", "engine"]
     _asked: Array | None  # max_qvel, where it was set
 
     def __init__(
@@ -203,17 +206,18 @@ class PybulletModel(HiddenModel):
         substeps: int,
         defaults: Literal["model", "engine"],
         max_qvel: Array | None = None,
+        acts: tuple[Act, ...] = (),
     ) -> None:
         as_it_comes, raw = defaults == "engine", plan.raw
         bound = fastest(raw) if max_qvel is None else max_qvel
-        shared = Shared(plan, "engine" if as_it_comes else "stepped")
+        kind: Literal["stepped", "engine"] = "engine" if as_it_comes else "stepped"
         super().__init__(
-            partial(DrivenWorld, shared),
+            partial(DrivenWorld, plan, kind, acts),
             backend="pybullet",
             engine_version=engine_version("pybullet"),
             path=path,
             raw={
-                raw.body(b).name or f"body {b}": plan.described(b, shared.kind)[0]
+                raw.body(b).name or f"body {b}": plan.described(b, kind)[0]
                 for b in (0, *urdf.roots(raw))
             },
             capabilities=_capabilities(as_it_comes, bound, softness(plan)),
@@ -223,7 +227,8 @@ class PybulletModel(HiddenModel):
             **{**facts(raw), **({"_clamps": False} if as_it_comes else {})},
             plan=plan,
             defaults=defaults,
-            _shared=shared,
+            acts=acts,
+            _kind=kind,
             _asked=max_qvel,
         )
 
@@ -233,13 +238,13 @@ class PybulletModel(HiddenModel):
 
     def with_compiled(self, compiled: mujoco.MjModel) -> PybulletModel:
         check_numbers(compiled, str(self.path))
-        return self._of(compiled, self.substeps, self._asked)
+        return self._of(compiled, self.substeps, self._asked)._started_as(self, {})
 
     @property
     def shared_worlds(self) -> dict[str, World]:
         """Worlds that its Data share, of those that were needed so far, by what they are."""
         ahead = cast("DrivenWorld | None", self._look_ahead.world)
-        worlds = {"still copy": self._shared.made_ghost, "look-ahead": ahead and ahead.raw}
+        worlds = {"still copy": self.plan.ghost, "look-ahead": ahead and ahead.raw}
         return {name: world for name, world in worlds.items() if world is not None}
 
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
@@ -248,10 +253,10 @@ class PybulletModel(HiddenModel):
         raw.opt.timestep = step_length(self.timestep, substeps, options)
         model = self._of(with_room(raw), substeps, options.get("max_qvel", self._asked))
         if "friction" in options:
-            _tell(model.plan.surfaces.differences, stacklevel=4)
+            _tell(model.plan, [], stacklevel=4)
         return model
 
     def _of(self, raw: mujoco.MjModel, substeps: int, asked: Array | None) -> PybulletModel:
         plan = Plan(raw)
         check(plan, "pybullet")
-        return PybulletModel(plan, self.path, substeps, self.defaults, asked)
+        return PybulletModel(plan, self.path, substeps, self.defaults, asked, self.acts)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 # What --help says of each, in its order.
 COMMANDS = {
-    "lesson": "the guided path, or one station of it",
+    "lesson": "the guided path, or one lesson alone",
     "check": "judge an exercise by what it does",
     "conventions": "what each engine takes for granted, asked of the engines",
     "audit": "what exactly the state is, found by saving, restoring and comparing bytes",

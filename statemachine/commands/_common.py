@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,29 @@ def one_line(text: object) -> str:
     A name may come from a file that somebody else made.
     """
     return "".join(c if c.isprintable() else "?" for c in " ".join(str(text).split()))
+
+
+def refuse(*rows: tuple[object, str]) -> None:
+    """Raise BadInputError with the text of the first row that holds."""
+    for holds, text in rows:
+        if holds:
+            raise BadInputError(text)
+
+
+def refuse_given(options: argparse.Namespace, names: Iterable[str], text: str) -> None:
+    """Raise BadInputError for the first of these options that is given; {} is its flag."""
+    values = {name: getattr(options, name) for name in names}
+    refuse(
+        *(
+            (value is not None and value is not False and value != [], text.format(flag_of(name)))
+            for name, value in values.items()  # 0 is given, and refused later
+        )
+    )
+
+
+def flag_of(name: str) -> str:
+    """An option as it is typed."""
+    return f"--{name.replace('_', '-')}"
 
 
 # What an option is: its flags, its metavar, its help, and what else argparse is told.
@@ -75,6 +98,8 @@ DEFAULTS = (
     "engine: each engine as its own users meet it (default model)",
     {"default": "model", "choices": ("model", "engine")},
 )
+SIDES = ("left", "right")
+PARTS = ("actuators", "floor")  # of a file, that another side can have, too
 JOBS = ("--jobs", "N", "processes here (one a processor)")
 SECONDS = ("--seconds", "S", "simulated time")
 TRUST = (

@@ -5,17 +5,16 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..errors import BadInputError
-from ._common import REPEATED, Row
+from ._common import REPEATED, Row, refuse
 
 OPTIONS: tuple[Row, ...] = (
     (
-        "--floor",
+        "--uncertainty",
         "SIZE",
         "what your robot's start is uncertain by, such as 0.1mm or 0.1deg",
         REPEATED,
     ),
-    ("--no-floor", "", "do not look for the chaos floor: faster"),
+    ("--no-chaos", "", "do not look for the chaos floor: faster"),
 )
 
 
@@ -27,11 +26,17 @@ def check(options: argparse.Namespace) -> None:
     """
     from ..compare.perturbed import parse_uncertainty
 
-    if options.floor and options.no_floor:
-        raise BadInputError("--floor and --no-floor exclude each other")
-    if options.floor and options.models:
-        raise BadInputError("--floor is of a run, and --models runs nothing")
-    parse_uncertainty(options.floor)
+    refuse(
+        (
+            options.uncertainty and options.no_chaos,
+            "--uncertainty and --no-chaos exclude each other",
+        ),
+        (
+            options.uncertainty and options.models,
+            "--uncertainty is of a run, and --models runs nothing",
+        ),
+    )
+    parse_uncertainty(options.uncertainty)
 
 
 def floor_of(
@@ -44,7 +49,7 @@ def floor_of(
     """The chaos floor of an experiment; None where nothing can be run again.
 
     Args:
-        options: `floor` and `no_floor` are read.
+        options: `uncertainty` and `no_chaos` are read.
         request: The `compare.Request`.
         comparison: Of the traces.
         traces: Both sides.
@@ -54,11 +59,15 @@ def floor_of(
         BadInputError: An uncertainty was given, and the left side was not run here.
     """
     one, two = traces
-    if options.no_floor:
+    if options.no_chaos:
         return None
     if (request.is_traces and not request.sides) or one.header.recorded:
-        if options.floor:
-            raise BadInputError("--floor runs the left side again, and it is a recorded run")
+        refuse(
+            (
+                options.uncertainty,
+                "--uncertainty runs the left side again, and it is a recorded run",
+            )
+        )
         return None
     from ..compare import chaos_floor
     from ..compare.perturbed import parse_uncertainty
@@ -74,6 +83,6 @@ def floor_of(
             two,
             rerun or side_of(request, 0),
             seed=request.seed,
-            uncertain=parse_uncertainty(options.floor),
+            uncertain=parse_uncertainty(options.uncertainty),
             progress=told,
         )

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, MissingEngineError, StateMachineError
+from ..errors import MissingEngineError, StateMachineError
 from ..installed import PAIR
-from ._common import PROGRAM, Row
+from ._common import PARTS, PROGRAM, Row, complain, refuse, refuse_given
 
 OPTIONS: tuple[Row, ...] = (
     (
@@ -28,14 +28,16 @@ def check(options: argparse.Namespace) -> None:
         BadInputError: It cannot, or --no-why is without --html.
     """
     if options.html is None:
-        if options.no_why:
-            raise BadInputError("--no-why goes with --html")
-        return
-    if options.models:
-        raise BadInputError("--html is of a run, and --models runs nothing")
+        return refuse_given(options, ["no_why"], "{} goes with --html")
+    refuse((options.models, "--html is of a run, and --models runs nothing"))
+    from ..report.figures import require_matplotlib
     from ..report.html import check_target
 
     check_target(options.html)
+    try:
+        require_matplotlib()
+    except MissingEngineError as error:
+        complain(f"the page will have no charts: {error}", 0)
 
 
 def write(
@@ -73,8 +75,7 @@ def write(
         *traces,
         said=said,
         witness=witness,
-        attribution=None if request.sides else found,
-        explanation=found if request.sides else None,
+        explanation=found,
         why_not=why_not,
         models=_models(request, traces),
         command=_typed(options, request),
@@ -88,25 +89,18 @@ def write(
 
 
 def _why(options: argparse.Namespace, request: Any, traces: tuple[Any, Any]) -> tuple[Any, str]:
-    """The attribution, or the explanation of two sides; or why there is none."""
-    if request.is_traces:
-        return None, (
-            "What causes it was not looked for: traces were compared, and causes are found by "
-            "running an experiment again."
-        )
+    """The explanation, or why there is none."""
     if any(trace.header.recorded for trace in traces):
         return None, (
             "What causes it was not looked for: one side is a recorded run, and causes are found "
             "by running both again."
         )
     from ..report.progress import progress
-    from ._compare_why import explain, of_sides, uncertain_of
+    from ._compare_why import explain
 
     try:
         with progress("why") as told:
-            if request.sides:
-                return of_sides(options, request, told), ""
-            return explain(request, options.quantity, told, uncertain_of(options)), ""
+            return explain(options, request, told), ""
     except StateMachineError as error:
         return None, f"What causes it could not be found: {error}."
 
@@ -186,8 +180,9 @@ def _typed(options: argparse.Namespace, request: Any) -> str:
         ("--keyframe", request.keyframe, None),
         *(("--map", f"{a}={b}", None) for a, b in request.names.items()),
         *(("--tolerance", text, None) for text in options.tolerance),
-        *(("--floor", text, None) for text in options.floor),
-        ("--no-floor", options.no_floor, False),
+        *((f"--{part}", getattr(options, part), None) for part in PARTS),
+        *(("--uncertainty", text, None) for text in options.uncertainty),
+        ("--no-chaos", options.no_chaos, False),
         ("--quantity", options.quantity or None, None),
         ("--no-why", options.no_why, False),
         ("--html", Path(options.html).name, None),

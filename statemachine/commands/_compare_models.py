@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from ..errors import BadInputError
-from ._common import PROGRAM, REPEATED, Row, pairs_of, show
+from ._common import PARTS, PROGRAM, REPEATED, Row, pairs_of, refuse, refuse_given, show
 
+ALONE = ("frame", "all", "digits")  # options that go with --models
 OPTIONS: tuple[Row, ...] = (
     (
         "--models",
@@ -30,23 +30,22 @@ def run(options: argparse.Namespace) -> int:
     from ..report.progress import progress
 
     given = [split(text) for text in options.models]
-    if options.what:
-        raise BadInputError(f"--models compares descriptions; {options.what[0]} is a run")
-    for name in (
-        "model",
-        "seconds",
-        "timestep",
-        "tolerance",
-        "plot",
-        "film",
-        "every",
-        "keyframe",
-    ):
-        if getattr(options, name) not in (None, []):
-            raise BadInputError(f"--{name} is of a run, and --models runs nothing")
+    run = ("model", "seconds", "timestep", "tolerance", "plot", "film", "every", "keyframe", *PARTS)
+    refuse(
+        *((True, f"--models compares descriptions; {word} is a run") for word in options.what),
+        (
+            options.why or options.quantity,
+            "--models compares files: --why and --quantity are of an experiment",
+        ),
+    )
+    refuse_given(options, run, "{} is of a run, and --models runs nothing")
     if options.backends:
-        if any(engine for _, engine in given):
-            raise BadInputError("--backends and FILE@ENGINE say the same: give one of them")
+        refuse(
+            (
+                any(engine for _, engine in given),
+                "--backends and FILE@ENGINE say the same: give one of them",
+            )
+        )
         for engine in options.backends:
             backend_engine(engine)
         if len(given) == 1:
@@ -54,17 +53,19 @@ def run(options: argparse.Namespace) -> int:
         given = [
             (model, engine) for (model, _), engine in zip(given, options.backends, strict=False)
         ]
-    if len(given) != 2 or len(options.models) > 2:
-        hint = "two models, or one and --backends A B"
-        typed = options.models[0].replace(",", " ").split()
-        if len(options.models) == 1 and len(typed) == 2:
-            hint = f"two words: {PROGRAM} compare --models {' '.join(typed)}"
-        raise BadInputError(f"--models wants {hint}; got {len(options.models)}")
+    typed = options.models[0].replace(",", " ").split()
+    hint = "two models, or one and --backends A B"
+    if len(options.models) == 1 and len(typed) == 2:
+        hint = f"two words: {PROGRAM} compare --models {' '.join(typed)}"
     digits = 6 if options.digits is None else options.digits
-    if not 1 <= digits <= 17:
-        raise BadInputError(f"--digits wants a number from 1 to 17; got {digits}")
-    if options.seed < 0:
-        raise BadInputError(f"--seed must not be negative; got {options.seed}")
+    refuse(
+        (
+            len(given) != 2 or len(options.models) > 2,
+            f"--models wants {hint}; got {len(options.models)}",
+        ),
+        (not 1 <= digits <= 17, f"--digits wants a number from 1 to 17; got {digits}"),
+        (options.seed < 0, f"--seed must not be negative; got {options.seed}"),
+    )
     with progress("compare"):
         result = compare(
             given[0][0],
@@ -77,12 +78,3 @@ def run(options: argparse.Namespace) -> int:
             menagerie=options.menagerie,
         )
     return show(model_diff.page(result, options.all), result, options.json)
-
-
-def refuse_alone(options: argparse.Namespace) -> None:
-    """Raise BadInputError for an option of --models without it."""
-    for name in ("frame", "all"):
-        if getattr(options, name):
-            raise BadInputError(f"--{name} goes with --models")
-    if options.digits is not None:
-        raise BadInputError("--digits goes with --models")

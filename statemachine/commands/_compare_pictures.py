@@ -118,16 +118,15 @@ def write(
     from ..report.progress import progress
 
     if pictures.plot is not None:
-        from ..report import plot_panels
-        from ..report.plot_draw import write_plot
+        from ..report import plot
 
         with progress("figure"):
             figure = (
-                plot_panels.of_trace(one)
+                plot.of_trace(one)
                 if two is None
-                else plot_panels.of_comparison(one, two, comparison, floor=floor)
+                else plot.of_comparison(one, two, comparison, floor)
             )
-            size = write_plot(figure, pictures.plot)
+            size = plot.write_plot(figure, pictures.plot)
         complain(f"{pictures.plot}: a figure, {_bytes(size)}", 0)
     if pictures.film is not None:
         from ..report import film as films

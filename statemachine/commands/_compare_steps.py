@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError
-from ._common import Row, show
+from ._common import Row, flag_of, refuse_given, show
 from ._compare_rerun import both_of, finer, refuse_recorded
 
 OPTIONS: tuple[Row, ...] = (
@@ -33,11 +32,22 @@ def asked(options: argparse.Namespace) -> bool:
     wanted = [name for name in ("one_step", "converge") if getattr(options, name)]
     if not wanted:
         return False
-    flag = "--" + wanted[0].replace("_", "-")
-    others = ("one_step", "converge", "why", "html", "plot", "film", "models", "floor", "tolerance")
-    for other in others:
-        if other not in wanted[:1] and getattr(options, other):
-            raise BadInputError(f"{flag} goes without --{other.replace('_', '-')}")
+    others = (
+        "one_step",
+        "converge",
+        "why",
+        "html",
+        "plot",
+        "film",
+        "models",
+        "uncertainty",
+        "tolerance",
+    )
+    refuse_given(
+        options,
+        [other for other in others if other != wanted[0]],
+        f"{flag_of(wanted[0])} goes without {{}}",
+    )
     return True
 
 

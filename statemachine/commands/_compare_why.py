@@ -6,8 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
-from ..errors import BadInputError
-from ._common import JOBS, PROGRAM, Row, complain, show
+from ._common import JOBS, Row, refuse, refuse_given, show
 
 _OF_SIDES = ("measure", "finer", "budget", "jobs")
 
@@ -18,18 +17,13 @@ OPTIONS: tuple[Row, ...] = (
     (
         "--measure",
         None,
-        "which figure of it, of two sides (worst)",
+        "which figure of it (worst)",
         {"choices": ("worst", "end", "rms")},
     ),
-    ("--finer", "", "every difference of two sides by its entries"),
+    ("--finer", "", "every difference by its entries"),
     ("--budget", "N", "how many sets of causes may be run where they interact (200)"),
     JOBS,
 )
-
-
-def _given(options: argparse.Namespace, name: str) -> bool:
-    value = getattr(options, name)
-    return value is not None and value is not False  # 0 is given, and refused later
 
 
 def check(options: argparse.Namespace) -> None:
@@ -38,77 +32,60 @@ def check(options: argparse.Namespace) -> None:
     Raises:
         BadInputError: Something has none.
     """
-    if options.quantity and not (options.why or options.html):
-        raise BadInputError("--quantity belongs to --why")
-    for name in _OF_SIDES:
-        if _given(options, name) and not options.why:
-            raise BadInputError(f"--{name} belongs to --why")
-    if options.budget is not None and options.budget < 1:
-        raise BadInputError(f"--budget wants a number of runs, at least 1; got {options.budget}")
+    if not options.why:
+        refuse_given(options, _OF_SIDES, "{} belongs to --why")
+    few = options.budget is not None and options.budget < 1
+    refuse(
+        (options.quantity and not (options.why or options.html), "--quantity belongs to --why"),
+        (few, f"--budget wants a number of runs, at least 1; got {options.budget}"),
+    )
 
 
 def run(options: argparse.Namespace, request: Any) -> int:
-    """Attribute, and show.
+    """Explain, and show.
 
     Args:
         options: Those of the command.
         request: A `compare.Request` that names what is run.
     """
-    from ..report import explain as explained
-    from ..report import why as report
+    from ..report import why
     from ..report.progress import progress
 
-    if request.is_traces or len(request.what) != 1:
-        raise BadInputError(
-            "--why takes one experiment, which it runs again and again: "
-            f"{PROGRAM} compare hold --why"
-        )
-    if request.sides:
-        with progress("why") as told:
-            result = of_sides(options, request, told)
-        return show(explained.page(result), result, options.json)
-    for name in _OF_SIDES:
-        if _given(options, name):
-            raise BadInputError(
-                f"--{name} is of two sides: {PROGRAM} compare {request.what[0]} LEFT RIGHT --why"
-            )
     with progress("why") as told:
-        found = explain(request, options.quantity, told, uncertain_of(options))
-    first = request.backends[0]
-    said = []
-    if not found.one.startswith(first):
-        said.append(f"{first} as it comes is brought to the other: the two have changed places.")
-    if options.json:
-        for line in said:
-            complain(line, 0)
-    return show(report.page(found, said), found, options.json)
+        result = explain(options, request, told)
+    said = (*request.taken, *([why.PLAYED] if request.is_traces else []))
+    return show(why.page(result, said), result, options.json)
 
 
-def uncertain_of(options: argparse.Namespace) -> Any:
-    """What is not known of the start; None where no chaos floor is wanted."""
-    from ..compare.perturbed import parse_uncertainty
-
-    return None if options.no_floor else parse_uncertainty(options.floor)
-
-
-def of_sides(options: argparse.Namespace, request: Any, progress: Any) -> Any:
+def explain(options: argparse.Namespace, request: Any, progress: Any) -> Any:
     """The explanation of what two sides differ in.
 
     Args:
         options: Those of the command.
-        request: A `compare.Request` with two sides.
+        request: A `compare.Request`.
         progress: Told the fraction that is done.
     """
-    from ..compare.why import explain as explain_sides
+    from ..compare import why
+    from ..compare.alike import for_left
+    from ..compare.perturbed import parse_uncertainty
+    from ..compare.sides import with_options
+    from ..compare.two_sides import recorded_sides
 
-    left, right = request.sides
-    asked = request.scenario()
-    asked = replace(asked, options={**asked.options, **request.options})
-    labels = left.label, right.label
-    return explain_sides(
-        left.load(),
-        right.load(),
-        asked,
+    if request.is_traces:
+        asked, sides, traces = recorded_sides(request)
+    else:
+        asked, traces = request.scenario(), ()
+        sides = request.sides or request.on_backends(asked.model)
+    left, right = (side.label for side in sides)
+    sides, given = with_options(sides, {**asked.options, **request.options})
+    one, two = (side.load() for side in sides)
+    return why.explain(
+        one,
+        two,
+        replace(asked, options=given),
+        recordings=[
+            for_left(t, model, request) for t, model in zip(traces, (one, two), strict=False)
+        ],
         seconds=request.seconds,
         seed=request.seed,
         names=request.names,
@@ -116,44 +93,8 @@ def of_sides(options: argparse.Namespace, request: Any, progress: Any) -> Any:
         measure=options.measure or "worst",
         finer=options.finer,
         budget=200 if options.budget is None else options.budget,
-        labels=None if labels[0] == labels[1] else labels,
-        uncertain=uncertain_of(options),
+        labels=None if left == right else (left, right),
+        uncertain=None if options.no_chaos else parse_uncertainty(options.uncertainty),
         jobs=options.jobs,
-        progress=progress,
-    )
-
-
-def explain(request: Any, quantity: str | None, progress: Any, uncertain: Any) -> Any:
-    """The attribution of one experiment on two backends.
-
-    Args:
-        request: A `compare.Request` that names it.
-        quantity: What the gap is measured in; None for the experiment's own.
-        progress: Told the fraction that is done.
-        uncertain: What is not known of the start; None for no chaos floor.
-    """
-    from ..backends import load
-    from ..compare.why import attribute
-    from ..runs.scenarios import scenario
-
-    asked = scenario(request.what[0])
-    asked = replace(asked, options={**asked.options, **request.options})
-    models = [
-        load(
-            request.model or asked.model,
-            backend=backend,
-            defaults=request.defaults,
-            menagerie=request.menagerie,
-        )
-        for backend in request.backends
-    ]
-    return attribute(
-        models[0],
-        models[1],
-        asked,
-        seconds=request.seconds,
-        seed=request.seed,
-        quantity=quantity,
-        uncertain=uncertain,
         progress=progress,
     )

@@ -7,8 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError
-from ._common import REPEATED, add_table, complain, file_name
+from ._common import REPEATED, add_table, complain, file_name, flag_of, refuse
 
 # Options of a report alone, and what they are where they are not given.
 _DEFAULTS: dict[str, Any] = {
@@ -68,27 +67,37 @@ def check(options: argparse.Namespace) -> None:
     Raises:
         BadInputError: It does not, or a file cannot be written.
     """
-    if options.out == "" or options.report == "":
-        raise BadInputError("the folder of a sweep has no name: say --out DIR, or --report DIR")
+    runs = options.what is not None and options.out is not None
+    there = options.report not in (None, True)
     if options.report is None:
-        for name, default in _DEFAULTS.items():
-            if getattr(options, name) != default:
-                raise BadInputError(f"--{name.replace('_', '-')} goes with --report")
-        if options.what is None or options.out is None:
-            raise BadInputError(
-                "a sweep wants WHAT and --out DIR; the report of a dataset --report DIR"
-            )
-        return
-    if options.report is True and (options.what is None or options.out is None):
-        raise BadInputError("--report wants the folder of a dataset, or WHAT and --out DIR to run")
-    if options.report is not True and (options.what is not None or options.out is not None):
-        raise BadInputError(
-            "--report DIR is of a dataset that is there; with WHAT and --out it takes no folder"
-        )
-    if options.report is not True and options.retry_failed:
-        raise BadInputError("--retry-failed is of a sweep that runs: say WHAT and --out DIR")
-    if options.floor_cells is not None and options.floor_cells < 0:
-        raise BadInputError(f"--floor-cells must not be negative; got {options.floor_cells}")
+        given = (name for name, usual in _DEFAULTS.items() if getattr(options, name) != usual)
+        refuse(*((True, f"{flag_of(name)} goes with --report") for name in given))
+    refuse(
+        (
+            "" in (options.out, options.report),
+            "the folder of a sweep has no name: say --out DIR, or --report DIR",
+        ),
+        (
+            options.report is None and not runs,
+            "a sweep wants WHAT and --out DIR; the report of a dataset --report DIR",
+        ),
+        (
+            options.report is True and not runs,
+            "--report wants the folder of a dataset, or WHAT and --out DIR to run",
+        ),
+        (
+            there and (options.what, options.out) != (None, None),
+            "--report DIR is of a dataset that is there; with WHAT and --out it takes no folder",
+        ),
+        (
+            there and options.retry_failed,
+            "--retry-failed is of a sweep that runs: say WHAT and --out DIR",
+        ),
+        (
+            (options.floor_cells or 0) < 0,
+            f"--floor-cells must not be negative; got {options.floor_cells}",
+        ),
+    )
     if options.html is not None:
         from ..report.html import check_target
 

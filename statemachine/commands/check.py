@@ -35,8 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             "--time-limit",
             "S",
             "seconds that each function of FILE may compute (default 5); time in which the "
-            "machine is busy with others does not count, up to 120 s on the clock, or 8 times S; "
-            "what only waits may do so for 10 s, or twice S",
+            "machine is busy with others does not count, up to 60 s on the clock, or 12 times S",
             {"default": 5.0},
         ),
         (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..errors import BadInputError, EndedEarlyError
+from ..errors import EndedEarlyError
 from ..installed import PAIR
 from . import (
     _compare_floor,
@@ -17,15 +17,19 @@ from . import (
 from . import _compare_pictures as pictures
 from ._common import (
     DEFAULTS,
+    PARTS,
     PROGRAM,
     REPEATED,
     SECONDS,
+    SIDES,
     Row,
     add_table,
     complain,
     json_of,
     menagerie,
     pairs_of,
+    refuse,
+    refuse_given,
     seed_of,
     show,
 )
@@ -81,6 +85,13 @@ def add(parser: argparse.ArgumentParser) -> None:
             "too",
             REPEATED,
         ),
+        (
+            "--actuators",
+            "SIDE",
+            "both sides have those of the left, or of the right",
+            {"choices": SIDES},
+        ),
+        ("--floor", "SIDE", "both have that of the left, or of the right", {"choices": SIDES}),
         ("--every", "N", "steps for which what FUNCTION(model, data) returned holds (1)"),
         ("--keyframe", "NAME", "where a FUNCTION starts, on both sides"),
     )
@@ -144,6 +155,12 @@ def request_of(options: argparse.Namespace) -> Any:
     one, two = options.backends or PAIR
     what, sides = split_words(options.what, options.menagerie)
     _check_sides(options, what, sides)
+    names = pairs_of(options.map, "--map")
+    if sides:
+        back = {there: here for here, there in names.items()}
+        taken = [[part for part in PARTS if getattr(options, part) == side] for side in SIDES]
+        left, right = sides
+        sides = left.taking(taken[1], right, back), right.taking(taken[0], left, names)
     return Request(
         what=what,
         backends=(one, two),
@@ -154,7 +171,7 @@ def request_of(options: argparse.Namespace) -> Any:
         seed=options.seed,
         options={} if options.timestep is None else {"timestep": options.timestep},
         sides=sides,
-        names=pairs_of(options.map, "--map"),
+        names=names,
         every=1 if options.every is None else options.every,
         keyframe=options.keyframe,
     )
@@ -165,23 +182,26 @@ def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any)
     from ..runs.controllers import is_function
 
     if sides:
-        for name, instead in (
-            ("model", "each side names its file"),
-            ("backends", "each side names its engine: FILE@ENGINE"),
-            ("defaults", "each side says whose: FILE@ENGINE:engine"),
-        ):
-            if getattr(options, name) not in (None, "model"):
-                raise BadInputError(f"--{name} goes without sides: {instead}")
-    elif options.map:
-        raise BadInputError(
-            f"--map is of two sides: {PROGRAM} compare hold LEFT RIGHT --map NAME=NAME"
+        refuse_given(options, ["model"], "{} goes without sides: each side names its file")
+        refuse_given(
+            options,
+            ["backends"],
+            "{} goes without sides: each side names its engine: FILE@ENGINE",
         )
-    function = len(what) == 1 and is_function(what[0])
-    for name in ("every", "keyframe"):
-        if getattr(options, name) is not None and not function:
-            raise BadInputError(f"--{name} goes with FILE.py:FUNCTION")
-    if options.every is not None and options.every < 1:
-        raise BadInputError(f"--every wants a number of steps, at least 1; got {options.every}")
+        refuse(
+            (
+                options.defaults != "model",
+                "--defaults goes without sides: each side says whose: FILE@ENGINE:engine",
+            )
+        )
+    else:
+        map_of = f"{{}} is of two sides: {PROGRAM} compare hold LEFT RIGHT --map NAME=NAME"
+        refuse_given(options, ["map"], map_of)
+        refuse_given(options, PARTS, f"{{}} is of two sides: {PROGRAM} compare hold LEFT RIGHT")
+    if not (len(what) == 1 and is_function(what[0])):
+        refuse_given(options, ["every", "keyframe"], "{} goes with FILE.py:FUNCTION")
+    few = options.every is not None and options.every < 1
+    refuse((few, f"--every wants a number of steps, at least 1; got {options.every}"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -192,17 +212,15 @@ def run(options: argparse.Namespace) -> int:
     steps = _compare_steps.asked(options)
     pictures.complete(options)
     if options.models:
-        if options.why or options.quantity:
-            raise BadInputError(
-                "--models compares files: --why and --quantity are of an experiment"
-            )
         return _compare_models.run(options)
-    _compare_models.refuse_alone(options)
-    if not options.what:
-        raise BadInputError(
+    refuse_given(options, _compare_models.ALONE, "{} goes with --models")
+    refuse(
+        (
+            not options.what,
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
-            f"{PROGRAM} compare hold"
+            f"{PROGRAM} compare hold",
         )
+    )
     if steps:
         return _compare_steps.run(options, request_of(options))
     if options.why and not options.html:
@@ -211,10 +229,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_why(options: argparse.Namespace) -> int:
-    if options.tolerance:
-        raise BadInputError("--why takes no --tolerance: it explains the gap, whatever its size")
-    if options.plot or options.film:
-        raise BadInputError("--why runs many times: --plot and --film go without it")
+    refuse(
+        (options.tolerance, "--why takes no --tolerance: it explains the gap, whatever its size"),
+        (
+            options.plot or options.film,
+            "--why runs many times: --plot and --film go without it",
+        ),
+    )
     try:
         return _compare_why.run(options, request_of(options))
     except EndedEarlyError as error:  # what there is until then, and no cause
@@ -229,8 +250,9 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
 
     tolerances = parse_tolerances(options.tolerance)
     request = request_of(options)
-    if request.is_traces and len(request.what) == 2 and options.backends:
-        raise BadInputError("--backends is of a run, and two traces are runs that were made")
+    if request.is_traces and len(request.what) == 2:
+        text = "{} is of a run, and two traces are runs that were made"
+        refuse_given(options, ["backends"], text)
     wanted = pictures.checked(options)
     run = None
     with progress("compare") as told:

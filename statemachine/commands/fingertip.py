@@ -40,7 +40,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
-    from ..lessons._certificate import page
+    from ..lessons.certificate import page
     from ..lessons.fingertip import certify
 
     results = on_each_backend(

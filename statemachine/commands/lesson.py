@@ -1,4 +1,4 @@
-"""`statemachine lesson`: the guided path, and each of its stations."""
+"""`statemachine lesson`: the guided path, and each lesson alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
-from ..lessons import LESSONS, STATIONS
+from ..lessons import BESIDE, LESSONS, PATH
 from ..lessons.records import Lesson
 from ._common import (
     BACKEND,
@@ -24,22 +24,23 @@ from ._common import (
     menagerie,
     model_of,
     on_each_backend,
+    refuse,
     show,
 )
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    """Its options, and a parser for each station."""
-    parser.description = "Without a name: all stations, one after the other."
-    parser.epilog = "In a terminal each station asks for a prediction before it shows the answer."
+    """Its options, and a parser for each lesson."""
+    parser.description = "Without a name: the lessons of the path, one after the other."
+    parser.epilog = "In a terminal each lesson asks for a prediction before it shows the answer."
     add_table(
         parser,
         *_shared(),
         (
             "--from",
-            "STATION",
+            "LESSON",
             "of the whole path: where to begin, if not at the first",
-            {"dest": "start", "type": by_number, "choices": [lesson.name for lesson in STATIONS]},
+            {"dest": "start", "type": by_number, "choices": [lesson.name for lesson in PATH]},
         ),
         (
             "--further",
@@ -54,13 +55,13 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def by_number(word: str) -> str:
-    """The name of a station that was given by its number."""
-    names = [lesson.name for lesson in STATIONS]
+    """The name of a lesson of the path that was given by its number."""
+    names = [lesson.name for lesson in PATH]
     return names[int(word) - 1] if word.isdecimal() and 0 < int(word) <= len(names) else word
 
 
 def _shared() -> Iterator[Row]:
-    """Options that come before a station's name or after it; the later one counts."""
+    """Options that come before a lesson's name or after it; the later one counts."""
     yield from (BACKEND, *menagerie(), json_of())
     yield "--calls", "", "show which of the engine's own functions the code made it run"
     yield "--no-questions", "", "do not ask for predictions, do not wait"
@@ -101,10 +102,13 @@ def overview(_options: argparse.Namespace) -> int:
     lines = [
         "A physics simulator is a state machine that you advance.",
         "",
-        f"  {PROGRAM} lesson           the guided path: ten stations, about 35 minutes",
+        f"  {PROGRAM} lesson           the guided path: ten lessons, about 35 minutes",
         "",
-        "Its stations, each to be had alone:",
-        *(f"  {PROGRAM} lesson {name:<9} {lesson.question}" for name, lesson in LESSONS.items()),
+        "Its lessons, each to be had alone:",
+        *(f"  {PROGRAM} lesson {each.name:<9} {each.question}" for each in PATH),
+        "",
+        "And two more:",
+        *(f"  {PROGRAM} lesson {each.name:<9} {each.question}" for each in BESIDE),
         "",
         "Then your turn:",
         "  python exercises/step_loop.py              four functions for you to write",
@@ -128,15 +132,19 @@ def overview(_options: argparse.Namespace) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """One station, on one backend or all."""
+    """One lesson, on one backend or all."""
     lesson: Lesson = options.lesson
-    if options.start is not None:
-        raise BadInputError(
+    refuse(
+        (
+            options.start is not None,
             f"--from begins the whole path, and {lesson.name} is one lesson of it: type "
-            f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}"
-        )
-    if options.further:
-        raise BadInputError(f"--further goes with the whole path: {PROGRAM} lesson --further")
+            f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}",
+        ),
+        (
+            options.further,
+            f"--further goes with the whole path: {PROGRAM} lesson --further",
+        ),
+    )
     values = {option.key: getattr(options, option.key) for option in lesson.options}
     reader = _reader(options, lesson)
     if options.plot is not None:
@@ -176,8 +184,8 @@ Where to go next:
 
 
 def run_path(options: argparse.Namespace) -> int:
-    """All stations, one after the other."""
-    reader = _reader(options, STATIONS[0])
+    """All lessons of the path, one after the other."""
+    reader = _reader(options, PATH[0])
     try:
         return _path(options, reader)
     finally:
@@ -190,20 +198,20 @@ def _path(options: argparse.Namespace, reader: Any) -> int:
     from ..report.quiz import Stopped
 
     code, everything = 0, {}
-    names = [lesson.name for lesson in STATIONS]
+    names = [lesson.name for lesson in PATH]
     first = names.index(options.start) if options.start else 0
-    for number, lesson in enumerate(STATIONS[first:], start=first + 1):
+    for number, lesson in enumerate(PATH[first:], start=first + 1):
         try:
             if reader and number > first + 1:
-                reader.go_on(f"station {number}: {lesson.question}")
+                reader.go_on(f"lesson {number}: {lesson.question}")
             if reader:
                 reader.lesson = lesson.name
             page, results = _compute(options, lesson, lesson.model, {})
             everything[lesson.name] = results
             code = code if page.holds else SAYS_NO
             if not options.json:
-                title = f"{number} of {len(STATIONS)}: {page.title}"
-                last = number == len(STATIONS) and not options.further
+                title = f"{number} of {len(PATH)}: {page.title}"
+                last = number == len(PATH) and not options.further
                 terminal.show(replace(page, title=title), _AFTER if last else "", reader)
         except (Stopped, KeyboardInterrupt) as stop:
             if reader:
@@ -225,7 +233,7 @@ def _path(options: argparse.Namespace, reader: Any) -> int:
 
 def _further(options: argparse.Namespace, reader: Any) -> int:
     """The fingertip of all engines against the witness, and where to go next."""
-    from ..lessons._certificate import page
+    from ..lessons.certificate import page
     from ..lessons.fingertip import certify
     from ..report import terminal
 
@@ -248,7 +256,7 @@ def _further(options: argparse.Namespace, reader: Any) -> int:
 def _compute(
     options: argparse.Namespace, lesson: Lesson, model: str, values: dict[str, Any]
 ) -> tuple[Any, dict[str, Any]]:
-    """The page of a station, and the results that it was made from, by backend."""
+    """The page of a lesson, and the results that it was made from, by backend."""
     from ..lessons.pictures import with_picture
     from ..lessons.session import page_of_lesson, take
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             "--spread",
             "SIZES",
             "how far a seed other than 0 puts the start away (1deg,1mm; 0 for not at all)",
+            {"default": "1deg,1mm"},
         ),
     )
     group = parser.add_argument_group("ranges")
@@ -140,13 +142,6 @@ def _reported(options: argparse.Namespace, out: Path, page: Any, summary: Any) -
 def _asked(options: argparse.Namespace) -> Any:
     from ..sweep import Sweep
 
-    given = {
-        name: getattr(options, name)
-        for name in (
-            *("what", "vary", "seeds", "samples", "indices", "design_seed", "model", "menagerie"),
-            *("seconds", "every", "keyframe", "defaults", "moments", "timeout"),
-        )
-    }
-    if options.spread is not None:
-        given["spread"] = options.spread.split(",")
+    typed = vars(options)
+    given = {each.name: typed[each.name] for each in fields(Sweep) if each.name in typed}
     return Sweep(backends=options.backend or ("all",), **given)

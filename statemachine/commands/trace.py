@@ -37,7 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         (
             "--controller",
             "FILE.py[:NAME]",
-            "instead: a function (time, data) -> ctrl, by default named controller",
+            "instead: a function (model, data) -> ctrl, by default named controller",
         ),
         ("--keyframe", "NAME", "where a controller starts"),
         ENGINE,
@@ -102,46 +102,37 @@ def run_record(options: argparse.Namespace) -> int:
         )
     from ..backends import load
     from ..report.progress import progress
-    from ..runs import record, record_scenario
-    from ..runs.controllers import controller_from
+    from ..runs import record_scenario
+    from ..runs.controllers import function_scenario
     from ..runs.scenarios import scenario
 
     changes = {} if options.timestep is None else {"timestep": options.timestep}
-    asked = None if options.what is None else scenario(options.what)
-    if asked is not None and options.keyframe is not None:
-        raise BadInputError(f"--keyframe goes with --controller; {asked.name} has its own start")
+    if options.what is not None and options.keyframe is not None:
+        raise BadInputError(f"--keyframe goes with --controller; {options.what} has its own start")
+    asked = (
+        scenario(options.what)
+        if options.what is not None
+        else function_scenario(options.controller, keyframe=options.keyframe)
+    )
     name = options.what or Path(options.controller.rpartition(":")[0] or options.controller).stem
     target = _target(options.output, f"{name}.{options.backend}.npz")
     model = load(
-        options.model or (asked.model if asked else "so101/scene"),
+        options.model or asked.model or "so101/scene",
         backend=options.backend,
         defaults=options.defaults,
         menagerie=options.menagerie,
     )
     with progress(f"record {name} on {options.backend}") as told:
-        if asked is not None:
-            trace = record_scenario(
-                asked,
-                model,
-                seconds=options.seconds,
-                seed=options.seed,
-                command=_typed(options),
-                defaults=options.defaults,
-                options=changes,
-                progress=told,
-            )
-        else:
-            trace = record(
-                model.replace(**changes) if changes else model,
-                controller_from(options.controller),
-                2.0 if options.seconds is None else options.seconds,
-                keyframe=options.keyframe,
-                experiment=name,
-                command=_typed(options),
-                defaults=options.defaults,
-                options=changes,
-                progress=told,
-            )
+        trace = record_scenario(
+            asked,
+            model,
+            seconds=options.seconds,
+            seed=options.seed,
+            command=_typed(options),
+            defaults=options.defaults,
+            options=changes,
+            progress=told,
+        )
     return _written(trace, target)
 
 

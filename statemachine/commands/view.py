@@ -12,7 +12,16 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import BadInputError, TraceError
-from ._common import ENGINE, PROGRAM, add_table, complain, menagerie, one_line
+from ._common import (
+    ENGINE,
+    PROGRAM,
+    add_table,
+    complain,
+    menagerie,
+    one_line,
+    refuse,
+    refuse_given,
+)
 
 _PORT = 8080
 _MODEL = "so101/scene_box"
@@ -101,11 +110,9 @@ def _play(options: argparse.Namespace, port: int) -> int:
     from ..runs import model_file, read
     from ..view.recording import TraceSession
 
-    if len(options.traces) > 2:
-        raise BadInputError(f"view shows one trace or two; got {len(options.traces)}")
-    for name in ("ghost", "keyframe", "site"):
-        if getattr(options, name) is not None:
-            raise BadInputError(f"--{name} is for a simulation, and a trace is a recording")
+    refuse((len(options.traces) > 2, f"view shows one trace or two; got {len(options.traces)}"))
+    text = "{} is for a simulation, and a trace is a recording"
+    refuse_given(options, ["ghost", "keyframe", "site"], text)
     recording = TraceSession([read(path) for path in options.traces])
     header = recording.header
     name, same = options.model or header.provenance.model_file.removesuffix(".xml"), True

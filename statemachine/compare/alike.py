@@ -123,9 +123,13 @@ def in_terms_of_right(left: Trace, right: Trace | None, matched: Matched | None)
 
 
 def same_commands(theirs: Trace, right: Trace) -> bool:
-    """Whether the right was told at each of its moments what the left was, from the same start."""
-    if any(not np.array_equal(theirs[name][0], right[name][0]) for name in ("qpos", "qvel")):
-        return False
+    """Whether the right was told what the left was, from the same start."""
+    starts = (np.array_equal(theirs[name][0], right[name][0]) for name in ("qpos", "qvel"))
+    return all(starts) and commands_alike(theirs, right)
+
+
+def commands_alike(theirs: Trace, right: Trace) -> bool:
+    """Whether the right was told at each of its moments what the left was."""
     since, times = right.time - right.time[0], theirs.time - theirs.time[0]
     early = 1e-6 * theirs.timestep  # as `play` has it
     rows = np.searchsorted(times - early, since, side="right") - 1

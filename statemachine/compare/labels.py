@@ -199,8 +199,10 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
             "the commands differ: the controllers saw different states, or are two",
         ),
     ]
-    for header, label in zip((a, b), labels, strict=True):
+    for trace, label in zip((one, two), labels, strict=True):
+        header, inside = trace.header, few(trace.overlaps)
         notes += [
+            (inside, f"{label} starts with shapes inside each other: {inside}"),
             (header.ended, f"{label} ended early: {header.ended}"),
             (
                 header.rewritten,

@@ -16,7 +16,7 @@ from ..description.records import Robot
 from ..description.tree import GroupTree
 from ..engines import room
 from ..engines.records import BodyPair
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
 from ..interface import Array, Model, make_data, reset
 from ..rotations import HERE
@@ -123,15 +123,20 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
         BadInputError: A backend tells nothing of the bodies of its Model.
     """
     given = dict(names or {})
-    trees = [GroupTree(_description(model)) for model in (one, two)]
-    drives = _check_names(given, one, two, trees)
-    trees[0] = GroupTree(
-        renamed(trees[0].robot, {a: b for a, b in given.items() if a not in drives})
-    )
-    found = match(trees[0], trees[1], one_world=all(tree.robot.rooted for tree in trees))
-    joints = _joints(found, trees)
+    robots = [_description(model) for model in (one, two)]
+    for side, model in enumerate((one, two)):
+        known = robots[side].names | {name for name in model.actuator_names if name}
+        for pair in given.items():
+            check_name(
+                f"joint, body, site or actuator in {model.path.name}", pair[side], sorted(known)
+            )
+    ours = {a: b for a, b in given.items() if a in robots[0].names}
+    trees = [GroupTree(renamed(robots[0], ours)), GroupTree(robots[1])]
+    found = match(trees[0], trees[1], one_world=all(robot.rooted for robot in robots))
+    moving = [(p.one.joint, p.two.joint) for p in found.pairs if p.one.joint and p.two.joint]
+    joints = tuple(sorted((a.number, b.number) for a, b in moving if a.kind == b.kind))
     # A body with several joints is several parts of a description, of which the last has its mass.
-    by_body = {solid.one: solid for solid in (_solid(p, trees, one, two) for p in found.pairs)}
+    by_body = {solid.one: solid for solid in map(_solid, found.pairs)}
     solids = (*by_body.values(), *_led(one, two, given))
     sites = _sites(one, two, given, found, trees)
     actuators = _actuators(one, two, joints, given)
@@ -152,7 +157,28 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
         actuators=actuators,
         solids=solids,
         only=(only[0], only[1]),
-        notes=(*_notes(found), *_site_notes(one, two, sites, given)),
+        notes=(*found.notes(), *_site_notes(one, two, sites, given)),
+    )
+
+
+def match_alike(one: Model, two: Model) -> Matched:
+    """Pair two Models of one file, of which a backend does not tell what the bodies are.
+
+    Raises:
+        BadInputError: They do not have the same names in the same order.
+    """
+    pairs = {}
+    for kind in ("joint", "body", "site", "actuator"):
+        names = getattr(one, f"{kind}_names"), getattr(two, f"{kind}_names")
+        if names[0] != names[1]:
+            raise BadInputError(
+                "a backend does not tell what the bodies of its models are, and they cannot be "
+                f"matched by name: the two sides have other names of a {kind}"
+            )
+        pairs[kind] = tuple((k, k) for k in range(len(names[0])))
+    only: tuple[Only, Only] = {}, {}
+    return Matched(
+        one, two, pairs["joint"], pairs["body"], pairs["site"], pairs["actuator"], (), only, ()
     )
 
 
@@ -165,50 +191,9 @@ def _description(model: Model) -> Robot:
     return room(DEFAULT).describe(model.compiled, model.path.name)
 
 
-def _check_names(
-    given: Mapping[str, str], one: Model, two: Model, trees: Sequence[GroupTree]
-) -> set[str]:
-    """Names that only actuators have; raises UnknownNameError for one that nothing has."""
-    drives = set()
-    for a, b in given.items():
-        for name, model, tree in ((a, one, trees[0]), (b, two, trees[1])):
-            robot = tree.robot
-            parts = {each.name for each in (*robot.joints, *robot.links, *robot.frames)}
-            known = parts | {name for name in model.actuator_names if name}
-            if name not in known:
-                raise unknown_name(
-                    f"joint, body, site or actuator in {model.path.name}", name, sorted(known)
-                )
-            if name not in parts:
-                drives.add(a)
-    return drives
-
-
-def _joints(found: Matching, trees: Sequence[GroupTree]) -> Pairs:
-    """Ids of the joints of one kind; a description has them in the order of the model."""
-    places = [{id(joint): k for k, joint in enumerate(tree.robot.joints)} for tree in trees]
-    pairs = []
-    for pair in found.pairs:
-        a, b = pair.one.joint, pair.two.joint
-        if a is not None and b is not None and a.kind == b.kind:
-            pairs.append((places[0][id(a)], places[1][id(b)]))
-    return tuple(sorted(pairs))
-
-
-def _solid(pair: Pair, trees: Sequence[GroupTree], one: Model, two: Model) -> BodyPair:
-    bodies = [
-        _body_of(group.links[0][0].name, tree, model)
-        for group, tree, model in ((pair.one, trees[0], one), (pair.two, trees[1], two))
-    ]
+def _solid(pair: Pair) -> BodyPair:
+    bodies = [group.links[0][0].body for group in (pair.one, pair.two)]
     return BodyPair(bodies[0], bodies[1], pair.align, pair.moved)
-
-
-def _body_of(link: str, tree: GroupTree, model: Model) -> int:
-    """The body whose link this is; of the links of a body with several joints, the last."""
-    place = [each.name for each in tree.robot.links].index(link)
-    # A body with n joints is n links, one without is one.
-    counts = np.maximum(np.bincount(model.jnt_bodyid, minlength=model.nbody), 1)
-    return int(np.searchsorted(np.cumsum(counts), place, side="right"))
 
 
 def _led(one: Model, two: Model, given: Mapping[str, str]) -> Iterator[BodyPair]:
@@ -302,20 +287,6 @@ def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
     return tuple(name or f"number {k}" for k, name in enumerate(names) if k not in taken)
 
 
-def _notes(found: Matching) -> list[str]:
-    notes = []
-    for pair in found.pairs:
-        a, b = pair.one.joint, pair.two.joint
-        if pair.by == "place" and a and b and a.name != b.name:
-            notes.append(
-                f"joint {a.name!r} on the left is taken for {b.name!r} on the right: one kind, "
-                f"one place, one axis (--map {a.name}=NAME says otherwise)"
-            )
-        elif a and b and a.kind != b.kind:
-            notes.append(f"joint {a.name!r} is a {a.kind} on the left and a {b.kind} on the right")
-    return notes
-
-
 def _site_notes(one: Model, two: Model, sites: Pairs, given: Mapping[str, str]) -> Iterator[str]:
     for a, b in sites:
         name, other = one.site_names[a], two.site_names[b]
@@ -331,3 +302,19 @@ def _moved(values: Array, start: Array, here: Sequence[int], there: Sequence[int
     rows = np.array(np.broadcast_to(start, (*np.shape(values)[:-1], len(start))))
     rows[..., there] = values[..., here]
     return rows
+
+
+def missing_parts(one: Model, two: Model) -> tuple[tuple[str, str], ...]:
+    """What one of two Models has nothing of, and the other has.
+
+    Returns:
+        Pairs: "left" or "right", who has none; and "actuators" or "floor".
+    """
+    if one.compiled is None or two.compiled is None:
+        return ()
+    left, right = (room(DEFAULT).counts(model.compiled) for model in (one, two))
+    return tuple(
+        ("right" if left[part] else "left", part)
+        for part in left
+        if bool(left[part]) is not bool(right[part])
+    )

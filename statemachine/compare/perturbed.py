@@ -14,6 +14,7 @@ from ..measures import amount
 from ..rotations import times
 from ..runs import Trace, record
 from ..runs.drive import Progress, part_of, silent
+from ..runs.recorder import commands_of
 from ..runs.scenarios import Controller, Scenario
 from .matching import start_of
 
@@ -123,16 +124,10 @@ def rerun_of(
 
 def replayed(trace: Trace, model: Model) -> Rerun:
     """A run that was made on a Model: its start and its commands, row by row."""
-    start, ctrl = float(trace.time[0]), trace.ctrl
-
-    def controller(time: float, data: Data) -> Array:
-        del data
-        return ctrl[min(round(time / trace.timestep), len(ctrl) - 1)]
-
     return Rerun(
         model,
-        lambda _model: controller,
-        float(trace.time[-1]) - start,
+        lambda _model: commands_of(trace),
+        float(trace.time[-1] - trace.time[0]),
         qpos=trace.qpos[0],
         qvel=trace.qvel[0],
         defaults="engine" if trace.header.defaults == "engine" else "model",
@@ -194,7 +189,12 @@ def perturbed_run(
         raise BadInputError(f"seed must not be negative; got {seed}")
     draw = np.random.default_rng([seed, k])
     qpos, qvel = rerun.start()
-    qpos = _displaced(rerun.model, qpos, uncertain, np.random.default_rng([seed, k // 2]), k)
+    # At a corner of what is possible; of two runs one is opposite to the other.
+    corner, side = np.random.default_rng([seed, k // 2]), -1.0 if k % 2 else 1.0
+    qpos = displaced(
+        rerun.model, qpos, uncertain, corner,
+        lambda: side * float(corner.choice((-1.0, 1.0))), lambda: side,
+    )  # fmt: skip
     controller = nudged_controller(rerun.controller(rerun.model), draw)
     qpos, qvel = nudged_start(rerun.model, qpos, qvel, draw)
     return rerun.record(
@@ -206,19 +206,32 @@ def perturbed_run(
     )
 
 
-def _displaced(
-    model: Model, qpos: Array, size: Uncertainty, draw: np.random.Generator, run: int
+def displaced(
+    model: Model,
+    qpos: Array,
+    size: Uncertainty,
+    draw: np.random.Generator,
+    along: Callable[[], float],
+    far: Callable[[], float],
 ) -> Array:
-    """A start (nq,) at a corner of what is possible; of two runs one is opposite to the other."""
-    qpos, opposite = qpos.copy(), -1.0 if run % 2 else 1.0
+    """A start (nq,) away from another one.
+
+    Args:
+        model: Whose joints they are.
+        qpos: (nq,) the other one.
+        size: How far away.
+        draw: Of the directions of free bodies and rotations.
+        along: Gives what share of it a hinge or a slide moves, with its sign.
+        far: Gives what share of it a free body or a rotation does.
+    """
+    qpos = qpos.copy()
     for kind, place in zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True):
         if kind in (JointType.HINGE, JointType.SLIDE):
-            most = size.angle if kind == JointType.HINGE else size.length
-            qpos[place] += opposite * most * float(draw.choice((-1.0, 1.0)))
+            qpos[place] += (size.angle if kind == JointType.HINGE else size.length) * along()
             continue
         if kind == JointType.FREE:
-            qpos[place : place + 3] += opposite * size.length * direction(draw)
-        turn(qpos[place + JointType(kind).nq - 4 :][:4], opposite * size.angle * direction(draw))
+            qpos[place : place + 3] += size.length * far() * direction(draw)
+        turn(qpos[place + JointType(kind).nq - 4 :][:4], size.angle * far() * direction(draw))
     return qpos
 
 

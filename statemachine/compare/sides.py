@@ -8,10 +8,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from ..backends import backend_names, load
+from ..engines import room
 from ..errors import BadInputError, StateMachineError, check_name, shown, unknown_name
 from ..installed import DEFAULT, PAIR
 from ..interface import OPTIONS, Model
@@ -22,6 +26,7 @@ from ..runs.controllers import function_scenario, is_function
 from ..runs.files import SUFFIXES
 from ..runs.scenarios import SCENARIOS, Scenario, scenario
 from .labels import typed_option
+from .matching import match_models
 
 _OPTION = re.compile(r"[A-Za-z_]+=\S*")
 _LAST_OPTION = re.compile(rf"\s+({_OPTION.pattern})\s*$")
@@ -39,6 +44,7 @@ class Side:
         defaults: "model", or "engine" for the engine as its own users meet it.
         options: As `Model.replace` takes them.
         menagerie: A menagerie folder to look the name up in.
+        taken: Parts of another side's file that stand in place of its own.
     """
 
     file: str
@@ -46,6 +52,7 @@ class Side:
     defaults: Literal["model", "engine"] = "model"
     options: Mapping[str, Any] = field(default_factory=dict)
     menagerie: str | None = None
+    taken: TakenParts | None = None
 
     @property
     def path(self) -> Path:
@@ -66,13 +73,73 @@ class Side:
         Raises:
             StateMachineError: As `load` does.
         """
-        return load(
+        options |= self.options
+        load_it = partial(
+            load,
             self.file,
             backend=self.engine,
             defaults=self.defaults,
             menagerie=self.menagerie,
-            **{**options, **self.options},
         )
+        if self.taken is None:
+            return load_it(**options)
+        model = self.taken.given_to(load_it())
+        return model.replace(**options) if options else model
+
+    def taking(self, parts: Iterable[str], of: Side, names: Mapping[str, str]) -> Side:
+        """Itself with some parts of another side's file; `names` as of `TakenParts`."""
+        parts = tuple(parts)
+        return replace(self, taken=TakenParts(parts, of, names)) if parts else self
+
+
+@dataclass(frozen=True)
+class TakenParts:
+    """Parts of a file that another file gets instead of its own.
+
+    Attributes:
+        parts: "actuators", "floor": the planes that are fixed to the world.
+        of: The side whose file has them.
+        names: Joints, bodies and sites of `of` that go by other names in the file that gets them.
+    """
+
+    parts: tuple[str, ...]
+    of: Side
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    def given_to(self, model: Model) -> Model:
+        """A Model of the same engine and file that has them.
+
+        Raises:
+            StateMachineError: It cannot be made.
+        """
+        giver = load(self.of.file, menagerie=self.of.menagerie)
+        matched = match_models(giver, model, self.names)
+        kinds = ("joint", "body", "site")
+        pairs = (matched.joints, matched.bodies, matched.sites)
+        names = {
+            kind: {
+                getattr(giver, f"{kind}_names")[a]: getattr(model, f"{kind}_names")[b]
+                for a, b in of_kind
+            }
+            for kind, of_kind in zip(kinds, pairs, strict=True)
+        }
+        raw = room(DEFAULT).with_parts(model.path, giver.path, self.parts, names)
+        return model.with_compiled(raw)
+
+
+def with_options(
+    sides: Sequence[Side], options: Mapping[str, Any]
+) -> tuple[list[Side], dict[str, Any]]:
+    """Sides with what only they are given, and the options that both have.
+
+    Args:
+        sides: Two.
+        options: Of what is run; those of a side win.
+    """
+    one, two = ({**options, **side.options} for side in sides)
+    both = {name: one[name] for name in one if name in two and np.array_equal(one[name], two[name])}
+    own = [{name: o[name] for name in o if name not in both} for o in (one, two)]
+    return [replace(side, options=o) for side, o in zip(sides, own, strict=True)], both
 
 
 def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side]:
@@ -217,13 +284,39 @@ class Request:
         """Whether files were named, not an experiment."""
         return any(map(is_trace, self.what))
 
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """A line for each side that has parts of the other's file."""
+        others = (("left", "right"), ("right", "left"))
+        return tuple(
+            f"the {here} has the {listed(side.taken.parts)} of the {there}, not its own"
+            for side, (here, there) in zip(self.sides, others, strict=False)
+            if side.taken
+        )
+
+    def on_backends(self, model: str) -> tuple[Side, Side]:
+        """The two sides of one model, where only backends were said.
+
+        Args:
+            model: The experiment's own, where none was said either.
+        """
+        one, two = (
+            Side(self.model or model, backend, self.defaults, {}, self.menagerie)
+            for backend in self.backends
+        )
+        return one, two
+
     def scenario(self) -> Scenario:
         """What is run: an experiment of ours, or the function of the user's.
 
         Raises:
             UnknownNameError: There is no such experiment.
-            BadInputError: There is no such function, or its file fails.
+            BadInputError: There is no such function, or its file fails; or two things are named.
         """
+        if len(self.what) != 1:
+            raise BadInputError(
+                "compare takes one experiment: it runs on both engines; two traces are files"
+            )
         (what,) = self.what
         if not is_function(what):
             return scenario(what)

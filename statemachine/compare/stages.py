@@ -176,12 +176,14 @@ class StageReader:
         contacts, (say, keys) = data.contacts, self._names[side]
         found: Touching = {}
         for k, geoms in enumerate(contacts.geom.tolist()):
-            depth, force = -float(contacts.dist[k]), contacts.frame[k].T @ contacts.force[k]
-            if depth < 0 and not force.any():
-                continue  # it is near, and does nothing
+            # Of points that are apart only a force counts: an engine may push before they touch.
+            depth = max(0.0, -float(contacts.dist[k]))
+            force = contacts.frame[k].T @ contacts.force[k]
+            if not depth and not force.any():
+                continue
             one, two = (keys[geom] for geom in geoms)
             name = say(one, two)
-            before = found.get(name, np.array([-np.inf, 0.0, 0.0, 0.0]))
+            before = found.get(name, np.zeros(4))
             total = before[1:] + (-force if one > two else force)
             found[name] = np.array([max(depth, before[0]), *total])
         return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +16,8 @@ from ..measures import common_moments
 from ..measures.text import command, milliseconds
 from ..runs import Trace, model_file, play, read, record_scenario, shipped
 from ..runs.drive import Progress, check_length, part_of, silent, steps_in
-from ..runs.scenarios import SCENARIOS, Controller, Scenario, scenario
+from ..runs.recorder import commands_of
+from ..runs.scenarios import SCENARIOS, Controller, Scenario
 from .alike import (
     beginning_with,
     called,
@@ -28,7 +29,7 @@ from .alike import (
     told_alike,
 )
 from .labels import files_apart, labels_of, lacking
-from .matching import Matched, start_of
+from .matching import Matched, missing_parts, start_of
 from .perturbed import Rerun
 from .sides import Request, Side, is_trace
 
@@ -50,6 +51,7 @@ class SidesRun:
         matched: What of the left is what of the right; None if both are of one file.
         reruns: How the left and the right were run; None where a trace was played.
         file: The file of both sides; None if they have two.
+        missing: What one side has nothing of, and the other has: see `missing_parts`.
         said: What a reader should know of how it was run.
     """
 
@@ -60,6 +62,7 @@ class SidesRun:
     matched: Matched | None
     reruns: tuple[Rerun, Rerun] | None
     file: Path | None
+    missing: tuple[tuple[str, str], ...]
     said: tuple[str, ...]
 
     @property
@@ -133,7 +136,17 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
         both = [told_alike(one, each, matched) for each in rights]
         one, rights = both[0][0], [two for _, two in both]
     file = left.path if left.path == right.path else None
-    return SidesRun(one, rights[0], rights[-1], commands, matched, reruns, file, said)
+    return SidesRun(
+        left=one,
+        right=rights[0],
+        played=rights[-1],
+        commands=commands,
+        matched=matched,
+        reruns=reruns,
+        file=file,
+        missing=missing_parts(*models),
+        said=(*said, *request.taken),
+    )
 
 
 def _check_moments(models: list[Model], seconds: float) -> None:
@@ -238,14 +251,10 @@ def sides_of(
         raise BadInputError("compare takes one experiment, or one or two traces")
     if request.is_traces:
         return _of_traces(request, progress)
-    if len(request.what) == 2:
-        raise BadInputError(
-            "compare takes one experiment: it runs on both engines; two traces are files"
-        )
     what = request.what[0]
     if what not in SCENARIOS and Path(what).is_file():
         raise BadInputError(f"{what!r} is no trace: a trace ends in .npz or .parquet")
-    scenario(what)
+    request.scenario()
     for name in request.backends:
         check_name("backend", name, backend_names())
     said: list[str] = []
@@ -258,6 +267,56 @@ def sides_of(
     return (traces[0], traces[1]), tuple(said)
 
 
+def recorded_sides(
+    request: Request,
+) -> tuple[Scenario, tuple[Side, Side], tuple[Trace, ...]]:
+    """What recorded runs were, so that their models can be run again.
+
+    Returns:
+        What was run; the two sides; and the traces: of both sides, or one whose start and commands
+        both are given.
+
+    Raises:
+        BadInputError: There are two traces and two sides.
+        ModelFileError: The model of a trace is not here.
+    """
+    traces = tuple(read(word) for word in request.what)
+    if len(traces) == 2 and request.sides:
+        raise BadInputError("two traces have their own sides")
+    _refuse_of_run(request)
+    sides = request.sides or tuple(_side_of(request, k, trace) for k, trace in enumerate(traces))
+    if len(sides) == 1:
+        other = _other_backend(request, sides[0].engine)
+        sides = (*sides, replace(sides[0], engine=other, defaults=request.defaults))
+    header = traces[0].header
+    seconds = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
+
+    def controller(_model: Model, _seed: int) -> Controller:
+        return commands_of(traces[0])
+
+    options = header.options if request.sides else {}
+    name, says = header.experiment, header.says
+    made = Scenario(name, says, "", seconds, controller, lambda _: says, options=options)
+    return made, (sides[0], sides[1]), traces
+
+
+def _side_of(request: Request, place: int, trace: Trace) -> Side:
+    """What a trace was recorded of."""
+    header = trace.header
+    file, _ = model_file(header, request.menagerie, request.what[place])
+    options = {**header.options, **request.options}
+    defaults = "engine" if header.defaults == "engine" else "model"
+    return Side(str(request.model or file), header.backend, defaults, options)
+
+
+def _other_backend(request: Request, own: str) -> str:
+    """The backend of a request that is not that of a trace."""
+    for name in request.backends:
+        if name != own:
+            return name
+    raise BadInputError(f"the trace is of {own}: name another with --backends")
+
+
 def _refuse_of_run(request: Request, **given: bool) -> None:
     """Raise BadInputError for an option that has no meaning for a trace."""
     refused = {"seconds": request.seconds is not None, "seed": request.seed != 0, **given}
@@ -266,7 +325,7 @@ def _refuse_of_run(request: Request, **given: bool) -> None:
 
 
 def _run(request: Request, backend: str, said: list[str], progress: Progress) -> Trace:
-    asked = scenario(request.what[0])
+    asked = request.scenario()
     try:
         model = load(
             request.model or asked.model,
@@ -317,15 +376,13 @@ def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace
     if len(opened) == 2:
         return (opened[0], opened[1]), ()
     (trace,) = opened
-    others = [name for name in request.backends if name != trace.header.backend]
-    if not others:
-        raise BadInputError(f"the trace is of {trace.header.backend}: name another with --backends")
+    other = _other_backend(request, trace.header.backend)
     name: str | Path | None = request.model
     if name is None:
         name, _ = model_file(trace.header, request.menagerie, request.what[0])
     model = load(
         name,
-        backend=others[0],
+        backend=other,
         defaults=request.defaults,
         menagerie=request.menagerie if request.model else None,
     )
@@ -335,10 +392,10 @@ def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace
     played = play(
         trace,
         model,
-        command=command(["statemachine", "trace", "play", request.what[0], "--backend", others[0]]),
+        command=command(["statemachine", "trace", "play", request.what[0], "--backend", other]),
         defaults=request.defaults,
         options=options,
         progress=progress,
     )
-    said = f"the ctrl of {request.what[0]} was played on {others[0]}, from the state it starts in"
+    said = f"the ctrl of {request.what[0]} was played on {other}, from the state it starts in"
     return (trace, played), (said,)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import cached_property
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..backends import load
+from ..engines.auditing import Driver, ReferenceRun, SavePoint
 from ..interface import (
     OPTIONS,
     Array,
@@ -25,26 +26,21 @@ from ..interface import (
 )
 from ..interface.options import unsupported
 from ..measures.readings import readings
+from ..probes.audit.interface_driver import InterfaceDriver
+from ..probes.audit.trials import AuditFinding
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
 
-class Lab:
-    """Models of one backend, compiled when first used, and Data closed at the end of a check."""
+class Lab(ExitStack):
+    """Models of one backend, compiled when first used, and Data.
+
+    `close`, at the end of a check, gives back all Data that were made so far; the Models stay.
+    """
 
     def __init__(self, backend: str) -> None:
+        super().__init__()
         self.backend = backend
-        self._open = ExitStack()
-
-    def __enter__(self) -> Lab:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Give back all Data that were made so far; the Models stay."""
-        self._open.close()
 
     @cached_property
     def arm(self) -> Model:
@@ -63,7 +59,7 @@ class Lab:
 
     def data(self, model: Model, keyframe: int | None = None) -> Data:
         """A new Data, closed when the lab is."""
-        data = self._open.enter_context(make_data(model))
+        data = self.enter_context(make_data(model))
         if keyframe is not None:
             reset(model, data, keyframe=keyframe)
         return data
@@ -113,6 +109,24 @@ class Lab:
         require(len(data.contacts) > 0, "the held box touches nothing")
         return data
 
+    def keeps(self, *questions: Callable[[Driver, ReferenceRun], Iterator[AuditFinding]]) -> None:
+        """Ask the interface questions of the audit: what is promised holds, to the bit.
+
+        The run is that of the held box under a command that moves the arm: mid-contact.
+        """
+        driver, run = self._moving
+        for question in questions:
+            for found in question(driver, run):
+                first = f"{found.experiment}, {found.case}: another future than {found.into}"
+                require(found.holds, f"{first}, after {found.gap.first} steps")
+
+    @cached_property
+    def _moving(self) -> tuple[Driver, ReferenceRun]:
+        driver, key = InterfaceDriver(self.box, seed=0), self.box.keyframes[0]
+        ctrl = key.ctrl + 0.3 * (np.arange(self.box.nu) == 0)
+        point = SavePoint("held", "", self.box, key.qpos, key.qvel, ctrl, run_in=25)
+        return driver, driver.run(point, steps=100)
+
 
 def require(condition: bool, message: str) -> None:
     """Raise AssertionError with a message; unlike `assert`, also under `python -O`."""
@@ -140,15 +154,19 @@ def require_close(got: Any, expected: Any, within: float, what: str) -> None:
 
 
 def require_raises(
-    kinds: type[Exception] | tuple[type[Exception], ...], call: Callable[[], Any]
+    kinds: type[Exception] | tuple[type[Exception], ...], *calls: Callable[[], Any]
 ) -> Exception:
-    """The call raises one of these errors, whose message is not empty."""
-    try:
-        call()
-    except kinds as error:
-        require(bool(str(error)), f"{type(error).__name__} without a message")
-        return error
-    raise AssertionError(f"no error; expected {kinds}")
+    """Each call raises one of these errors, whose message is not empty; the last of them."""
+    caught = Exception()
+    for number, call in enumerate(calls):
+        try:
+            call()
+        except kinds as error:
+            caught = error
+            require(bool(str(error)), f"{type(error).__name__} without a message")
+        else:
+            raise AssertionError(f"no error in call {number}; expected {kinds}")
+    return caught
 
 
 def snapshot(data: Data) -> dict[str, Array]:
@@ -156,7 +174,7 @@ def snapshot(data: Data) -> dict[str, Array]:
     found: dict[str, Array] = {}
     for name, held in readings(data).items():
         if isinstance(held, Contacts):
-            found |= {"contacts.dist": np.array(held.dist), "contacts.pos": np.array(held.pos)}
+            found |= {f"contacts.{part}": np.array(array) for part, array in vars(held).items()}
         else:
             found[name] = np.array(held)
     return found

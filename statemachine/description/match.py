@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import check_name, unknown_name
+from ..errors import check_name
 from ..interface import Array
 from ..rotations import HERE, Placement
 from .records import Robot
@@ -54,6 +54,18 @@ class Matching:
         """The pair of a group of the first description."""
         return next((pair for pair in self.pairs if pair.one.number == number), None)
 
+    def notes(self) -> Iterator[str]:
+        """What was taken for one without a common name, or is of two kinds."""
+        for pair in self.pairs:
+            a, b = pair.one.joint, pair.two.joint
+            if pair.by == "place" and a and b and a.name != b.name:
+                yield (
+                    f"joint {a.name!r} on the left is taken for {b.name!r} on the right: one kind, "
+                    f"one place, one axis (--map {a.name}=NAME says otherwise)"
+                )
+            elif a and b and a.kind != b.kind:
+                yield f"joint {a.name!r} is a {a.kind} on the left and a {b.kind} on the right"
+
 
 def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
     """A description whose joints, links and frames go by other names.
@@ -61,10 +73,8 @@ def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
     Raises:
         UnknownNameError: It has nothing of such a name.
     """
-    known = {each.name for each in (*robot.joints, *robot.links, *robot.frames)}
     for name in names:
-        if name not in known:
-            raise unknown_name(f"joint, link or frame of {robot.name}", name, sorted(known))
+        check_name(f"joint, link or frame of {robot.name}", name, sorted(robot.names))
 
     def of(name: str) -> str:
         return names.get(name, name)
@@ -97,13 +107,13 @@ def match(one: GroupTree, two: GroupTree, *, one_world: bool = False) -> Matchin
     names = _fixed_frames(one, two)
 
     def add(a: Group, b: Group, by: str, moved: bool = False) -> None:
-        above = pairs.get(a.parent)
-        if by == "root" or above is None or moved:
-            told = one_world and a.number == b.number == 0
-            align = _of_root(one, two, a, b, names) if by == "root" and not told else HERE
-        else:
-            align = _of_child(one, two, a, b, names, above.align)
-        pairs[a.number] = Pair(a, b, align, by, moved)
+        above, choices = pairs.get(a.parent), [HERE]
+        if by == "root" and not (one_world and a.number == b.number == 0):
+            choices = _of_root(one, two, a, b)
+        elif by != "root" and above is not None and not moved:
+            # One frame, or two of a solid that is in one place.
+            choices = [HERE, b.place.inverse @ above.align @ a.place]
+        pairs[a.number] = Pair(a, b, _best(one, two, a, b, names, choices), by, moved)
         taken.add(b.number)
 
     add(*_bases(one, two), "root")
@@ -146,12 +156,10 @@ def _placed(
     """A group of the second description that hangs where `group` does, by the same axis."""
     joint = group.joint
     assert joint is not None
-    found: list[tuple[float, Group]] = []
-    for other in two.children(above.two.number):
+    found: dict[float, Group] = {}
+    for other in (g for g in two.children(above.two.number) if g.number not in taken):
         hers = other.joint
-        if other.number in taken or hers is None or hers.kind != joint.kind:
-            continue
-        if hers.name in one.by_joint:
+        if hers is None or hers.kind != joint.kind or hers.name in one.by_joint:
             continue
         if joint.kind not in ("hinge", "slide"):
             if group.name == other.name:
@@ -159,8 +167,8 @@ def _placed(
             continue
         (at, axis), (there, along) = _line(group, above.align), _line(other, HERE)
         if _apart(at, there, along) < _NEAR and abs(axis @ along) > np.cos(_TILT):
-            found.append((_apart(at, there, along), other))
-    return min(found, key=lambda each: each[0])[1] if found else None
+            found.setdefault(_apart(at, there, along), other)
+    return found[min(found)] if found else None
 
 
 def _line(group: Group, align: Placement) -> tuple[Array, Array]:
@@ -176,12 +184,10 @@ def _apart(point: Array, other: Array, axis: Array) -> float:
     return float(np.linalg.norm(np.cross(axis, point - other)))
 
 
-def _of_root(one: GroupTree, two: GroupTree, a: Group, b: Group, names: Places) -> Placement:
-    """How the frames of two roots lie: as they are, or so that links of them coincide."""
-    choices = [HERE]
-    ours = {link.name: place for link, place in a.links}
+def _of_root(one: GroupTree, two: GroupTree, a: Group, b: Group) -> list[Placement]:
+    """How the frames of two roots may lie: as they are, or so that links of them coincide."""
     theirs = {link.name: place for link, place in b.links}
-    choices += [theirs[name] @ ours[name].inverse for name in ours if name in theirs]
+    choices = [theirs[link.name] @ at.inverse for link, at in a.links if link.name in theirs]
     # The robot's first link, where only one of the files has a world around it.
     firsts = [
         group.links[1][1]
@@ -189,15 +195,7 @@ def _of_root(one: GroupTree, two: GroupTree, a: Group, b: Group, names: Places) 
         else HERE
         for tree, group in ((one, a), (two, b))
     ]
-    choices.append(firsts[1] @ firsts[0].inverse)
-    return _best(one, two, a, b, names, choices)
-
-
-def _of_child(
-    one: GroupTree, two: GroupTree, a: Group, b: Group, names: Places, above: Placement
-) -> Placement:
-    """How the frames of a pair lie: one frame, or two of a solid that is in one place."""
-    return _best(one, two, a, b, names, [HERE, b.place.inverse @ above @ a.place])
+    return [HERE, *choices, firsts[1] @ firsts[0].inverse]
 
 
 def _best(
@@ -259,11 +257,10 @@ def frame_names(
     Raises:
         UnknownNameError: A frame that was given is not there.
     """
-    found: dict[str, str] = {}
-    for name, other in (given or {}).items():
-        for tree, each in ((one, name), (two, other)):
-            check_name(f"frame in {tree.robot.name}", each, tree.frames)
-        found[name] = other
+    found = dict(given or {})
+    for pair in found.items():
+        for tree, name in zip((one, two), pair, strict=True):
+            check_name(f"frame in {tree.robot.name}", name, tree.frames)
     rest = [name for name in two.frames if name not in found.values()]
     plain = {_plain(name): name for name in reversed(rest)}
     for name in one.frames:

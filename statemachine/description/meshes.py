@@ -1,8 +1,7 @@
-"""Solids: volumes and extents, of meshes too (STL and OBJ, read here)."""
+"""Meshes (STL and OBJ, read here) and what they enclose; which shape is which."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -14,6 +13,7 @@ from ..interface import Array
 from ..models import mesh_file
 from .records import CollisionShape
 
+_OTHER_KIND = 100.0  # [m] worse than any distance
 _LARGEST = 256 * 2**20  # bytes
 
 
@@ -71,53 +71,52 @@ def _obj(text: str) -> Array:
     return np.array(points, dtype=np.float64)[np.array(faces, dtype=int)]
 
 
-def volume_of(kind: str, size: tuple[float, ...], triangles: Array | None = None) -> float | None:
-    """Volume [m³] of a solid; of a mesh, what its triangles (n, 3, 3) enclose."""
-    if kind == "box":
-        return 8 * math.prod(size)
-    if kind == "sphere":
-        return 4 / 3 * math.pi * size[0] ** 3
-    if kind == "ellipsoid":
-        return 4 / 3 * math.pi * math.prod(size)
-    if kind in ("cylinder", "capsule"):
-        radius, half = size[:2]
-        ends = 4 / 3 * math.pi * radius**3 if kind == "capsule" else 0.0
-        return 2 * math.pi * radius**2 * half + ends
-    if triangles is not None:
-        a, b, c = np.moveaxis(triangles, 1, 0)
-        return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6
-    return None
+def volume_of(triangles: Array) -> float:
+    """Volume [m³] that the triangles (n, 3, 3) of a mesh enclose."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6
 
 
-def extent(shape: CollisionShape, direction: Array) -> float | None:
-    """How far a shape reaches from its link's origin in a direction (3,) [m]; None: unknown."""
-    own = shape.place.mat.T @ direction
-    start = float(shape.place.pos @ direction)
-    size = shape.size
-    match shape.kind:
-        case "box":
-            return start + float(np.abs(own) @ size)
-        case "sphere":
-            return start + size[0]
-        case "ellipsoid":
-            return start + float(np.linalg.norm(own * size))
-        case "cylinder":
-            return start + size[0] * math.hypot(own[0], own[1]) + size[1] * abs(own[2])
-        case "capsule":
-            return start + size[0] + size[1] * abs(float(own[2]))
-    return None if shape.points is None else start + float((shape.points @ own).max())
+def bounds_of(shape: CollisionShape) -> Array:
+    """Least and greatest coordinates (6,) of a mesh; of another shape twice its place.
+
+    A mesh has other frames in other files, but the same extent; of one that was not read (0,).
+    """
+    if shape.kind != "mesh":
+        return np.tile(shape.place.pos, 2)
+    if shape.points is None:
+        return np.empty(0)
+    return np.concatenate((shape.corners.min(axis=0), shape.corners.max(axis=0)))
+
+
+def likest(ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]) -> dict[int, int]:
+    """Which shape of a part is which of another, both in one frame: by name, then by likeness."""
+    costs = sorted((_misfit(a, b), k, i) for k, a in enumerate(ours) for i, b in enumerate(theirs))
+    pairs: dict[int, int] = {}
+    for _, k, i in costs:
+        if k not in pairs and i not in pairs.values():
+            pairs[k] = i
+    return pairs
+
+
+def _misfit(one: CollisionShape, two: CollisionShape) -> float:
+    """How unlike two shapes are: of one name least, of other kinds most."""
+    if one.name and one.name == two.name:
+        return -1.0
+    ends = bounds_of(one), bounds_of(two)
+    far = float(np.linalg.norm(ends[0] - ends[1])) if len(ends[0]) == len(ends[1]) else 0.0
+    if one.kind != two.kind:
+        return far + _OTHER_KIND
+    return far + float(np.abs(np.subtract(sorted(one.size), sorted(two.size))).sum())
 
 
 def with_capsules(shapes: Sequence[CollisionShape]) -> tuple[CollisionShape, ...]:
     """A cylinder with a sphere on each end is the capsule that the format has no word for."""
     found = list(shapes)
     for cylinder in shapes:
-        if cylinder.kind != "cylinder":
-            continue
-        ends = list(_ends(cylinder, found))
+        ends = list(_ends(cylinder, found)) if cylinder.kind == "cylinder" else []
         if len(ends) == 2:
             capsule = replace(cylinder, kind="capsule")
-            capsule = replace(capsule, volume=volume_of("capsule", capsule.size))
             found = [capsule if each is cylinder else each for each in found if each not in ends]
     return tuple(found)
 
@@ -126,8 +125,10 @@ def _ends(cylinder: CollisionShape, shapes: Sequence[CollisionShape]) -> Iterato
     radius, half = cylinder.size
     for sign in (-1, 1):
         end = cylinder.place.of(np.array([0.0, 0.0, sign * half]))
-        for each in shapes:
-            alike = each.kind == "sphere" and abs(each.size[0] - radius) <= 1e-6 * radius
-            if alike and np.linalg.norm(each.place.pos - end) <= 1e-3 * radius:
-                yield each
-                break
+        yield from [
+            shape
+            for shape in shapes
+            if shape.kind == "sphere"
+            and abs(shape.size[0] - radius) <= 1e-6 * radius
+            and np.linalg.norm(shape.place.pos - end) <= 1e-3 * radius
+        ][:1]

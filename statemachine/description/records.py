@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,10 @@ class Inertial:
     com: Array
     tensor: Array
 
+    def seen_from(self, place: Placement) -> Inertial:
+        """The same body in the frame in which its link is at `place`."""
+        return Inertial(self.mass, place.of(self.com), place.mat @ self.tensor @ place.mat.T)
+
 
 @dataclass(frozen=True, eq=False)
 class CollisionShape:
@@ -36,8 +41,9 @@ class CollisionShape:
         place: In the link's frame.
         size: Half edges of a box or ellipsoid, radius, radius and half length [m].
         points: (n, 3) corners of a mesh [m], in its own frame; None if it was not read.
-        volume: [m³]; None where there is none to be had.
+        volume: Of a mesh that was read [m³].
         name: As in the file, may be empty.
+        label: What the list of two compiled models calls it.
         friction: (sliding, torsional, rolling) coefficients, or None where not said.
         contact: Further settings of its contacts, by name.
     """
@@ -48,8 +54,27 @@ class CollisionShape:
     points: Array | None = None
     volume: float | None = None
     name: str = ""
+    label: str = ""
     friction: tuple[float, ...] | None = None
     contact: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def corners(self) -> Array:
+        """Those (n, 3) of a mesh that was read [m], in the link's frame."""
+        assert self.points is not None
+        return self.place.pos + self.points @ self.place.mat.T
+
+
+class Follows(NamedTuple):
+    """A joint's position as that of another one, times a factor, plus an offset.
+
+    `label` is what the list of two compiled models calls it, where it is of one.
+    """
+
+    joint: str
+    factor: float
+    offset: float
+    label: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +91,8 @@ class RobotJoint:
         armature: Inertia of the rotor as the joint feels it [kg m² or kg].
         damping: [N·m·s/rad or N·s/m]; friction: dry friction [N·m or N].
         stiffness: Of a spring in it; rest: where that is slack.
-        follows: RobotJoint, factor and offset where it mimics another.
+        follows: Where it mimics another.
+        number: Its id in a compiled model, where it is of one.
     """
 
     name: str
@@ -81,7 +107,8 @@ class RobotJoint:
     friction: float | None = None
     stiffness: float | None = None
     rest: float | None = None
-    follows: tuple[str, float, float] | None = None
+    follows: Follows | None = None
+    number: int = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +122,7 @@ class Link:
         joint: None where it is fixed.
         inertial: None where the file gives it none.
         shapes: What it touches with.
+        body: Its id in a compiled model, where it is of one.
     """
 
     name: str
@@ -103,6 +131,7 @@ class Link:
     joint: RobotJoint | None
     inertial: Inertial | None
     shapes: tuple[CollisionShape, ...] = ()
+    body: int = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,12 +205,22 @@ class Robot:
         """All joints, in the order of the links."""
         return tuple(link.joint for link in self.links if link.joint)
 
+    @property
+    def names(self) -> set[str]:
+        """Of all joints, links and frames."""
+        return {part.name for part in (*self.joints, *self.links, *self.frames)}
+
 
 def moved(joint: RobotJoint | None, amount: float) -> Placement:
     """Where a joint takes its link at a position, in the frame that the link has at zero."""
     if joint is None or not amount or joint.kind not in ("hinge", "slide"):
         return HERE
-    if joint.kind == "slide":
-        return Placement(joint.axis * amount, np.eye(3))
-    mat = rotation(joint.axis, amount)
-    return Placement(joint.anchor - mat @ joint.anchor, mat)
+    return motion(joint.kind == "slide", joint.axis, joint.anchor, amount)
+
+
+def motion(slides: bool, axis: Array, anchor: Array, amount: float) -> Placement:
+    """A move by `amount` along an axis (3,), or a turn about it through a point (3,)."""
+    if slides:
+        return Placement(axis * amount, np.eye(3))
+    mat = rotation(axis, amount)
+    return Placement(anchor - mat @ anchor, mat)

@@ -48,12 +48,9 @@ class Group:
     @cached_property
     def inertial(self) -> Inertial:
         """All of its links together, in the group's frame."""
-        parts = [
-            Inertial(i.mass, place.of(i.com), place.mat @ i.tensor @ place.mat.T)
-            for link, place in self.links
-            if (i := link.inertial) is not None
-        ]
-        return together(parts)
+        return together(
+            [link.inertial.seen_from(place) for link, place in self.links if link.inertial]
+        )
 
     @cached_property
     def shapes(self) -> tuple[CollisionShape, ...]:
@@ -69,6 +66,8 @@ class Group:
 
 def together(parts: list[Inertial]) -> Inertial:
     """Composite of rigid parts in one frame: the parallel axis theorem."""
+    if len(parts) == 1:
+        return parts[0]
     mass = sum(part.mass for part in parts)
     if not mass:
         tensor = sum((part.tensor for part in parts), np.zeros((3, 3)))
@@ -115,13 +114,9 @@ class GroupTree:
         ]
         self.by_joint = {g.joint.name: g for g in self.groups if g.joint}
 
-        self._children: dict[int, list[Group]] = {}
-        for group in self.groups:
-            self._children.setdefault(group.parent, []).append(group)
-
     def children(self, number: int) -> list[Group]:
         """Groups that hang on a group."""
-        return self._children.get(number, [])
+        return [group for group in self.groups if group.parent == number]
 
     @cached_property
     def frames(self) -> dict[str, tuple[int, Placement]]:
@@ -150,9 +145,7 @@ class GroupTree:
         found = [group.inertial for group in self.groups]
         for group in reversed(self.groups):  # children before parents
             if group.parent >= 0:
-                own, place = found[group.number], group.place
-                turned = place.mat @ own.tensor @ place.mat.T
-                held = Inertial(own.mass, place.of(own.com), turned)
+                held = found[group.number].seen_from(group.place)
                 found[group.parent] = together([found[group.parent], held])
         return found
 

@@ -7,19 +7,20 @@ on Windows; both refuse a file for one missing mesh. The format is small, so its
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from .. import models
 from ..errors import ModelError
 from ..interface import Array
-from ..rotations import HERE
-from ._urdf_numbers import number, numbers, origin
+from ..rotations import HERE, Placement
 from .meshes import read_mesh, volume_of
-from .records import CollisionShape, Inertial, Link, Robot, RobotJoint
+from .records import CollisionShape, Follows, Inertial, Link, Robot, RobotJoint
 
-Element = ElementTree.Element
 _LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere
 _MOST = 2_000  # links
 _KINDS = {
@@ -29,14 +30,13 @@ _KINDS = {
     "floating": "free",
     "planar": "planar",
 }
-_LABEL = "a URDF"
 
 
 class _Builder(ElementTree.TreeBuilder):
     """Refuses a document type: with it come entities, which can grow without bound."""
 
     def doctype(self, name: str, _pubid: str | None, _system: str | None) -> None:
-        raise ModelError(f"it has a <!DOCTYPE {name}>, which {_LABEL} has no use for")
+        raise ModelError(f"it has a <!DOCTYPE {name}>, which a URDF has no use for")
 
 
 def read(path: Path) -> Robot:
@@ -124,7 +124,7 @@ class _Reader:
     def _link(self, name: str, element: Element, parent: str, joint: Element | None) -> Link:
         place, moves = HERE, None
         if joint is not None:
-            place, moves = origin(joint, f"joint {_name(joint)!r}"), _joint(joint)
+            place, moves = _origin(joint, f"joint {_name(joint)!r}"), _joint(joint)
         friction = self._friction(element, name)
         shapes = [self._shape(each, name, friction) for each in element.findall("collision")]
         return Link(name, parent, place, moves, _inertial(element, name), tuple(shapes))
@@ -136,7 +136,7 @@ class _Reader:
         if found[0] is None:
             return None
         return tuple(
-            0.0 if each is None else number(each, "value", f"link {name!r}") for each in found
+            0.0 if each is None else _number(each, "value", f"link {name!r}") for each in found
         )
 
     def _shape(
@@ -150,29 +150,30 @@ class _Reader:
         if kind == "mesh":
             points = self._mesh(solid, link, where)
         elif kind == "box":
-            size = tuple(edge / 2 for edge in numbers(solid, "size", 3, where))
+            size = tuple(edge / 2 for edge in _numbers(solid, "size", 3, where))
         elif kind == "sphere":
-            size = (number(solid, "radius", where),)
+            size = (_number(solid, "radius", where),)
         elif kind in ("cylinder", "capsule"):
-            size = (number(solid, "radius", where), number(solid, "length", where) / 2)
+            size = (_number(solid, "radius", where), _number(solid, "length", where) / 2)
         else:
             self.notes.append(f"{where} is a <{kind}>, which is not known here")
         if min(size, default=0) < 0:
             raise ModelError(f"{where} has a negative size")
         return CollisionShape(
             kind,
-            origin(element, where),
+            _origin(element, where),
             size,
             points=None if points is None else points.reshape(-1, 3),
-            volume=volume_of(kind, size, points),
+            volume=None if points is None else volume_of(points),
             name=element.get("name", ""),
+            label=element.get("name", ""),
             friction=friction,
         )
 
     def _mesh(self, solid: Element, link: str, where: str) -> Array | None:
         """Triangles (n, 3, 3) of a mesh [m], or None."""
         file = solid.get("filename", "")
-        scale = numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0))
+        scale = _numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0))
         if file not in self._meshes:
             self._meshes[file] = read_mesh(file, self.path.parent)
         points, trouble = self._meshes[file]
@@ -230,7 +231,7 @@ def _joint(element: Element) -> RobotJoint | None:
         raise ModelError(f"{where} is of type {kind!r}; known: fixed, {', '.join(_KINDS)}")
     axis = np.array([1.0, 0.0, 0.0])  # what the format takes where none is given
     if (given := element.find("axis")) is not None:
-        axis = numbers(given, "xyz", 3, where, (1.0, 0.0, 0.0))
+        axis = _numbers(given, "xyz", 3, where, (1.0, 0.0, 0.0))
     length = float(np.linalg.norm(axis))
     if length < 1e-9 and kind != "floating":
         raise ModelError(f"the axis of {where} is zero")
@@ -239,7 +240,7 @@ def _joint(element: Element) -> RobotJoint | None:
     def of(part: Element | None, attribute: str, default: float | None = None) -> float | None:
         if part is None or part.get(attribute) is None:
             return default if part is not None else None
-        return number(part, attribute, where)
+        return _number(part, attribute, where)
 
     limits = None
     if kind in ("revolute", "prismatic"):
@@ -259,7 +260,7 @@ def _joint(element: Element) -> RobotJoint | None:
         friction=of(dynamics, "friction"),
         follows=None
         if mimic is None
-        else (
+        else Follows(
             mimic.get("joint", ""),
             of(mimic, "multiplier", 1.0) or 0.0,
             of(mimic, "offset", 0.0) or 0.0,
@@ -275,12 +276,53 @@ def _inertial(link: Element, name: str) -> Inertial | None:
     heavy, inertia = element.find("mass"), element.find("inertia")
     if heavy is None:
         raise ModelError(f"{where} has no <mass>")
-    mass = number(heavy, "value", where)
+    mass = _number(heavy, "value", where)
     if mass < 0:
         raise ModelError(f"{where} gives a mass of {mass} kg")
     tensor = np.zeros((3, 3))
     if inertia is not None:
         for i, j in zip(*np.triu_indices(3), strict=True):
-            tensor[i, j] = tensor[j, i] = number(inertia, f"i{'xyz'[i]}{'xyz'[j]}", where)
-    place = origin(element, where)
+            tensor[i, j] = tensor[j, i] = _number(inertia, f"i{'xyz'[i]}{'xyz'[j]}", where)
+    place = _origin(element, where)
     return Inertial(mass, place.pos, place.mat @ tensor @ place.mat.T)
+
+
+def _origin(element: Element, where: str) -> Placement:
+    origin = element.find("origin")
+    if origin is None:
+        return HERE
+    pos = _numbers(origin, "xyz", 3, where, (0.0, 0.0, 0.0))
+    roll, pitch, yaw = _numbers(origin, "rpy", 3, where, (0.0, 0.0, 0.0))
+    return Placement(pos, _matrix_from_rpy(roll, pitch, yaw))
+
+
+def _matrix_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """Rz(yaw)·Ry(pitch)·Rx(roll), as the format defines its rpy."""
+    (sr, sp, sy), (cr, cp, cy) = (
+        [f(angle) for angle in (roll, pitch, yaw)] for f in (math.sin, math.cos)
+    )
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _number(element: Element, attribute: str, where: str) -> float:
+    return float(_numbers(element, attribute, 1, where)[0])
+
+
+def _numbers(
+    element: Element,
+    attribute: str,
+    count: int,
+    where: str,
+    default: tuple[float, ...] | None = None,
+) -> Array:
+    text = element.get(attribute)
+    if text is None and default is None:
+        raise ModelError(f"{where}: <{element.tag}> has no {attribute}")
+    given = default if text is None else models.numbers(text, count, f"{where}: {attribute}")
+    return np.array(given)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.metadata
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
@@ -113,10 +113,6 @@ class RawEngine:
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
         """What can be set between the engine as it comes and the contract; None of any other."""
         return None
-
-    def frictionless(self, model: Model) -> Model:
-        """The same Model with surfaces that have no friction, where the engine has a way."""
-        return model
 
     def plain_run(self, path: Path, commands: Array, keyframe: int | None) -> Array | None:
         """A file as the engine's own users run it, where the interface promises the same bits.
@@ -238,6 +234,32 @@ class RawEngine:
         ...
 
     @_needed
+    def counts(self, compiled: Any) -> dict[str, int]:
+        """How many "actuators" a compiled model has, and how many planes are its "floor"."""
+        ...
+
+    @_needed
+    def with_parts(
+        self,
+        taker: Path,
+        giver: Path,
+        parts: Collection[str],
+        names: Mapping[str, Mapping[str, str]],
+    ) -> Any:
+        """The compiled model of a file that has parts of another one instead of its own.
+
+        Args:
+            taker: The file.
+            giver: The other.
+            parts: Of `counts`.
+            names: By kind ("joint", "body", "site") the names in `taker` of what `giver` has.
+
+        Raises:
+            ModelError: It cannot be made.
+        """
+        ...
+
+    @_needed
     def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
         """Kinetic and potential energy (n, 2) [J] of states.
 
@@ -326,9 +348,8 @@ def register(name: str, kind: str) -> None:
     Raises:
         BadInputError: There is another room of that name.
     """
-    if _ROOMS.get(name, kind) != kind:
+    if _ROOMS.setdefault(name, kind) != kind:
         raise BadInputError(f"there is a room for {name!r} already; choose another name")
-    _ROOMS[name] = kind
 
 
 def room(engine: str | None) -> RawEngine:

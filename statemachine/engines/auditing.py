@@ -29,7 +29,7 @@ ONLY = "only those that matter"  # the candidate of what was found to be needed
 ITSELF, FRESH, USED = "the run itself", "a fresh one", "a used one"
 ITSELF_AGAIN = "the run itself, again"  # where nothing else can be
 Machine = Any  # what a driver steps: an MjData, a client, a Data
-Restore = Callable[[Machine], None]
+Restore = Callable[[Machine], object]
 # Entered, it saves a machine and gives what restores one.
 Save = Callable[[Machine], AbstractContextManager[Restore]]
 
@@ -224,8 +224,8 @@ class Driver(ABC):
         return machine.time
 
     @abstractmethod
-    def _measure(self, point: SavePoint) -> Measured:
-        """What a save point is like."""
+    def touching(self, machine: Machine) -> tuple[int, int | None]:
+        """How many contacts there are now, and joints at a limit; None where that is not told."""
 
     @abstractmethod
     def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
@@ -238,7 +238,15 @@ class Driver(ABC):
     def measure(self, point: SavePoint) -> Measured:
         """What a save point is like, looked at once."""
         if point.name not in self._measured:
-            self._measured[point.name] = self._measure(point)
+            with self.at(point) as machine:
+                speeds = self.read(machine)[self.coordinates.width :]
+                self._measured[point.name] = Measured(
+                    point.name,
+                    point.how,
+                    float(self.time(machine)),
+                    *self.touching(machine),
+                    float(np.abs(speeds).max(initial=0.0)),
+                )
         return self._measured[point.name]
 
     def reset(self, machine: Machine) -> None:
@@ -339,6 +347,11 @@ class Driver(ABC):
         if not np.isfinite(future).all():
             raise DivergedError(f"{self.name} diverged")
         return ReferenceRun(point, future)
+
+    def off(self, first: Array, second: Array) -> float:
+        """The largest difference of a position after any step of two futures [rad or m]."""
+        differences = (first - second)[1:, : self.coordinates.width]
+        return float(np.abs(differences).max(initial=0.0))
 
     def gap(self, run: ReferenceRun, *futures: Array) -> FutureGap:
         """The worst gap of futures to that of a run."""

@@ -15,6 +15,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..interface import Model
 
 _FUNCTIONS = (types.BuiltinFunctionType, types.FunctionType)
@@ -142,12 +144,10 @@ def entries(field: str, before: bytes, after: bytes, size: int) -> str:
     """Which entries of a flat array of items of a size differ: "qpos[1]", "ctrl[0:2]"."""
     if len(before) != len(after):
         return field
-    count = len(after) // size
-    differ = [
-        i for i in range(count) if before[i * size : (i + 1) * size] != after[i * size :][:size]
-    ]
+    was, now = (np.frombuffer(each, np.uint8).reshape(-1, size) for each in (before, after))
+    differ = np.flatnonzero((was != now).any(axis=1)).tolist()
     first, end = differ[0], differ[-1] + 1
-    if len(differ) == count or len(differ) != end - first:
+    if len(differ) == len(now) or len(differ) != end - first:
         return field
     return f"{field}[{first}]" if end == first + 1 else f"{field}[{first}:{end}]"
 

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 from ..interface import Array
+from .auditing import Save
 from .measured import Futures
 
 HALF = 0.1  # an edge [m]
@@ -16,9 +17,6 @@ HALF = 0.1  # an edge [m]
 PLACES = ((0.0, 0.0, 0.25), (0.0, 0.02, 0.55), (0.0, 0.0, 0.85))
 TILT = (0.92, 0.31, 0.21, 0.1)
 _WRITTEN, _OTHER = 0.5, -0.25  # half of anything is not what it has at the start
-
-# Saves when it is entered, and gives the function that restores.
-Saved = Callable[[Any], AbstractContextManager[Callable[[], object]]]
 
 
 class Pile(ABC):
@@ -34,7 +32,7 @@ class Pile(ABC):
     quantities: ClassVar[Sequence[str]]
     near: ClassVar[float] = 0.0
     resets: ClassVar[Mapping[str, Callable[[Any], object]]]
-    ways_to_save: ClassVar[Mapping[str, Saved]]
+    ways_to_save: ClassVar[Mapping[str, Save]]
 
     @classmethod
     @abstractmethod
@@ -95,14 +93,14 @@ class Pile(ABC):
     def save(cls) -> dict[str, dict[str, bool]]:
         """Which quantities a restore brings back, for each way to save."""
 
-        def there_and_back(quantity: str, saved: Saved, scene: Pile) -> None:
-            with saved(scene) as restore:
+        def there_and_back(quantity: str, save: Save, scene: Pile) -> None:
+            with save(scene) as restore:
                 scene.disturb(quantity)
-                restore()
+                restore(scene)
 
         return {
-            name: {q: cls._survives(q, partial(there_and_back, q, saved)) for q in cls.quantities}
-            for name, saved in cls.ways_to_save.items()
+            name: {q: cls._survives(q, partial(there_and_back, q, save)) for q in cls.quantities}
+            for name, save in cls.ways_to_save.items()
         }
 
     @classmethod
@@ -115,15 +113,15 @@ class Pile(ABC):
                 way(scene)
                 return first, scene.refilled().run(steps)
 
-        def middle(saved: Saved, moment: float) -> Futures:
+        def middle(save: Save, moment: float) -> Futures:
             with cls.fresh() as scene:
                 scene.run(round(moment / scene.timestep))
-                with saved(scene) as restore:
+                with save(scene) as restore:
                     first = scene.run(steps)
-                    restore()
+                    restore(scene)
                     return first, scene.run(steps)
 
         return {name: [start(way)] for name, way in cls.resets.items()} | {
-            name: [middle(saved, moment) for moment in moments]
-            for name, saved in cls.ways_to_save.items()
+            name: [middle(save, moment) for moment in moments]
+            for name, save in cls.ways_to_save.items()
         }

@@ -69,12 +69,10 @@ class Dials(Protocol):
     Attributes:
         model: The model as it comes, with the options of an experiment.
         emulated: The same file behind the contract, with the same options.
-        with_servo: What only an adapter can give, and so only the world of the model's law.
         words: What the engine's own setting of a factor is, in a few words.
         frictions: (nsolid,) friction that the engine tells of each body that touches.
     """
 
-    with_servo: tuple[str, ...]
     words: Mapping[str, str]
 
     @property
@@ -83,6 +81,10 @@ class Dials(Protocol):
     def emulated(self) -> Model: ...
     @property
     def frictions(self) -> Array: ...
+
+    def of(self, model: Model, emulated: Model) -> Dials:
+        """The same of another Model as it comes, and of its file behind the contract."""
+        ...
 
     def build(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         """A Model with some of them turned."""
@@ -140,7 +142,7 @@ class ModelDifference:
     subject: str
     kind: str
     where: str
-    values: tuple[tuple[str, Any, Any], ...]
+    values: tuple[tuple[Any, ...], ...]
     unit: str = ""
     edits: tuple[Edit, ...] = ()
     edits_one: tuple[Edit, ...] = ()

@@ -12,20 +12,16 @@ import faulthandler
 import json
 import os
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 _LONGEST = 8_000_000  # characters of a line
-
-
 _TOO_MUCH = {"text": "it returns more than can be looked at", "written": True}
 
 
 def main(job_file: str) -> None:
     """Call one function, as the job file says, and end the process."""
-    with open(job_file, encoding="utf-8") as file:
-        job = json.load(file)
+    job = json.loads(Path(job_file).read_text(encoding="utf-8"))
     os.unlink(job_file)
     path = Path(job["file"])
 
@@ -39,15 +35,19 @@ def main(job_file: str) -> None:
 
     sys.argv = [str(path)]
     try:
-        worlds = _prepare(job["function"], job["backend"])
+        # The worlds to call it on; nothing of what is right there.
+        from .judges import judge_of
+        from .worlds import Scenes
+
+        folder = Path.cwd() / "worlds"
+        folder.mkdir()
+        worlds = judge_of(job["function"]).worlds(Scenes(job["backend"], folder))
     except Exception as error:
         say("refused", kind=type(error).__name__, text=" ".join(str(error).split()))
         return
-    from .calls import FaultError
-    from .examine import answers_of_file
+    from ..processes.sandbox import limit_cpu
+    from .calls import FaultError, answers_of_file
     from .guard import Guard
-    from .limits import limit_cpu
-    from .transcript import encode
 
     # Both work where Python's own threads do not get their turn, and tell the line.
     trace = open(job["trace"], "w", encoding="utf-8")  # noqa: SIM115  (till the end)
@@ -57,22 +57,12 @@ def main(job_file: str) -> None:
         path, Path(job["own"]), Path(job["answers"]).parent, lambda kind, text: say(kind, text=text)
     )
     sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now
-    say("running", cpu=time.process_time())
+    say("running")
     limit_cpu(job["cpu"], trace)
     for answer in answers_of_file(path, job["function"], worlds):
         if isinstance(answer, FaultError):
             say("fault", text=str(answer), written=answer.written)
         else:
-            say("answer", answer=encode(answer))
+            say("answer", answer=answer)
     # Threads that the student's code left, and what it registered for the end, have no say.
     os._exit(0)
-
-
-def _prepare(function: str, backend: str) -> Any:
-    """The worlds to call it on; nothing of what is right there."""
-    from .judges import judge_of
-    from .worlds import Scenes
-
-    folder = Path.cwd() / "worlds"
-    folder.mkdir()
-    return judge_of(function).worlds(Scenes(backend, folder))

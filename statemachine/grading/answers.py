@@ -1,20 +1,25 @@
-"""What came of calling a student's function, as plain data: nothing of it runs code."""
+"""What came of calling a student's function, as text and back: anybody may have written it.
+
+Nothing of it runs code, neither where it is written nor where it is read.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import base64
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from ..engines import room
-from ..interface import DERIVED, INPUTS, Model
+from ..interface import DERIVED, INPUTS
 from .watch import EngineRun, Inputs, StudentWatch
 
 _MOST = 10_000  # values that a list or a generator may have
-_DEEPEST = 6  # lists within lists
+_DEEPEST = 8  # lists within lists, in a record
 _LONGEST = 200  # characters of a text
 _SHOWN = 40  # characters of a value
 
@@ -51,7 +56,10 @@ class Answer:
     changed: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
 
 
-def answer_of(result: Any, watch: StudentWatch) -> Answer:
+_RECORDS: dict[str, Any] = {kind.__name__: kind for kind in (Answer, EngineRun, Inputs, Thing)}
+
+
+def answer_of(result: Any, watch: StudentWatch, changed: dict[str, Any]) -> Answer:
     """The answer that a result and what was seen amount to.
 
     What is worked out only when somebody asks (a generator) is asked for here.
@@ -62,66 +70,17 @@ def answer_of(result: Any, watch: StudentWatch) -> Answer:
     items = [list(islice(each, _MOST)) if isinstance(each, Iterator) else each for each in every]
     if type(result) in (tuple, list):
         result = type(result)(items)
+    items = items[:100]
+    first = [next(j for j in range(k + 1) if _same(items[j], items[k])) for k in range(len(items))]
     return Answer(
-        plain(result),
-        tuple(next(j for j in range(k + 1) if _same(items[j], items[k])) for k in range(len(items)))
-        if len(items) < 100
-        else (),
-        tuple(_live(item, watch.datas) for item in items[:100]),
+        result,
+        tuple(first),
+        tuple(_live(item, watch.datas) for item in items),
         tuple(watch.runs),
         tuple(watch.forwards),
         tuple(watch.inputs(data) for data in watch.datas),
+        changed,
     )
-
-
-def plain(value: Any, depth: int = 0) -> Any:
-    """A value without code: see `Answer.result`."""
-    if value is None or type(value) in (bool, float):
-        return value
-    if type(value) is int:
-        return value if abs(value) < 2**63 else Thing(kind(value))
-    if type(value) is str:
-        return value[:_LONGEST]
-    if isinstance(value, (np.bool_, np.integer, np.float64)):
-        return value.item()
-    if isinstance(value, (np.ndarray, np.generic)):
-        return _numeric(value)
-    if isinstance(value, slice) and depth < _DEEPEST:
-        return slice(*(plain(part, depth + 1) for part in (value.start, value.stop, value.step)))
-    if isinstance(value, (tuple, list, dict)) and depth < _DEEPEST:
-        if len(value) > _MOST:
-            return Thing(kind(value))
-        if isinstance(value, dict):
-            return {
-                key[:_LONGEST] if type(key) is str else kind(key): plain(each, depth + 1)
-                for key, each in islice(value.items(), _MOST)
-            }
-        items: Iterable[Any] = [plain(each, depth + 1) for each in islice(value, _MOST)]
-        return tuple(items) if isinstance(value, tuple) else items
-    if hasattr(value, "__array__"):
-        return _numeric(np.asarray(value))
-    return Thing(kind(value))
-
-
-def _numeric(value: Any) -> Any:
-    """A copy of an array of numbers, in the machine's byte order; its type is kept."""
-    array = np.array(value, subok=False)
-    if array.dtype.kind not in "biuf" or array.size > 100 * _MOST or array.dtype.itemsize > 8:
-        return Thing(kind(value))
-    return array.astype(array.dtype.newbyteorder("="))
-
-
-def kind(value: Any) -> str:
-    """What a value is, in words."""
-    if isinstance(value, Thing):
-        return value.text
-    if isinstance(value, np.ndarray) and value.shape:
-        return f"an array of shape {value.shape}"
-    if isinstance(value, (tuple, list, dict, set)):
-        return f"a {type(value).__name__} of {len(value)}"
-    text, name = repr(value), type(value).__name__
-    name = f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
-    return f"{name}: {text}" if len(text) < _SHOWN else name
 
 
 def _rows(value: Any) -> bool:
@@ -134,9 +93,7 @@ def _same(one: Any, two: Any) -> bool:
 
 
 def _live(value: Any, datas: Sequence[Any]) -> str:
-    if not isinstance(value, np.ndarray):
-        return ""
-    for data in datas:
+    for data in datas if isinstance(value, np.ndarray) else ():
         for name in (*INPUTS, *DERIVED):
             try:
                 array = getattr(data, name)
@@ -147,6 +104,106 @@ def _live(value: Any, datas: Sequence[Any]) -> str:
     return ""
 
 
-def settings(model: Model) -> dict[str, list[float]]:
-    """What of the engine's own model a student can reach: its options, and its arrays' sums."""
-    return room(model.backend).settings(model.raw)
+def kind(value: Any) -> str:
+    """What a value is, in words."""
+    if isinstance(value, Thing):
+        return value.text
+    if _rows(value):
+        return f"an array of shape {value.shape}"
+    if isinstance(value, (tuple, list, dict, set)):
+        return f"a {type(value).__name__} of {len(value)}"
+    text, name = repr(value), type(value).__name__
+    name = f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
+    return f"{name}: {text}" if len(text) < _SHOWN else name
+
+
+def encode(value: Any, depth: int = 0) -> Any:
+    """An answer, or a part of one, as what JSON can hold; see `Answer.result`."""
+    if isinstance(value, (np.bool_, np.integer, np.float64)):
+        value = value.item()
+    if value is None or type(value) in (bool, float):
+        return value
+    if type(value) is int and abs(value) < 2**63:
+        return value
+    if type(value) is str:
+        return value[:_LONGEST]
+    if isinstance(value, (np.ndarray, np.generic)) or hasattr(value, "__array__"):
+        array = np.array(value, subok=False)
+        if array.dtype.kind in "biuf" and array.size <= 100 * _MOST and array.dtype.itemsize <= 8:
+            data = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+            return {"array": [array.dtype.str, list(array.shape), data]}
+    elif depth < _DEEPEST:
+        if type(value) in _RECORDS.values():
+            parts = {name: encode(each, depth + 1) for name, each in vars(value).items()}
+            return {type(value).__name__: parts}
+        if isinstance(value, slice):
+            ends = (value.start, value.stop, value.step)
+            return {"slice": [encode(part, depth + 1) for part in ends]}
+        if isinstance(value, dict) and len(value) <= _MOST:
+            named = [(k[:_LONGEST] if type(k) is str else kind(k), v) for k, v in value.items()]
+            return {"dict": [[name, encode(each, depth + 1)] for name, each in named]}
+        if isinstance(value, (tuple, list)) and len(value) <= _MOST:
+            items = [encode(each, depth + 1) for each in islice(value, _MOST)]
+            return {"tuple": items} if isinstance(value, tuple) else items
+    return {"Thing": {"text": kind(value)}}
+
+
+def decode(found: Any) -> Answer:
+    """The answer that `encode` was given.
+
+    Raises:
+        ValueError: It was given none.
+    """
+    try:
+        answer = _decoded(found)
+    except (KeyError, TypeError, OverflowError, RecursionError) as error:
+        raise ValueError(f"{type(error).__name__}: {error}") from None
+    if not isinstance(answer, Answer):
+        raise ValueError("no answer")
+    return answer
+
+
+def _decoded(found: Any) -> Any:
+    if found is None or isinstance(found, (bool, int, float, str)):
+        return found
+    if isinstance(found, list):
+        return [_decoded(each) for each in found]
+    ((name, content),) = dict(found).items()
+    if name == "array":
+        return _array(*content)
+    if name == "slice":
+        start, stop, step = map(_decoded, content)
+        return slice(start, stop, step)
+    if name == "tuple":
+        return tuple(map(_decoded, content))
+    if name == "dict":
+        return {key: _decoded(each) for key, each in content}
+    values = {key: _decoded(each) for key, each in dict(content).items()}
+    for key, hint in get_type_hints(_RECORDS[name]).items():
+        if not _is(values[key], hint):
+            raise ValueError(f"{key} is no {hint}")
+    return _RECORDS[name](**values)
+
+
+def _is(value: Any, hint: Any) -> bool:
+    """Whether a value is of a type; of arrays there are rows of floats only."""
+    origin = get_origin(hint)
+    if hint is Any:
+        return True
+    if not isinstance(value, hint if origin in (None, UnionType) else origin):
+        return False
+    if isinstance(value, np.ndarray):
+        return value.dtype == np.float64 and value.ndim == 1
+    return origin is not tuple or all(_is(each, get_args(hint)[0]) for each in value)
+
+
+def _array(dtype: str, shape: list[int], data: str) -> Any:
+    kind = np.dtype(dtype)
+    if kind.kind not in "biuf" or kind.itemsize > 8 or kind.shape:
+        raise ValueError("an array of no numbers")
+    content = base64.b64decode(data, validate=True)
+    negative = any(each < 0 for each in shape)
+    if negative or len(shape) > 16 or math.prod(shape) * kind.itemsize != len(content):
+        raise ValueError("an array of another size")
+    array = np.frombuffer(content, kind).reshape(shape)
+    return array.astype(kind.newbyteorder("="))

@@ -7,16 +7,16 @@ import inspect
 import linecache
 import sys
 import traceback
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..engines import room
 from ..errors import UnsupportedError
-from .answers import Answer, answer_of, settings
-from .watch import watching
+from .answers import answer_of, encode
+from .watch import engine_watched, watching
 from .worlds import ExerciseWorld
 
 Function = Callable[..., Any]
@@ -92,8 +92,37 @@ def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function
     return function
 
 
-def call(function: Function, world: ExerciseWorld) -> Answer:
-    """What came of a function on a world.
+def answers_of_file(
+    path: Path, name: str, worlds: Sequence[ExerciseWorld]
+) -> Iterator[Any | FaultError]:
+    """What comes of a function of a file, which is loaded here, on world after world.
+
+    Args:
+        path: The student's file, absolute.
+        name: Of the function.
+        worlds: The first is the course's own.
+    """
+    with engine_watched(worlds[0].model.backend):
+        try:
+            function = find(load_file(path), name, worlds[0].arguments)
+        except FaultError as fault:
+            yield fault
+            return
+        yield from answers_of(function, worlds)
+
+
+def answers_of(function: Function, worlds: Sequence[ExerciseWorld]) -> Iterator[Any | FaultError]:
+    """What comes of a function on world after world, until it fails on one; as `encode` has it."""
+    for world in worlds:
+        try:
+            yield call(function, world)
+        except FaultError as fault:
+            yield fault
+            return
+
+
+def call(function: Function, world: ExerciseWorld) -> Any:
+    """What came of a function on a world, as `answers.encode` has it.
 
     Raises:
         FaultError: It raised, tried to end the program, is not written, or returned nothing.
@@ -102,19 +131,21 @@ def call(function: Function, world: ExerciseWorld) -> Answer:
     given = [
         np.array(value) if isinstance(value, np.ndarray) else value for value in world.arguments
     ]
-    before = settings(world.model)
+    settings = room(world.model.backend).settings  # what of the engine's own model is reached
+    before = settings(world.model.raw)
     try:
         with watching(world.model, world.nudge) as watch:
-            answer = answer_of(function(world.model, *given), watch)
+            result = function(world.model, *given)
+            now = settings(world.model.raw)
+            changed = {name: (old, now[name]) for name, old in before.items() if old != now[name]}
+            answer = encode(answer_of(result, watch, changed))
     except BaseException as error:
         if isinstance(error, NotImplementedError) and not isinstance(error, UnsupportedError):
             raise FaultError(f"not written yet. {error}".strip(), written=False) from None
         raise FaultError(said(error, file)) from error
-    if answer.result is None:
+    if result is None:
         raise FaultError("it returns nothing: print shows a result, `return` hands it over")
-    after = settings(world.model)
-    changed = {name: (before[name], after[name]) for name in before if before[name] != after[name]}
-    return replace(answer, changed=changed)
+    return answer
 
 
 def said(error: BaseException, file: Path) -> str:

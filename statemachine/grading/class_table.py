@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import csv
-import io
 import re
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import BadInputError
-from ..runs.whole import replace_text
 from .calls import reason
-from .exercise import LOOK, Judgement
-from .judges import JUDGES
+from .exercise import LOOK
+from .judges import JUDGES, Judgement
 
 _HEAD = (
     "file", "right", "of", *JUDGES, "remarks", "tests", "predictions", "student", "same_as",
@@ -96,17 +94,15 @@ def few_words(judgement: Judgement) -> str:
     return textwrap.shorten(_AFTER.sub(r"\1", text), _FEW, placeholder=" …")
 
 
-def as_csv(entries: Iterable[ClassEntry]) -> str:
-    """The table as text: a row a submission; details have a line for each remark."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(_HEAD)
+def rows_of(entries: Iterable[ClassEntry]) -> Iterator[tuple[object, ...]]:
+    """The table: its head, and a row a submission; details have a line for each remark."""
+    yield _HEAD
     for entry in entries:
         words = {each.function: verdict_word(each) for each in entry.functions}
         remarks = [f"{each.function}: {text}" for each in entry.functions for text in each.remarks]
         if len(entry.functions) > 1 and len({each.remarks for each in entry.functions}) == 1:
             remarks = list(entry.functions[0].remarks)  # of the file, and not of a function
-        row = (
+        yield (
             entry.name,
             entry.right if entry.judged else "",
             len(JUDGES),
@@ -121,13 +117,6 @@ def as_csv(entries: Iterable[ClassEntry]) -> str:
             entry.sha256,
             entry.made_with,
         )
-        writer.writerow([no_formula(cell) for cell in row])
-    return out.getvalue()
-
-
-def no_formula(cell: object) -> object:
-    """No formula: a spreadsheet would run what a student wrote, or named the file."""
-    return f"'{cell}" if isinstance(cell, str) and cell[:1] in "=+-@\t\r" and cell else cell
 
 
 def verdict_word(judgement: Judgement) -> str:
@@ -138,12 +127,6 @@ def verdict_word(judgement: Judgement) -> str:
         (judgement.passed, "right"),
         (True, "wrong"),
     )
-
-
-def write(table: Path, entries: Iterable[ClassEntry]) -> None:
-    """Write the table anew."""
-    # With the mark by which a spreadsheet knows UTF-8.
-    replace_text(table, as_csv(entries), "utf-8-sig")
 
 
 def read(table: Path) -> dict[tuple[str, str], ClassEntry]:

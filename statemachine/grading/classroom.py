@@ -12,12 +12,13 @@ from pathlib import Path
 
 from ..errors import BadInputError, StateMachineError
 from ..processes import checked_jobs
+from ..processes.parallel import in_parallel
+from ..runs.whole import replace_csv
 from .calls import reason
-from .class_table import NOTHING, ClassEntry, read, write
+from .class_table import NOTHING, ClassEntry, read, rows_of
 from .exercise import TIME_LIMIT, ExerciseJudge
 from .mutants.run import examine
 from .own_files import digest, has_functions, in_folder
-from .parallel import in_parallel
 from .predictions import score
 from .similarity import code_of, likeness, shape_of
 
@@ -227,7 +228,7 @@ def judge_all(
     jobs = checked_jobs(jobs, processors=2)
     before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
-    compared = _Compared(found)
+    in_order = _compared(found)
     own = {each.path: each.own for each in found if each.path}
     with ExerciseJudge(backend, time_limit, own=own) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
@@ -246,7 +247,7 @@ def judge_all(
         def ended(name: str, entry: ClassEntry) -> None:
             entries[name] = entry
             if table is not None:
-                write(table, compared.in_order(entries))
+                replace_csv(table, rows_of(in_order(entries)))
 
         in_parallel(
             work,
@@ -255,9 +256,9 @@ def judge_all(
             stop=judge.stop.set,
             progress=lambda waiting: progress(1 - waiting / len(found)),
         )
-    done = compared.in_order(entries)
+    done = in_order(entries)
     if table is not None:
-        write(table, done)
+        replace_csv(table, rows_of(done))
     return done
 
 
@@ -288,30 +289,27 @@ def _caught(file: Path, backend: str) -> str:
     return f"{found.caught} of {len(found.trials)}" + f"; not {missed}" * bool(missed)
 
 
-class _Compared:
-    """Submissions, each compared with all others; each pair once, though a table asks often."""
+def _compared(
+    found: Sequence[Submission],
+) -> Callable[[Mapping[str, ClassEntry]], list[ClassEntry]]:
+    """Puts entries in the order of the submissions, each with those that are like it.
 
-    def __init__(self, found: Sequence[Submission]) -> None:
-        self._found = found
-        self._code, shape = cache(code_of), cache(shape_of)
-        self._likeness = cache(lambda left, right: likeness(shape(left), shape(right)))
+    Each pair is compared once, though a table asks often.
+    """
+    code, shape = cache(code_of), cache(shape_of)
+    alike = cache(lambda left, right: likeness(shape(left), shape(right)))
 
-    def in_order(self, entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
-        """The entries in the order of the submissions, each with those that are like it."""
+    def in_order(entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
         done = []
         first: dict[str, str] = {}
-        for each in self._found:
-            if each.name not in entries:
-                continue
+        for each in (each for each in found if each.name in entries):
             entry, same = entries[each.name], ""
-            if any(judgement.written for judgement in entry.functions):
-                code = self._code(each.path)
-                same = first.setdefault(code, each.name) if code else ""
-            others = ((self._alike(each, other), other.name) for other in self._found)
-            part, name = max(others, key=lambda other: other[0])
-            alike = f"{part:.0%} {name}" if part else ""
-            done.append(replace(entry, same_as="" if same == each.name else same, alike=alike))
+            if any(judged.written for judged in entry.functions) and code(each.path):
+                same = first.setdefault(code(each.path), each.name)
+            others = [(alike(each.path, o.path), o.name) for o in found if o is not each]
+            part, name = max(others, key=lambda other: other[0], default=(0.0, ""))
+            same = "" if same == each.name else same
+            done.append(replace(entry, same_as=same, alike=f"{part:.0%} {name}" if part else ""))
         return done
 
-    def _alike(self, left: Submission, right: Submission) -> float:
-        return 0.0 if left is right else self._likeness(left.path, right.path)
+    return in_order

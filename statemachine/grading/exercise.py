@@ -23,22 +23,24 @@ from typing import Any
 
 from .. import __version__, errors
 from ..backends import backend_engine
-from ..errors import BadInputError, EngineError, StateMachineError
+from ..errors import BadInputError, EngineError
 from ..installed import DEFAULT, engine_version
-from . import sandbox
-from .calls import reason
-from .examine import Judgement, judged
-from .judges import JUDGES, judge_of
+from ..processes.parallel import in_parallel, unwinding
+from .judges import JUDGES, Judgement, judge_of, judged
 from .own_files import LARGEST, digest, has_solutions, in_folder, named_by
-from .parallel import in_parallel
-from .recording import START, FunctionRecording, Limits, record
-from .unwinding import unwinding
+from .recording import FunctionRecording, Limits, record
 from .worlds import ExerciseWorld, Scenes
 
 LOOK = "please look at this"
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
-WALL_LIMIT = 10.0  # [s] on the clock for it, those apart in which others have the processor
-_TIMES = 2  # so many times what may be computed, at least
+WALL_LIMIT = 60.0  # [s] on the clock for it: the machine may be busy with others
+_TIMES = 12  # so many times what may be computed, at least
+_HINTS = {
+    "cpu": ": a loop that does not end?",
+    "flood": ": a loop that does not end?",
+    "code": ": a function must return",
+    "clock": ": is this machine busy, or does it wait for something (sleep, a lock)?",
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class Grade:
         file: Its name; sha256: the digest of its content.
         backend: The backend that it ran on; versions: of what it ran with.
         functions: One after the other, in the exercise's order.
-        cpu_limit: What each function might compute [s], and wall_limit, what it might wait [s].
+        cpu_limit: What each function might compute [s]; wall_limit: and take on the clock [s].
     """
 
     file: str
@@ -87,9 +89,8 @@ def run(
         time_limit: What each function may compute, after everything it needs is ready [s];
             this does not pass while the machine is busy with others.
         progress: Told the fraction that is done.
-        wall_limit: What each may take on the clock, from the same moment [s], where it waits for
-            something else than a processor; at least twice `time_limit`.
-
+        wall_limit: What each may take on the clock, from the same moment [s]; at least twelve
+            times `time_limit`.
         folder: One of which everything belongs to the file; without, what it names beside it.
 
     Raises:
@@ -211,10 +212,7 @@ class ExerciseJudge:
     def _judgement(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
         if recording.refusal:
             kind, text = recording.refusal
-            known = getattr(errors, kind, None)
-            if isinstance(known, type) and issubclass(known, StateMachineError):
-                raise known(text)
-            raise EngineError(text)
+            raise getattr(errors, kind, EngineError)(text)
         others = copy.others(recording.reads)
         if borrowed := ", ".join(other for other, matters in others.items() if matters):
             text = (
@@ -234,41 +232,35 @@ class ExerciseJudge:
                 return judgement
         except Exception as error:  # what was recorded may have been made up
             recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        outcome = recording.outcome
         if recording.broken:
             text = f"what its process recorded is no record of a run ({recording.broken})"
-            return Judgement(name, True, False, (text,))
-        if not recording.began:
-            return Judgement(name, True, False, (_not_ready(recording.outcome),), judged=False)
-        # It did not come to its end. The innermost line of the student's file comes first in what
-        # is noted last.
-        outcome, last = recording.outcome, recording.trace.rpartition("Timeout (")[2]
-        lines = re.findall(rf'File "{re.escape(str(copy.path))}", line (\d+)', last)
-        where = f"line {lines[0]}: " if lines else ""
-        if not outcome.timed_out:
-            text = where + _how_it_ended(self.limits, outcome)
-            return Judgement(name, True, False, (text,))
-        computed = max(0.0, outcome.cpu - recording.cpu)
-        busy, clock = "is this machine busy?", outcome.wall
-        if outcome.asleep > self.limits.wall:
-            busy, clock = "does it wait for something (sleep, a lock)?", self.limits.wall
-        text = (
-            f"{where}nothing could be judged: not at its end after {clock:.3g} s on the clock, "
-            f"of which it computed for {computed:.1f} s: {busy}"
-        )
-        return Judgement(name, True, False, (text,), judged=False)
+        elif not recording.began:
+            text = (
+                f"nothing could be judged: the judge itself {outcome.how}, twice. Your code was "
+                "not run: this machine may be busy, or out of memory; try again"
+            )
+        else:
+            # The innermost line of the student's file comes first in what is noted last.
+            last = recording.trace.rpartition("Timeout (")[2]
+            lines = re.findall(rf'File "{re.escape(str(copy.path))}", line (\d+)', last)
+            where = f"line {lines[0]}: " if lines else ""
+            what = "nothing could be judged: " if outcome.end == "clock" else ""
+            text = f"{where}{what}it {outcome.how}{_HINTS.get(outcome.end, '')}"
+        known = recording.broken or (recording.began and outcome.end != "clock")
+        return Judgement(name, True, False, (text,), judged=bool(known))
 
 
 def _python_file(path: Path) -> Path:
     try:
         path = path.expanduser().resolve()
-        if path.is_dir():
-            raise BadInputError(f"{path.name} is a folder: name the student's file in it")
-        if not path.is_file():
-            raise BadInputError(f"there is no file {path.name}")
+        folder, file = path.is_dir(), path.is_file()
     except (OSError, ValueError, RuntimeError) as error:
-        if isinstance(error, StateMachineError):
-            raise
         raise BadInputError(f"no file can have this name: {error}") from None
+    if folder:
+        raise BadInputError(f"{path.name} is a folder: name the student's file in it")
+    if not file:
+        raise BadInputError(f"there is no file {path.name}")
     if path.suffix != ".py":
         raise BadInputError(f"{path.name} is no Python file: its name does not end in .py")
     try:
@@ -322,38 +314,7 @@ def _recorded(
     copy: _Copy, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
 ) -> FunctionRecording:
     """A recording; if the process did not get ready, a second one."""
-    recording = record(copy.path, copy.folder, name, backend, limits, folder / "1", stop)
-    if recording.began or recording.refusal or recording.broken or stop.is_set():
-        return recording
+    first = record(copy.path, copy.folder, name, backend, limits, folder / "1", stop)
+    if first.began or first.refusal or first.broken or stop.is_set():
+        return first
     return record(copy.path, copy.folder, name, backend, limits, folder / "2", stop)
-
-
-def _not_ready(outcome: sandbox.ProcessOutcome) -> str:
-    """Why a process did not get as far as the student's code."""
-    if outcome.timed_out:
-        how = f"the engine was not ready after {START:.0f} s, twice"
-    else:
-        code = outcome.returncode if outcome.signal is None else sandbox.signal_name(outcome.signal)
-        how = f"the judge itself ended with {code}, twice"
-    return (
-        f"nothing could be judged: {how}. Your code was not run: this machine may be busy, or "
-        "out of memory; try again"
-    )
-
-
-def _how_it_ended(limits: Limits, outcome: sandbox.ProcessOutcome) -> str:
-    """What became of a process that gave no verdict."""
-    name = sandbox.signal_name(outcome.signal or 0)
-    return reason(
-        (
-            outcome.out_of_cpu,
-            f"still running after {limits.cpu:g} s of computing: a loop that does not end?",
-        ),
-        (
-            outcome.flooded,
-            "it prints more than 256 MB, and was ended there: a loop that does not end?",
-        ),
-        (outcome.out_of_memory, "it asks for more memory than there is for it"),
-        (outcome.signal is not None, f"it crashed the process ({name})"),
-        (True, f"it ended the process, with code {outcome.returncode}: a function must return"),
-    )

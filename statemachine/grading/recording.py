@@ -12,14 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import sandbox
-from .answers import Answer
+from ..processes import ALONE, sandbox
+from .answers import Answer, decode
 from .calls import FaultError
-from .transcript import decode
 
 START = 60.0  # [s] on the clock for Python, the engine and the worlds to get ready
-_CLOCK = 120.0  # [s] that it may take where others have the processor, or nobody can tell
-_TIMES = 4  # and so many times what it may take without them, at least
 _MEMORY_MOST = 2 * sandbox.GB
 _RECORD_MOST = 40_000_000  # bytes
 _TEXT_MOST = 2000  # characters
@@ -37,7 +34,7 @@ _KEPT = (
 
 @dataclass(frozen=True)
 class Limits:
-    """What a function may compute, and what it may wait for anything but a processor [s]."""
+    """What a function may compute, and what it may take on the clock [s]."""
 
     cpu: float
     wall: float
@@ -49,7 +46,7 @@ class FunctionRecording:
 
     Attributes:
         outcome: How it ended.
-        began: Whether it came as far as the student's code; cpu: what it had computed by then.
+        began: Whether it came as far as the student's code.
         refusal: The kind of an error, and what it said, where there is no engine.
         answers: What came of the function, world after world, as far as it came.
         forbidden: What the student's code tried and may not do.
@@ -61,7 +58,6 @@ class FunctionRecording:
     outcome: sandbox.ProcessOutcome
     trace: str
     began: bool = False
-    cpu: float = 0.0
     refusal: tuple[str, str] | None = None
     answers: list[Answer | FaultError] = field(default_factory=list)
     forbidden: list[str] = field(default_factory=list)
@@ -104,16 +100,17 @@ def record(
         "nonce": nonce,
     }
     job.write_text(json.dumps(facts), encoding="utf-8")
+    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
+    environment = {**kept, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     outcome = sandbox.run(
         [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
         cpu=limits.cpu,
-        wall=max(_CLOCK, _TIMES * limits.wall),
-        asleep=limits.wall,
+        wall=limits.wall,
         started=lambda: bool(content(answers, 1)),
         start=START,
         start_cpu=START,
         cwd=scratch,
-        env=_environment(),
+        env=environment,
         writable=folder,
         memory_most=_MEMORY_MOST,
         stop=stop,
@@ -144,7 +141,7 @@ def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
         case "refused" if not recording.began:
             recording.refusal = _text(found["kind"]), _text(found["text"])
         case "running" if not recording.began:
-            recording.began, recording.cpu = True, float(found["cpu"])
+            recording.began = True
         case "forbidden" | "reads" as kind if recording.began:
             getattr(recording, kind).append(_text(found["text"]))
         case "answer" if recording.began:
@@ -171,10 +168,3 @@ def content(file: Path, most: int) -> bytes:
             return opened.read(most) if plain else b""
     except OSError:
         return b""
-
-
-def _environment() -> dict[str, str]:
-    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
-    # One thread each: four processes share the machine, and threads reserve memory.
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    return {**kept, **threads, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}

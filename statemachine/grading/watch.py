@@ -7,23 +7,25 @@ begins at a fresh Data, a reset to whatever state, or a write, however that was 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..engines import room
+from ..errors import ClosedDataError
 from ..installed import require
-from ..interface import Array, Data, Model
+from ..interface import INPUTS, Array, Data, Model
 
 _MOST = 1000  # runs, forwards and Data that are noted
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """The inputs of a Data at some moment: (nq,), (nv,), (nu,).
+    """The inputs of a Data at some moment: (nq,), (nv,), (nu,), and its time [s].
 
     Attributes:
         data: The number of the Data, in the order in which they were met.
@@ -33,6 +35,15 @@ class Inputs:
     qpos: Array
     qvel: Array
     ctrl: Array
+    time: float
+
+    def continues(self, other: Inputs) -> bool:
+        """Whether nobody touched the state since the other moment."""
+        return (
+            self.time == other.time
+            and bool((self.qpos == other.qpos).all())
+            and bool((self.qvel == other.qvel).all())
+        )
 
 
 @dataclass
@@ -40,33 +51,18 @@ class EngineRun:
     """One run, from its first step on.
 
     Attributes:
-        data: The number of the Data.
-        own: Whether it is a Data of the Model that the function got, or of a variant of it.
-        qpos, qvel, ctrl, time: What they were at the first step.
-        end, end_qvel, end_time: qpos, qvel and the time after the last step.
+        own: Whether it is on a Data of the Model that the function got, or of a variant of it.
+        start: Where it began.
+        end: Where it is after the last step.
         nstep: How many steps it took.
         ctrl_changed: After how many steps ctrl was another; None if it never was.
     """
 
-    data: int
     own: bool
-    qpos: Array
-    qvel: Array
-    ctrl: Array
-    time: float
-    end: Array
-    end_qvel: Array
-    end_time: float
+    start: Inputs
+    end: Inputs
     nstep: int = 0
     ctrl_changed: int | None = None
-
-    def continues(self, data: Any) -> bool:
-        """Whether nobody touched the state since the last step."""
-        return (
-            data.time == self.end_time
-            and bool((data.qpos == self.end).all())
-            and bool((data.qvel == self.end_qvel).all())
-        )
 
 
 @dataclass(frozen=True)
@@ -122,8 +118,11 @@ class StudentWatch:
 
     def inputs(self, data: Any) -> Inputs:
         """What they are now."""
-        copies = (np.array(getattr(data, name)) for name in ("qpos", "qvel", "ctrl"))
-        return Inputs(self.meet(data), *copies)
+        qpos, qvel, ctrl = (np.array(getattr(data, name)) for name in INPUTS)
+        time = math.nan
+        with suppress(ClosedDataError):  # of which the inputs alone are told
+            time = float(data.time)
+        return Inputs(self.meet(data), qpos, qvel, ctrl, time)
 
     def recomputed(self, data: Any) -> None:
         """Note that what is derived was."""
@@ -132,26 +131,21 @@ class StudentWatch:
 
     def step(self, model: Any, data: Any, advance: Callable[[], Any], nstep: int) -> Any:
         """Let `advance` move `data`, and note where from and where to."""
-        number = self.meet(data)
-        run = self._current.get(number)
-        if run is None or not run.continues(data):
-            now, time = self.inputs(data), float(data.time)
-            own = self._origin_of(model) == self._origin
-            run = EngineRun(
-                number, own, now.qpos, now.qvel, now.ctrl, time, now.qpos, now.qvel, time
-            )
+        now = self.inputs(data)
+        run = self._current.get(now.data)
+        if run is None or not now.continues(run.end):
+            run = EngineRun(self._origin_of(model) == self._origin, now, now)
             if len(self.runs) < _MOST:
                 self.runs.append(run)
-            self._current[number] = run
-        elif run.ctrl_changed is None and (data.ctrl != run.ctrl).any():
+            self._current[now.data] = run
+        elif run.ctrl_changed is None and (now.ctrl != run.start.ctrl).any():
             run.ctrl_changed = run.nstep
         result = advance()
         run.nstep += nstep
         if self._nudge and run is not self.runs[0] and run.nstep >= self._nudge.after:
             place = self._nudge.place
             data.qpos[place] = np.nextafter(data.qpos[place], self._nudge.towards)
-        run.end, run.end_qvel = np.array(data.qpos), np.array(data.qvel)
-        run.end_time = float(data.time)
+        run.end = self.inputs(data)
         return result
 
     def _origin_of(self, model: Any) -> object:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,7 @@ class Model(ABC):
     site_quat: Array
     keyframes: tuple[Keyframe, ...]
 
+    _holds_start = False  # whether the commands before a keyframe were that of the keyframe
     _clamps = False  # whether what acts of ctrl is always within its range
     if TYPE_CHECKING:
         _quaternions: list[tuple[int, int]]  # (joint id, address in qpos) of each
@@ -188,7 +190,8 @@ class Model(ABC):
                 kp > 0, kv ≥ 0: gains of the position servos, (nu,) with NaN where there is
                 none, or one number for every servo;
                 latency: ≥ 0 [s], (nu,) or one number: how late a command acts, rounded up to
-                whole engine steps. Before a reset the command was that of the reset;
+                whole engine steps. Before a reset the command was that of the reset (before that
+                to a keyframe a delay of the file's own finds 0, as in MuJoCo);
                 integrator: a name of `capabilities.integrators`;
                 max_qvel: > 0 [rad/s or m/s], (nv,) or one number: beyond it a step raises
                 DivergedError. By default it is computed for each Model.
@@ -197,7 +200,8 @@ class Model(ABC):
             UnsupportedError: This backend has no such option.
             BadInputError: The value has the wrong shape, kind or size.
         """
-        return self._replace(checked_options(self, options))
+        checked = checked_options(self, options)
+        return self._replace(checked)._started_as(self, checked)
 
     def with_compiled(self, compiled: Any) -> Model:
         """Another Model of the same engine and file, from another compiled model.
@@ -210,6 +214,11 @@ class Model(ABC):
             ModelError: It has a number that nothing can be computed with.
         """
         raise unsupported(self, "compiled", "it does not start from a compiled model")
+
+    def _started_as(self, before: Model, options: Mapping[str, Any]) -> Self:
+        """Itself, made of another Model by some options: how it starts is told on."""
+        vars(self)["_holds_start"] = before._holds_start or "latency" in options
+        return self
 
     def _check_quaternions(self, qpos: Array) -> None:
         """Raise BadInputError for a quaternion of `qpos` (nq,) that is zero."""

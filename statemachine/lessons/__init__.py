@@ -1,11 +1,13 @@
 """The lessons: what each is called, asks and takes. Importing this loads no engine.
 
-A lesson is one module with three functions, in the order in which one reads them:
-`code(model, options, load)` is what a student types for a Model, where `load` is the call that
-loads it; `run(play, options, progress)` calls `play` (a `session.CodeRun`) once, which runs that
-code, looks on, and returns what was found; and `page(results, session)` says what the results, by
-backend, mean. One whose options depend on the robot also has `fit(model, options)`, which gives
-them back with nothing left open. Terminal, documentation and notebook are made from the same three.
+A lesson is a page `NAME.md`, a template (see `template.py`), and a module `NAME.py` with four
+functions, in the order in which one reads them: `code(model, options, load)` is what a student
+types for a Model, where `load` is the call that loads it; `run(play, options, progress)` calls
+`play` (a `session.CodeRun`) once, which runs that code, looks on, and returns what was measured;
+`slots(result)` gives what the page's slots take beside the fields of the result; and
+`tables(results)` its tables and curves, from the results by backend. One whose options depend on
+the robot also has `fit(model, options)`, which gives them back with nothing left open. Terminal,
+documentation and notebook show the same page.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from .records import Lesson, Option
 _JOINT = Option("--joint", None, "joint to write (default shoulder_lift, if there is one)")
 _VALUE = Option("--value", None, "what to write [rad or m] (default 0.8, if in range)", float)
 
-# The stations of the path, in order, and what comes after it.
+# The lessons of the path, in order, and those beside it.
 LESSONS = {
     lesson.name: lesson
     for lesson in (
@@ -71,7 +73,7 @@ LESSONS = {
                 Option(
                     "--joint",
                     None,
-                    "joint to watch (default shoulder_lift, or the one with the largest load)",
+                    "joint to watch, with a servo (default shoulder_lift, or that with most load)",
                 ),
                 Option(
                     "--longer", None, "simulated time of the fall; 0 for none (default 100)", float
@@ -111,15 +113,20 @@ LESSONS = {
             "speed",
             "What does one second of your machine buy?",
             "so101/scene_box",
-            (
-                Option("--steps", 4000, "steps of each run", int),
-                Option("--worlds", False, "many worlds: what a shared Model saves", bool),
-            ),
+            (Option("--steps", 4000, "steps of each run", int),),
         ),
-        Lesson("questions", "Check yourself: six questions.", "so101/scene_box", station=False),
+        Lesson(
+            "worlds",
+            "Many worlds: what does a shared Model save?",
+            "so101/scene_box",
+            (Option("--most", 4096, "the largest number of worlds", int),),
+            on_path=False,
+        ),
+        Lesson("questions", "Check yourself: six questions.", "so101/scene_box", on_path=False),
     )
 }
-STATIONS = tuple(lesson for lesson in LESSONS.values() if lesson.station)
+PATH = tuple(lesson for lesson in LESSONS.values() if lesson.on_path)
+BESIDE = tuple(lesson for lesson in LESSONS.values() if not lesson.on_path)
 
 
 def module(name: str) -> Any:

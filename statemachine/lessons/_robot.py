@@ -11,8 +11,8 @@ import numpy as np
 from ..errors import BadInputError
 from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
 from ..measures.readings import readings
-from ..runs.commands import load_at_start, start_keyframe
-from ..runs.robot import ARM, carried_by, scalar_joint
+from ..runs.commands import is_servo, load_at_start, start_keyframe
+from ..runs.robot import carried_by, scalar_joint
 
 USUAL = "shoulder_lift"  # the arm's joint that lessons are about
 _VALUE = 0.8  # rad
@@ -55,8 +55,8 @@ def coordinate(model: Model, joint: str) -> Coordinate:
     return Coordinate(joint, place, dof, kind is JointType.SLIDE, slot)
 
 
-def usual_joint(model: Model) -> str:
-    """The joint that a lesson takes where nobody names one.
+def usual_joint(model: Model, servos: bool = False) -> str:
+    """The joint that a lesson takes where nobody names one; with `servos` one that has a servo.
 
     shoulder_lift if there is one; else of the driven hinges and slides the one that takes the
     largest force to keep where it starts. Of a robot without any, a joint that nothing drives.
@@ -66,21 +66,16 @@ def usual_joint(model: Model) -> str:
     """
     if USUAL in model.joint_names:
         return USUAL
-    driven = set(model.actuator_jntid.tolist())
-    scalar = (int(JointType.HINGE), int(JointType.SLIDE))
-    kinds, names = model.jnt_type.tolist(), model.joint_names
-    named = [j for j, name in enumerate(names) if name and kinds[j] != int(JointType.BALL)]
-    groups = (
-        [j for j in named if kinds[j] in scalar and j in driven],
-        [j for j in named if kinds[j] in scalar],
-        named,
-    )
-    found = next((group for group in groups if group), None)
-    if found is None:
+    kinds, names = model.jnt_type, model.joint_names
+    driven = model.actuator_jntid[is_servo(model)] if servos else model.actuator_jntid
+    named = [j for j, name in enumerate(names) if name and kinds[j] != JointType.BALL]
+    scalar = [j for j in named if kinds[j] != JointType.FREE]
+    candidates = [j for j in scalar if j in driven] or scalar or named
+    if not candidates:
         what = "names none of its joints" if model.njnt else "has no joints"
         raise BadInputError(f"{model.path.name} {what}, and this lesson is about one")
     load = load_at_start(model)
-    return names[max(found, key=lambda j: load[coordinate(model, names[j]).dof])]
+    return names[max(candidates, key=lambda j: load[coordinate(model, names[j]).dof])]
 
 
 def usual_value(model: Model, joint: str) -> float:
@@ -92,16 +87,12 @@ def usual_value(model: Model, joint: str) -> float:
     if not at.slide and (not limited or low <= _VALUE <= high):
         return _VALUE
     with make_data(model) as data:
-        begin = float(data.qpos[at.place])
-    if limited and low < high:
-        begin = min(max(begin, low), high)
-        far = (high - low) / 4
-        return _short(begin + far if high - begin >= begin - low else begin - far)
-    return _short(begin + _SHIFT)
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.3g}")
+        start = float(data.qpos[at.place])
+    shift = _SHIFT
+    if limited and low < high:  # a quarter of the range, towards the farther end
+        start = min(max(start, low), high)
+        shift = (high - low) / 4 if high - start >= start - low else (low - high) / 4
+    return float(f"{start + shift:.3g}")
 
 
 @dataclass(frozen=True)
@@ -119,7 +110,7 @@ class ReadPlace:
     number: int
 
     @property
-    def found(self) -> str:
+    def typed(self) -> str:
         """How its number is typed."""
         kind = "site" if self.array == "site_xpos" else "body"
         return f"model.{kind}_id({self.name!r})"
@@ -140,16 +131,6 @@ def tip_of(model: Model, name: str) -> ReadPlace:
     return ReadPlace(name, "site_xpos", model.site_id(name))
 
 
-def a_tip(name: str) -> str:
-    """What the place of this name is called: the arm's is its fingertip."""
-    return "fingertip" if name == FINGERTIP else name
-
-
-def the_tip(name: str) -> str:
-    """The same, in a sentence."""
-    return "the fingertip" if name == FINGERTIP else name
-
-
 def usual_tip(model: Model, joint: str) -> str:
     """The fingertip if there is one; else the last site or body that a joint carries."""
     if FINGERTIP in model.site_names:
@@ -165,11 +146,11 @@ def usual_tip(model: Model, joint: str) -> str:
     raise BadInputError(f"{model.path.name} names no site and no body, and this lesson reads one")
 
 
-def with_joint(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+def with_joint(model: Model, options: Mapping[str, Any], servos: bool = False) -> dict[str, Any]:
     """Options with a joint, if none is named, and with a value to write to it."""
     values = dict(options)
     if values["joint"] is None:
-        values["joint"] = usual_joint(model)
+        values["joint"] = usual_joint(model, servos)
     if "value" in values and values["value"] is None:
         values["value"] = usual_value(model, values["joint"])
     return values
@@ -181,17 +162,6 @@ def start_line(model: Model, name: str) -> str:
     return f"sm.reset({name}, data, keyframe={key!r})\n" if key else ""
 
 
-def is_of_the_arm(results: Mapping[str, Any]) -> bool:
-    """Whether results are of an SO-101, ours or another's."""
-    file = next(iter(results.values())).provenance.model_file
-    return file.partition("/")[0] in ("so101", "robotstudio_so101")
-
-
-def robot_word(joint: str) -> str:
-    """What the robot of a joint is called."""
-    return "arm" if joint in ARM else "robot"
-
-
 def read_stored(data: Data) -> dict[str, bytes]:
     """The bytes of every input, and of the time."""
     return {name: np.array(getattr(data, name)).tobytes() for name in (*INPUTS, "time")}
@@ -200,8 +170,20 @@ def read_stored(data: Data) -> dict[str, bytes]:
 def read_derived(data: Data) -> dict[str, bytes]:
     """The bytes of every derived array that this engine gives, contacts among them."""
     return {
-        name: b"".join(getattr(held, part).tobytes() for part in ("geom", "dist", "pos", "force"))
-        if isinstance(held, Contacts)
-        else held.tobytes()
-        for name, held in readings(data).items()
+        name: b"".join(getattr(value, part).tobytes() for part in ("geom", "dist", "pos", "force"))
+        if isinstance(value, Contacts)
+        else value.tobytes()
+        for name, value in readings(data).items()
     }
+
+
+def check_servos(model: Model, lesson: str, joint: str | None = None) -> None:
+    """Raise BadInputError for a model, or a joint, without a position servo."""
+    servos = model.actuator_jntid[is_servo(model)]
+    if not servos.size or (joint is not None and model.joint_id(joint) not in servos):
+        file = model.path.name
+        raise BadInputError(
+            f"no position servo drives {joint or file}, and this lesson is about servos; without "
+            f"one: statemachine compare {lesson} --model {file}, or "
+            f"statemachine trace record {lesson} --model {file}"
+        )

@@ -19,13 +19,13 @@ from ..errors import BadInputError, ModelError, UnknownNameError
 from ..installed import WITNESS
 from ..interface import Array, Model, forward, make_data
 from ..interface.checks import as_count
-from ..kinematics import Kind, Kinematics, Pose, shared_joints
-from ..rotations import angle_between, matrix_from_quat
+from ..kinematics import Kind, Kinematics, shared_joints
+from ..rotations import Placement, angle_between, matrix_from_quat
 from ..runs.drive import Progress, silent
 from ..runs.provenance import Provenance, provenance
 from ..runs.robot import carried_by
 from ..witness import labels
-from ._tips import Tip, random_qpos, slots, tips_of
+from ._frames import Tip, random_qpos, slots, tips_of
 
 _MOST = 1_000_000
 _TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
@@ -161,7 +161,7 @@ def certify(
     ours = _engine_poses(model, configurations, asked.tips, progress)
     theirs = configurations[:, slots(model, asked.joints)]
     gaps = [
-        _gap(model, tip, asked.kinematics, frame, Pose(ours.pos[:, k], ours.mat[:, k]), theirs)
+        _gap(model, tip, asked.kinematics, frame, Placement(ours.pos[:, k], ours.mat[:, k]), theirs)
         for k, (tip, frame) in enumerate(zip(asked.tips, asked.frames, strict=True))
     ]
     gaps.sort(key=lambda gap: -gap.worst)
@@ -244,7 +244,12 @@ def _frame(kinematics: Kinematics, name: str, kind: Kind) -> tuple[str, Kind]:
 
 
 def _gap(
-    model: Model, tip: Tip, kinematics: Kinematics, frame: tuple[str, Kind], ours: Pose, qpos: Array
+    model: Model,
+    tip: Tip,
+    kinematics: Kinematics,
+    frame: tuple[str, Kind],
+    ours: Placement,
+    qpos: Array,
 ) -> TipGap:
     name, kind = frame
     theirs = kinematics.poses(qpos, name, kind)
@@ -269,7 +274,7 @@ def _gap(
 
 def _engine_poses(
     model: Model, configurations: Array, tips: Sequence[Tip], progress: Progress
-) -> Pose:
+) -> Placement:
     """Positions (N, tips, 3) and rotation matrices (N, tips, 3, 3), by the engine's forward."""
     sites = [k for k, tip in enumerate(tips) if tip.kind == "site"]
     bodies = [k for k, tip in enumerate(tips) if tip.kind == "body"]
@@ -288,7 +293,7 @@ def _engine_poses(
             mat[k, bodies] = matrix_from_quat(data.xquat[body_ids])
             if k % 100 == 0:
                 progress(k / len(configurations))
-    return Pose(pos, mat)
+    return Placement(pos, mat)
 
 
 def _declared_offset(
@@ -305,7 +310,7 @@ def _declared_offset(
     return Offset(distance, angle)
 
 
-def _steady_offset(ours: Pose, theirs: Pose) -> Offset | None:
+def _steady_offset(ours: Placement, theirs: Placement) -> Offset | None:
     """The offset that all poses share; None if it changes with the pose.
 
     Where the files call their bodies differently, definitions cannot be compared

@@ -4,83 +4,66 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..engines import room
-from ..errors import BadInputError, UnsupportedError
-from ..interface import Data, JointType, Model, make_data, reset
+from ..engines.records import LeftAlone
+from ..errors import UnsupportedError
+from ..interface import Data, Model, make_data, reset
 from ..measures import largest
-from ..measures.text import apart, short_time, signed
-from ..page import Page, Question, Table, Text
-from ..runs.commands import is_servo, load_at_start, start_keyframe
+from ..measures.text import NONE, apart, position, short_time, signed
+from ..page import Table, Traces
+from ..runs.commands import start_keyframe
 from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
-from ..runs.provenance import provenance
-from ..runs.robot import ARM, has_floor, is_the_arm
-from ..runs.scenarios import SCENARIOS, drives
-from ._balance import engine_alone, force, parts_of, unit_of, who_holds
-from ._fall import BALANCE, Droop, Falling, Gravity, longer, longer_apart, milestones
-from ._robot import USUAL, coordinate, start_line, with_joint
-from ._words import differences, emulation, page_of, spans, typed, where
-from .records import Session
-from .session import CodeRun
+from ..runs.provenance import Provenance, provenance
+from ..runs.robot import is_the_arm
+from ..runs.scenarios import SCENARIOS
+from ._falling import BALANCE, PARTS, Droop, Falling, milestones
+from ._robot import check_servos, coordinate, start_line, with_joint
+from .session import CodeRun, stepping_loop
+from .template import differences, emulated, where
 
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
-_FALLEN = 30  # degrees
 # The first that is paid is taken; each is a row of the longer ones.
-_SECONDS, _LONGER = (4.0, 2.0, 1.0), (100.0, 50.0, 20.0, 10.0, 4.0)
+_OPEN = {"seconds": (4.0, 2.0, 1.0), "longer": (100.0, 50.0, 20.0, 10.0, 4.0)}
 _PATIENCE = 15.0  # s by the clock
+_CREEP = 0.05  # of the way; a joint that goes on by more has not settled
+_FURTHER = 0.02  # rad or m; less is not worth a cause
 
 
 def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
     """The joint, and times that a model with slow steps can be run for."""
-    if not model.nv:
-        raise BadInputError(f"{model.path.name} has no joints: nothing in it can fall")
-    values = with_joint(model, options)
-    dof = coordinate(model, values["joint"]).dof
-    usual = options["joint"] is not None or values["joint"] == USUAL
-    values["chosen"] = not usual and bool(load_at_start(model)[dof] > BALANCE)
-    open_ones = {"seconds": _SECONDS, "longer": _LONGER}
-    open_ones = {name: times for name, times in open_ones.items() if values[name] is None}
-    slow = 0.0 if is_the_arm(model) or not open_ones else cost_of_a_second(model)
-    for name, times in open_ones.items():  # there are two runs of each
-        values[name] = next((time for time in times if 2 * time * slow <= _PATIENCE), times[-1])
+    check_servos(model, "gravity", options["joint"])
+    values = with_joint(model, options, servos=True)
+    left_open = any(values[name] is None for name in _OPEN)
+    slow = cost_of_a_second(model) if left_open and not is_the_arm(model) else 0.0
+    for name, times in _OPEN.items():  # there are two runs of each
+        if values[name] is None:
+            paid = [time for time in times if 2 * time * slow <= _PATIENCE]
+            values[name] = [*paid, times[-1]][0]
     return values
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The same seconds with the servos on and off; ctrl is never written."""
-    at = coordinate(model, options["joint"])  # or says what is wrong with it
-    steps_in(model, options["seconds"])  # and this
-    loop, nstep = spans(model, milestones(options["seconds"]), options["seconds"])
+    at = coordinate(model, options["joint"])
+    seconds = steps_in(model, options["seconds"]) * model.timestep  # refuses what is no time
+    loop, nstep = stepping_loop(model, milestones(seconds), options["seconds"])
     shown, numpy = "np.degrees(data.qpos[slot]).round(3)", "import numpy as np\n"
     if at.slide:
         shown, numpy = "(1000 * data.qpos[slot]).round(2)", ""  # millimetres
-    slot = at.slot
-    if options["chosen"] and "#" not in slot:
-        slot += "  # the largest load at the start"
-    if not model.nu:
-        start = start_line(model, "model")
-        return f"""\
-{numpy}import statemachine as sm
-
-model = {load}
-slot = {slot}
-data = sm.make_data(model)
-{start}{loop}
-    sm.step(model, data, {nstep})
-    print({shown}, end="  ")
-print()
-"""
     off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
     start = start_line(model, "variant")
     return f"""\
 {numpy}import statemachine as sm
 
 model = {load}
-limp = model.replace({off})  # another Model: {drives(model)} off
-slot = {slot}
+limp = model.replace({off})  # another Model: servos off
+slot = {at.slot}
 for variant in (model, limp):
     data = sm.make_data(variant)
     {start + "    " if start else ""}{loop}
@@ -90,19 +73,40 @@ for variant in (model, limp):
 """
 
 
+@dataclass(frozen=True, eq=False)
+class Gravity:
+    """The same run with the servos on and off.
+
+    Attributes:
+        joint: The joint that was watched; slide: whether it is one, and no hinge.
+        longer: The servos off for longer, with "contacts" and with "no contacts".
+        alone: The joint on the engine as it comes, where that differs from the contract.
+    """
+
+    joint: str
+    slide: bool
+    servos_on: Droop
+    servos_off: Droop
+    longer: dict[str, Droop]
+    alone: tuple[LeftAlone, ...]
+    provenance: Provenance
+
+    @property
+    def unit(self) -> str:
+        """Of the forces on the joint."""
+        return "N" if self.slide else "N·m"
+
+
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravity:
     """Watch both runs; then the servos off for longer, with and without anything to touch."""
     model, joint, seconds = play.model, options["joint"], options["seconds"]
-    at = coordinate(model, joint)
-    limp = model.replace(**SCENARIOS["gravity"].options)
-    runs = {}
+    variants: dict[str, Model] = {}
     if options["longer"]:
         steps_in(model, options["longer"])  # says what is wrong with it
-        touch = "floor" if has_floor(model) else "contacts"
-        runs[touch] = limp
+        variants["contacts"] = model.replace(**SCENARIOS["gravity"].options)
         with suppress(UnsupportedError):
-            runs[f"no {touch}"] = model.replace(**SCENARIOS["fall"].options)
-    total = 2 * seconds + len(runs) * options["longer"]
+            variants["no contacts"] = model.replace(**SCENARIOS["fall"].options)
+    total = 2 * seconds + len(variants) * options["longer"]
     falls: dict[Data, Falling] = {}
 
     def begin(_model: Model, data: Data) -> None:
@@ -111,26 +115,19 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
             falls[data] = Falling(data, joint, seconds, share)
 
     play(before=begin, after=lambda _model, data: falls[data].note(contacts=True))
-    ends = [falls[data].end() for _, data in play.worlds]
-    fallen = {}
-    for number, (name, each) in enumerate(runs.items()):
+    servos_on, servos_off = (falls[data].end() for _, data in play.worlds)
+    longer = {}
+    for number, (name, variant) in enumerate(variants.items()):
         start = 2 * seconds + number * options["longer"]
         share = part_of(progress, start / total, options["longer"] / total)
-        fallen[name] = _left_alone(each, joint, options["longer"], share)
-    which = model.joint_id(joint)
-    driven = model.actuator_jntid == which
-    # No motor of the engine's own is on a free body.
-    engine = None if int(model.jnt_type[which]) == int(JointType.FREE) else model.backend
+        longer[name] = _left_alone(variant, joint, options["longer"], share)
     return Gravity(
         joint=joint,
-        slide=at.slide,
-        servo=bool(is_servo(model)[driven].any()),
-        drives=drives(model) if model.nu else "",
-        keyframe=start_keyframe(model),
-        servos_on=ends[0],
-        servos_off=ends[-1],
-        longer=fallen,
-        alone=room(engine).left_alone(model, seconds, which),
+        slide=coordinate(model, joint).slide,
+        servos_on=servos_on,
+        servos_off=servos_off,
+        longer=longer,
+        alone=room(model.backend).left_alone(model, seconds, model.joint_id(joint)),
         provenance=provenance(model),
     )
 
@@ -141,137 +138,197 @@ def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) ->
         fall = Falling(data, joint, seconds, progress)
         steps = steps_in(model, seconds)
         error = drive(model, data, None, steps, after=lambda _k, _time: fall.note(contacts=False))
-        return fall.end() if error is None else fall.gave_up(error.time)
+        return fall.end(None if error is None else error.time)
 
 
-def page(results: Mapping[str, Gravity], session: Session) -> Page:
-    """The table of the course, and the balance of forces at its end."""
-    first = next(iter(results.values()))
-    columns = {
-        f"{where(results, name)}{state}": droop
-        for name, result in results.items()
-        for state, droop in result.runs().items()
+def slots(result: Gravity) -> dict[str, Any]:
+    """What the page says."""
+    on, off, unit = result.servos_on, result.servos_off, result.unit
+    sagged = abs(float(on.position[-1]))
+    return {
+        "right": 0 if sagged >= np.radians(1) else 1 if sagged == 0 else 2,
+        "seconds": f"{on.time[-1]:g} s",
+        "ctrl_untouched": on.ctrl_untouched and off.ctrl_untouched,
+        "balanced": on.balanced and off.balanced,
+        "servo_holds": on.held_by == PARTS["actuator"],
+        "servo_force": f"{abs(on.forces['actuator'] or 0.0):.4f} {unit}",
+        "load_on": f"{abs(on.forces['bias'] or 0.0):.4f} {unit}",
+        "touching": ", ".join(f"{pair} since {off.touches[pair]:.3f} s" for pair in off.touching)
+        or "nothing",
+        "emulated": emulated(result, *_OURS),
+        **_caught(result),
+        **_own_motors(result),
     }
-    headers = [name.replace(": ", "\n") for name in columns]
-    digits = {name: 3 if name.endswith("on") else 2 for name in columns}
-    end = float(first.servos_on.time[-1])
-    parts = [
-        (label, part)
-        for label, part in parts_of(first)
-        if part != "equality" or any(force(run, part) for run in columns.values())
-    ]
-    blocks: list[Any] = [
-        Text(_introduction(first)),
-        *typed(session, _question(first)),
-        Table(
-            ("time", *headers),
-            [
-                (
-                    f"{time:.2f} s",
-                    *(run.at(k, first.slide, digits[name]) for name, run in columns.items()),
-                )
-                for k, time in enumerate(max((run.time for run in columns.values()), key=len))
-            ],
-            title=f"{first.joint} under gravity",
+
+
+def _caught(result: Gravity) -> dict[str, Any]:
+    """Whether it is the contact that catches the joint, and whether it stays there."""
+    then, runs = float(result.servos_off.position[-1]), list(result.longer.values())
+    both = len(runs) == 2 and all(run.diverged is None for run in runs)
+    if not (both and result.servos_off.touching):
+        return {"caught": False}
+    end, free = (float(run.position[-1]) for run in runs)
+    limit = abs(runs[1].forces["limit"] or 0.0)
+    return {
+        "caught": free * np.sign(then) - abs(then) >= max(_FURTHER, abs(then) * _CREEP),
+        "free_end": position(free, result.slide),
+        "at_limit": limit > BALANCE,
+        "limit_force": f"{limit:.4f} {result.unit}",
+        "creeps": abs(end - then) > abs(then) * _CREEP,
+        "caught_at": position(then, result.slide),
+        "long_end": position(end, result.slide),
+        "long_time": f"{runs[0].time[-1]:g} s",
+    }
+
+
+def _own_motors(result: Gravity) -> dict[str, Any]:
+    """What the engine without our adapter, at its own defaults, does to the joint."""
+    if not result.alone:
+        return {"own_motors": False, "flails": False}
+    _, held, limp, undamped = result.alone
+    falls = min(abs(limp.position), abs(undamped.position))
+    return {
+        "own_motors": bool(held.motor) and abs(held.position) < falls / 10,
+        "own_gravity": f"{held.gravity:g} m/s²",
+        "widest": position(held.widest, result.slide),
+        "own_force": f"{abs(held.motor):.4f} {result.unit}",
+        "held": position(held.position, result.slide),
+        "undamped": position(undamped.position, result.slide),
+        "flails": limp.explicit > 2 and limp.turns > limp.steps / 4,
+        "turns": f"{limp.turns} of {limp.steps} steps",
+        "explicit": f"{limp.explicit:.0f}",
+    }
+
+
+def tables(results: Mapping[str, Gravity]) -> dict[str, Any]:
+    """The course of the joint, the balance of forces at its end, and the longer runs."""
+    first = next(iter(results.values()))
+    runs = {
+        f"{where(results, name)}{state}": run
+        for name, result in results.items()
+        for state, run in (("servos on", result.servos_on), ("servos off", result.servos_off))
+    }
+    long_runs = {
+        f"{where(results, name)}{label}": run
+        for name, result in results.items()
+        for label, run in result.longer.items()
+    }
+    on, off = partial(_apart, "servos_on"), partial(_apart, "servos_off")
+    return {
+        "course": _course(runs, f"{first.joint} under gravity", first.slide),
+        "forces": _forces(runs, first),
+        "long_course": [
+            _course(long_runs, f"{first.joint} for longer, servos off", first.slide),
+            _curves(long_runs, first),
+        ]
+        if long_runs
+        else [],
+        "alone": [_alone(name, result) for name, result in results.items() if result.alone],
+        "differences": differences(
+            results,
+            {
+                "servos on, worst": partial(on, None),
+                "servos off, until one touches": partial(off, False),
+                "servos off, after that": partial(off, True),
+                **{f"servos off, {k}, at the end": partial(_ends_apart, k) for k in first.longer},
+            },
         ),
-        Table(
-            ("who", *headers),
-            [
-                *(
-                    (label, *(signed(force(run, part)) for run in columns.values()))
-                    for label, part in parts
-                ),
-                ("sum", *(signed(run.forces["total"]) for run in columns.values())),
-            ],
-            title=f"Who holds {first.joint}, at {end:g} s [{unit_of(first)}]",
-            emphasis=frozenset({len(parts)}),
-        ),
-    ]
-    blocks += emulation(results, *_OURS)
-    for name, run in columns.items():
-        blocks.append(who_holds(name, run, first))
-        if run.touching:
-            touches = (f"{touch} since {run.touches[touch]:.3f} s" for touch in run.touching)
-            blocks.append(Text(f"{name}: touching at the end: {', '.join(touches)}."))
-    blocks += longer(results)
-    for name, result in results.items():
-        if result.alone:
-            blocks += engine_alone(name, result)
-    blocks += differences(
-        results,
+    }
+
+
+def _course(runs: Mapping[str, Droop], title: str, slide: bool) -> Table:
+    times = max((run.time for run in runs.values()), key=len)
+    return Table(
+        ("time", *(name.replace(": ", "\n") for name in runs)),
         [
-            *[(f"{first.drives} on, worst", lambda a, b: _worst(a, b, "servos_on"))]
-            * bool(first.drives),
-            (f"{first.off()}, until one touches", lambda a, b: _worst(a, b, "servos_off", False)),
             (
-                f"{first.off()}, after that, up to {end:g} s",
-                lambda a, b: _worst(a, b, "servos_off", True),
-            ),
-            *longer_apart(results),
+                f"{time:.2f} s",
+                *(run.at(k, slide, 3 if name.endswith("on") else 2) for name, run in runs.items()),
+            )
+            for k, time in enumerate(times)
         ],
-    )
-    return page_of("You never wrote ctrl", results, blocks)
-
-
-def _question(first: Gravity) -> Question | None:
-    if first.slide or not first.servo or first.keyframe is not None:
-        return None
-    droop, began = abs(float(first.servos_on.position[-1])), float(first.servos_on.position[0])
-    if began or (np.radians(1) <= droop < np.radians(_FALLEN) and first.joint not in ARM):
-        return None
-    return Question(
-        f"nobody writes ctrl. Where is {first.joint} after {first.servos_on.time[-1]:g} s "
-        "with the servos on?",
-        ("it has fallen", "at 0, exactly", "it has sagged by less than a degree"),
-        0 if droop >= np.radians(1) else 1 if droop == 0 else 2,
-        "ctrl is zero, and zero is a target: the servo holds the joint there, with the small "
-        "error that it needs to push.",
+        title=title,
     )
 
 
-def _worst(one: Gravity, two: Gravity, which: str, touching: bool | None = None) -> str:
+def _forces(runs: Mapping[str, Droop], first: Gravity) -> Table:
+    """Each part of the forces at the end, their sum, and who carries the load."""
+
+    def row(label: str, part: str, sign: float = 1.0) -> tuple[str, ...]:
+        values = [run.forces[part] for run in runs.values()]
+        return (label, *(signed(None if v is None else sign * v) for v in values))
+
+    shown = [
+        part
+        for part in PARTS
+        if part != "equality" or any(run.forces[part] for run in runs.values())
+    ]
+    return Table(
+        ("who", *(name.replace(": ", "\n") for name in runs)),
+        [
+            row("gravity (−bias)", "bias", -1.0),
+            *(row(PARTS[part], part) for part in shown),
+            row("sum", "total"),
+            ("held by", *(run.held_by for run in runs.values())),
+        ],
+        title=f"Who holds {first.joint}, at {first.servos_on.time[-1]:g} s [{first.unit}]",
+        emphasis=frozenset({len(shown) + 1}),
+    )
+
+
+def _curves(runs: Mapping[str, Droop], first: Gravity) -> Traces:
+    """The longer runs, every 20th step of them."""
+    scale, unit = (1.0, "m") if first.slide else (np.degrees(1.0), "angle [°]")
+    timestep = first.provenance.timestep
+    return Traces(
+        f"{first.joint} with the servos off",
+        "time [s]",
+        unit,
+        {
+            name: (
+                (np.arange(len(run.path)) * timestep)[::20].tolist(),
+                (scale * run.path)[::20].tolist(),
+            )
+            for name, run in runs.items()
+        },
+    )
+
+
+def _alone(name: str, result: Gravity) -> Table:
+    return Table(
+        (f"{name} itself", result.joint, "its own motor"),
+        [
+            (a.label, position(a.position, result.slide), f"{signed(a.motor)} {result.unit}")
+            for a in result.alone
+        ],
+        title=f"The same model as {name}'s own users load it, left alone, at "
+        f"{result.alone[0].time:.3g} s",
+    )
+
+
+def _apart(runs: str, touched: bool | None, left: Gravity, right: Gravity) -> str:
     """The largest distance between two runs, before or after the first touch of either."""
-    runs = [getattr(result, which) for result in (one, two)]
-    timestep = one.provenance.timestep
-    common = min(len(run.path) for run in runs)
-    gap = np.abs(runs[0].path[:common] - runs[1].path[:common])
-    touches = [time for run in runs for time in run.touches.values()]
-    first = round(min(touches) / timestep) if touches else len(gap)
-    if touching is False:
-        gap = gap[: first + 1]
-    elif touching:
-        if first >= len(gap):
-            return "nothing touched"
-        gap = np.concatenate([np.zeros(first), gap[first:]])
-    size, row = largest(gap)
-    found = apart(size, one.slide)
-    return found if found.startswith("below") else f"{found} at {short_time(row * timestep)}"
+    pair: list[Droop] = [getattr(result, runs) for result in (left, right)]
+    common = min(len(run.path) for run in pair)
+    gaps = np.abs(pair[0].path[:common] - pair[1].path[:common])
+    timestep = left.provenance.timestep
+    touches = [time for run in pair for time in run.touches.values()]
+    first = round(min(touches) / timestep) if touches else common
+    start = first if touched else 0
+    gaps = gaps[start : first + 1 if touched is False else None]
+    if not gaps.size:
+        return "nothing touched"
+    size, row = largest(gaps)
+    text = apart(size, left.slide)
+    at = f" at {short_time((start + row) * timestep)}"
+    return text if text.startswith("below") else f"{text}{at}"
 
 
-def _introduction(first: Gravity) -> str:
-    runs = tuple(first.runs().values())
-    if not first.drives:
-        return f"Nothing drives this robot. {_watched(first)}".rstrip()
-    text = "Nobody writes ctrl in either run"
-    if first.keyframe is not None:
-        text += f"; it is what the keyframe {first.keyframe!r} says, where both runs start"
-    elif all(run.ctrl_is_zero for run in runs):
-        text += "; it is zero, at the end too"
-    if first.servo:
-        zero = "zero is a target like any other" if first.keyframe is None else "it is a target"
-        text += (
-            f". To a position servo {zero}: no value of ctrl means "
-            '"no command". The second run has the servos switched off.'
-        )
-    else:
-        text += f". No position servo drives {first.joint}."
-        if np.array_equal(first.servos_on.path, first.servos_off.path):
-            text += " To what drives this robot zero is no force: both runs are the same."
-    return f"{text} {_watched(first)}".rstrip()
-
-
-def _watched(first: Gravity) -> str:
-    """Which joint it is about, where that is not the arm's."""
-    if first.joint in ARM:
-        return ""
-    return f"Watched is {first.joint}; --joint takes another."
+def _ends_apart(label: str, left: Gravity, right: Gravity) -> str:
+    """The ends of two longer runs, as far as both go."""
+    if label not in left.longer or label not in right.longer:
+        return NONE
+    runs = left.longer[label], right.longer[label]
+    row = min(len(run.position) for run in runs) - 1
+    gap = abs(float(runs[0].position[row] - runs[1].position[row]))
+    return apart(gap, left.slide) if np.isfinite(gap) else "one diverged"

@@ -3,129 +3,139 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, DivergedError, UnsupportedError
+from ..errors import DivergedError, UnsupportedError
 from ..interface import Array, Data, Ints, JointType, Model, forward, make_data, reset, step
-from ..measures.text import NONE
-from ..page import Page, Table, Text
+from ..measures import largest, together
+from ..measures.text import apart, position, short_time
+from ..page import Table, Traces
 from ..runs.commands import hold_ctrl, is_servo, start_keyframe
 from ..runs.drive import Progress, steps_in
-from ..runs.provenance import provenance
-from ..runs.robot import ARM, command, moved_by_actuators, touching
-from ._hold import Hold, apart_freely, apart_until, at, at_end, gap, question, row, traces
-from ._robot import Coordinate, coordinate, start_line
-from ._words import differences, page_of, spans, typed, where
-from .records import Session
-from .session import CodeRun
+from ..runs.provenance import Provenance, provenance
+from ..runs.robot import command, touching, trees_of_actuators
+from ._robot import check_servos, start_line
+from .session import CodeRun, stepping_loop
+from .template import differences, where
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
 _SHOWN = 12  # numbers of qpos that fit in a line
-_NUMBERS = {1: "One number", 6: "Six numbers"}
+_THERE = np.radians(0.1)  # rad, or m
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """One command, and where the robot is then."""
-    target = _target(model, options).tolist()
-    loop, nstep = spans(model, _PRINTED, options["seconds"])
+    check_servos(model, "hold")
+    target = options["target"]
+    ctrl = hold_ctrl(model) if target is None else command(model, target, "target")
+    loop, nstep = stepping_loop(model, _PRINTED, options["seconds"])
     shown = "data.qpos" if model.nq <= _SHOWN else f"data.qpos[:{_SHOWN}]"
     return f"""\
 import statemachine as sm
 
 model = {load}
 data = sm.make_data(model)
-{start_line(model, "model")}data.ctrl[:] = {target}
+{start_line(model, "model")}data.ctrl[:] = {ctrl.tolist()}
 {loop}
     sm.step(model, data, {nstep})
     print(round(data.time, 3), {shown}.round(3))
 """
 
 
-def _target(model: Model, options: Mapping[str, Any]) -> Array:
-    """The command (nu,), each number in the unit of its actuator."""
-    usual = hold_ctrl(model)  # or says that there are no actuators
-    return usual if options["target"] is None else command(model, options["target"], "target")
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """The response to one command from the start, of the k joints that position servos drive.
+
+    Attributes:
+        target: (k,) what the servos are told [rad; of a slide, m].
+        goal: (k,) the same within ctrlrange, which is what the servos see.
+        time: (n+1,) [s].
+        qpos: (n+1, k) the joints.
+        first_contact: When the robot first touched something, or itself [s], or None.
+        touched: What touched what then; contact_steps: how many steps found a contact.
+        touching: What it touches at the end.
+        speed: (k,) velocities of the joints at the end.
+        without_contacts: (k,) where the joints end if nothing can touch; None if
+            nothing did, or the backend cannot leave contacts out.
+        joints: Names of the joints; slides: which of them are slides.
+        keyframe: Where the run starts, None for the default state.
+    """
+
+    target: Array
+    goal: Array
+    time: Array
+    qpos: Array
+    first_contact: float | None
+    touched: tuple[str, ...]
+    contact_steps: int
+    touching: tuple[str, ...]
+    speed: Array
+    without_contacts: Array | None
+    joints: tuple[str, ...]
+    slides: tuple[bool, ...]
+    keyframe: str | None
+    provenance: Provenance
+
+    @property
+    def error(self) -> Array:
+        """(n+1,) the worst joint's distance to the goal [rad; of a slide, m]."""
+        return np.abs(self.qpos - self.goal).max(axis=1)
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
     """Watch the way to the command; then the same with nothing to touch."""
     model = play.model
-    driven = _driven(model)
-    names = list(driven)
-    addresses = np.array([(at.place, at.dof) for at, _ in driven.values()], dtype=np.int64)
-    total = steps_in(model, options["seconds"])
-    robot = moved_by_actuators(model)
+    servos = np.flatnonzero(is_servo(model))
+    joints = model.actuator_jntid[servos]
+    places, total = model.jnt_qposadr[joints], steps_in(model, options["seconds"])
+    robot = trees_of_actuators(model)
     times: list[float] = []
     poses: list[Array] = []
     touches: list[tuple[float, tuple[str, ...]]] = []  # when, and what touches what
 
     def note(_model: Model, data: Data) -> None:
         times.append(data.time)
-        poses.append(data.qpos[addresses[:, 0]])
-
-    def look(_model: Model, data: Data) -> None:
-        # The contacts of a step are those of the state that it started from.
-        if found := touching(model, data.contacts, robot):
-            touches.append((times[-1], found))
+        poses.append(data.qpos[places])
         if len(times) % 100 == 0:
             progress(len(times) / total)
 
+    def look(_model: Model, data: Data) -> None:
+        # The contacts of a step are those of the state that it started from.
+        if pairs := touching(model, data.contacts, robot, each_other=True):
+            touches.append((times[-1], pairs))
+
     play(before=note, after=look)
     _, data = play.worlds[0]
+    contact_steps = len(touches)
     note(model, data)
     forward(model, data)
-    at_end = touching(model, data.contacts, robot)
-    last = [(data.time, at_end)] if at_end else []
-    first, touched = [*touches, *last, (None, ())][0]
-    ctrl = data.ctrl.copy()
-    servos = [servo for _, servo in driven.values()]
+    look(model, data)
+    first_contact, touched = touches[0] if touches else (None, ())
+    ctrl, gear = data.ctrl.copy(), model.actuator_gear[servos]
     return Hold(
-        target=_goals(model, ctrl, servos),
-        goal=_goals(model, np.clip(ctrl, *model.actuator_ctrlrange.T), servos),
+        target=ctrl[servos] / gear,
+        goal=np.clip(ctrl, *model.actuator_ctrlrange.T)[servos] / gear,
         time=np.array(times),
         qpos=np.array(poses),
-        first_contact=first,
+        first_contact=first_contact,
         touched=touched,
-        contact_steps=len(touches),
-        touching=at_end,
-        speed=data.qvel[addresses[:, 1]].copy(),
-        without_contacts=None if first is None else _freely(model, ctrl, total, addresses),
-        joints=tuple(names),
-        slides=tuple(at.slide for at, _ in driven.values()),
-        servo=bool(is_servo(model).all()),
-        actuators=model.nu,
+        contact_steps=contact_steps,
+        touching=touches[-1][1] if len(touches) > contact_steps else (),
+        speed=data.qvel[model.jnt_dofadr[joints]].copy(),
+        without_contacts=None if not touches else _freely(model, ctrl, total, places),
+        joints=tuple(model.joint_names[joint] or f"joint {joint}" for joint in joints),
+        slides=tuple((model.jnt_type[joints] == JointType.SLIDE).tolist()),
         keyframe=start_keyframe(model),
         provenance=provenance(model),
     )
 
 
-def _driven(model: Model) -> dict[str, tuple[Coordinate, int | None]]:
-    """The joints to look at by name, each with the number of the servo on it."""
-    servos = is_servo(model)
-    found: dict[str, tuple[Coordinate, int | None]] = {}
-    for i, joint in enumerate(model.actuator_jntid.tolist()):
-        name = model.joint_names[joint] if joint >= 0 else ""
-        if name and (servos[i] or name not in found):
-            found[name] = coordinate(model, name), i if servos[i] else None
-    if not found:  # they act through tendons, at sites or on bodies
-        kinds = zip(model.joint_names, model.jnt_type.tolist(), strict=True)
-        names = [name for name, kind in kinds if name and kind != int(JointType.BALL)]
-        found = {name: (coordinate(model, name), None) for name in names}
-    if not found:
-        raise BadInputError(f"{model.path.name} names no joint that could be looked at")
-    return found
-
-
-def _goals(model: Model, ctrl: Array, servos: list[int | None]) -> Array:
-    """What ctrl says to each joint; NaN where it is no target."""
-    return np.array([np.nan if i is None else ctrl[i] / model.actuator_gear[i] for i in servos])
-
-
-def _freely(model: Model, ctrl: Array, steps: int, addresses: Ints) -> Array | None:
-    """Where the actuated joints end if nothing can touch anything."""
+def _freely(model: Model, ctrl: Array, steps: int, places: Ints) -> Array | None:
+    """Where the joints end if nothing can touch anything."""
     try:
         alone = model.replace(contacts=False)
     except UnsupportedError:
@@ -137,86 +147,121 @@ def _freely(model: Model, ctrl: Array, steps: int, addresses: Ints) -> Array | N
             step(alone, data, steps)
         except DivergedError:
             return None
-        return data.qpos[addresses[:, 0]].copy()
+        return data.qpos[places].copy()
 
 
-def page(results: Mapping[str, Hold], session: Session) -> Page:
-    """Error over time, pose at the end, what is in the way."""
+def slots(result: Hold) -> dict[str, Any]:
+    """What the page says."""
+    gaps, free = np.abs(result.qpos[-1] - result.goal), result.without_contacts
+    away, worst = int((gaps > _THERE).sum()), largest(gaps)[1]
+    speed, fastest = largest(np.abs(result.speed))
+    free_gaps = gaps if free is None else np.abs(free - result.goal)
+    return {
+        "right": 0 if away == 0 else 2 if away == len(gaps) else 1,
+        "within": position(_THERE, result.slides[worst]),
+        "seconds": f"{result.time[-1]:g} s",
+        "away": f"{away} of {len(gaps)}",
+        "worst": _farthest(result, gaps),
+        "fastest": result.joints[fastest],
+        "speed": f"{position(speed, result.slides[fastest], 3)}/s",
+        "touches": result.first_contact is not None,
+        "touched": together(result.touched),
+        "touched_at": "" if result.first_contact is None else short_time(result.first_contact),
+        "touching": together(result.touching) or "nothing",
+        "contact_steps": f"{result.contact_steps} of {len(result.time) - 1} steps",
+        "free": free is not None,
+        "free_worst": _farthest(result, free_gaps),
+    }
+
+
+def _farthest(result: Hold, gaps: Array) -> str:
+    gap, joint = largest(gaps)
+    return f"{result.joints[joint]}, by {position(gap, result.slides[joint])}"
+
+
+def tables(results: Mapping[str, Hold]) -> dict[str, Any]:
+    """The worst joint over time, the pose at the end, and the way of each joint."""
     first = next(iter(results.values()))
     end = float(first.time[-1])
-    times = [t for t in _TIMES if t < end - 1e-6] + [end]
-    text = (
-        "ctrl is how you command this robot: one number for each actuator, in the order of "
-        "model.actuator_names."
-    )
-    moves = "arm follows" if first.joints == ARM else "joint follows"
-    law = "with kp·(ctrl − q) − kv·q̇, within its force limit, and the"
-    if first.servo:
-        text += (
-            f" Each is a position servo: it pushes {law} {moves}. A script, a joystick and a "
-            "trained policy all speak to the robot through this array."
-        )
-    elif first.told():
-        text += (
-            f" {len(first.told())} of {first.actuators} are position servos: each pushes {law} "
-            f"{moves}. To the others a number is no place: a motor takes it as a force, and has "
-            "no goal."
-        )
-    else:
-        text += (
-            " None of them is a position servo: a number here is no place to go to. A motor takes "
-            "it as a force, and has no goal; what keeps a joint where it is would be your "
-            "controller."
-        )
-    if first.keyframe is not None:
-        text += f" The run starts at the keyframe {first.keyframe!r}."
-    blocks: list[Any] = [
-        Text(text),
-        *typed(session, question(first)),
+    clipped = not np.array_equal(first.target, first.goal)
+
+    poses = [first.target] * clipped + [first.goal, *(r.qpos[-1] for r in results.values())]
+    ends = [
+        (joint, *(position(float(pose[k]), first.slides[k]) for pose in poses))
+        for k, joint in enumerate(first.joints)
     ]
-    for k in (k for k in first.told() if first.goal[k] != first.target[k]):
-        blocks.append(
-            Text(
-                f"{first.joints[k]} was asked for {at(first, first.target[k], k)}, beyond its "
-                f"range: the servo takes {at(first, first.goal[k], k)} for it."
-            )
-        )
-    told = first.told()
-    if told:
-        blocks.append(
-            Table(
-                ("time", *results),
-                [row(results, time) for time in times],
-                title="The worst joint on the way: how far from its goal",
-            )
-        )
-    begins = len(told) < len(first.joints)  # of what has no goal the start is of interest
-    blocks.append(
-        Table(
-            ("joint", *["start"] * begins, *["goal"] * bool(told), *results),
-            [
-                (
-                    joint,
-                    *[at(first, first.qpos[0, k], k)] * begins,
-                    *[at(first, first.goal[k], k) if k in told else NONE] * bool(told),
-                    *(at(result, result.qpos[-1, k], k) for result in results.values()),
-                )
-                for k, joint in enumerate(first.joints)
-            ],
+    return {
+        "way": Table(
+            ("time", *results),
+            [_row(results, time) for time in [*(t for t in _TIMES if t < end - 1e-6), end]],
+            title="The worst joint on the way: how far from its goal",
+        ),
+        "pose": Table(
+            ("joint", *["asked for"] * clipped, "goal", *results),
+            ends,
             title=f"Where it is at {end:g} s",
-        )
-    )
-    for name, result in results.items():
-        blocks.append(Text(f"{where(results, name)}{at_end(result)}"))
-    blocks += traces(results)
-    blocks += differences(
-        results,
-        [
-            ("any joint, until one touches", lambda a, b: apart_until(a, b, False)),
-            ("any joint, after that", lambda a, b: apart_until(a, b, True)),
-            ("any joint, at the end", lambda a, b: gap(a, np.abs(a.qpos[-1] - b.qpos[-1]))),
-            ("at the end, contacts left out", apart_freely),
+        ),
+        "curves": [
+            Traces("The way to the goal", "time [s]", f"distance to the goal [{unit}]", curves)
+            for slide, unit, scale in ((False, "°", np.degrees(1.0)), (True, "mm", 1e3))
+            if (curves := _curves(results, slide, scale))
         ],
-    )
-    numbers = _NUMBERS.get(first.actuators, f"{first.actuators} numbers")
-    return page_of(f"{numbers} in", results, blocks)
+        "differences": differences(
+            results,
+            {
+                "any joint, until one touches": lambda a, b: _apart(a, b, 0, _touch(a, b)),
+                "any joint, after that": lambda a, b: _apart(a, b, _touch(a, b), None),
+                "any joint, at the end": lambda a, b: _apart(a, b, -1, None),
+                "at the end, contacts left out": _apart_freely,
+            },
+        ),
+    }
+
+
+def _row(results: Mapping[str, Hold], time: float) -> tuple[str, ...]:
+    cells = [f"{time:.3f} s"]
+    for result in results.values():
+        k = int(np.argmin(np.abs(result.time - time)))
+        gap, joint = largest(np.abs(result.qpos[k] - result.goal))
+        cells.append(f"{position(gap, result.slides[joint], 3)}  {result.joints[joint]}")
+    return tuple(cells)
+
+
+def _curves(results: Mapping[str, Hold], slide: bool, scale: float) -> dict[str, Any]:
+    """How far each joint is from its goal; those that are slides, or the others."""
+    return {
+        f"{where(results, name)}{joint}": (
+            result.time.tolist(),
+            (scale * (result.qpos[:, k] - result.goal[k])).tolist(),
+        )
+        for name, result in results.items()
+        for k, joint in enumerate(result.joints)
+        if result.slides[k] is slide
+    }
+
+
+def _touch(left: Hold, right: Hold) -> int:
+    """The row after that in which one of two runs first touches something."""
+    times = [run.first_contact for run in (left, right) if run.first_contact is not None]
+    return round(min(times) / left.provenance.timestep) + 1 if times else len(left.time)
+
+
+def _apart(left: Hold, right: Hold, start: int, stop: int | None) -> str:
+    """The largest gap of a joint in some rows of two runs, whose it is, and when."""
+    gaps = np.abs(left.qpos - right.qpos)[start:stop]
+    if not gaps.size:
+        return "nothing touched"
+    size, place = largest(gaps.ravel())
+    row, joint = divmod(place, gaps.shape[1])
+    time = short_time(left.time[start:stop][row])
+    return _gap(left, size, joint, f" at {time}")
+
+
+def _apart_freely(left: Hold, right: Hold) -> str:
+    ends = [r.qpos[-1] if r.without_contacts is None else r.without_contacts for r in (left, right)]
+    return _gap(left, *largest(np.abs(ends[0] - ends[1])))
+
+
+def _gap(result: Hold, size: float, joint: int, at: str = "") -> str:
+    text = apart(size, result.slides[joint])
+    return text if text.startswith("below") else f"{text}  {result.joints[joint]}{at}"

@@ -12,17 +12,15 @@ import numpy as np
 
 from ..backends import load
 from ..errors import BadInputError
-from ..interface import Array, Model, make_data, step
+from ..interface import Array, Data, Model, make_data, step
 from ..interface.checks import as_count
 from ..measures.text import count, duration
-from ..page import Page, Question, Table, Text, Verdict
+from ..page import Table
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import Provenance, provenance
-from ._robot import is_of_the_arm
-from ._words import differences, page_of, sentence, typed, where, words
 from .in_turns import in_turns
-from .records import Session
 from .session import CodeRun
+from .template import differences
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 _TIMES = 5  # repetitions; the median counts
@@ -37,11 +35,11 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
 import statemachine as sm
 
 model = {load}
-one = sm.make_data(model)
-two = sm.make_data(model)
-sm.step(model, one, 100)
+data = sm.make_data(model)
+other = sm.make_data(model)
+sm.step(model, data, 100)
 print(model)
-print(round(one.time, 6), round(two.time, 6))
+print(round(data.time, 6), round(other.time, 6))
 """
 
 
@@ -64,7 +62,6 @@ class Objects:
         nstep: Steps of each.
         alone: Whether each ended bit for bit where it ends when it runs alone.
         different: How many of the worlds' ends are different.
-        commanded: Whether each had a ctrl of its own; a model may have no actuators.
         arrays: How many arrays the Model and the engine's own model hold; constant:
             whether all of them are unchanged.
         shared: Whether each Data's engine object names the Model's as its own.
@@ -77,7 +74,6 @@ class Objects:
     nstep: int
     alone: bool
     different: int
-    commanded: bool
     arrays: int
     constant: bool
     shared: bool
@@ -94,17 +90,19 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
     model, worlds = play.model, _worlds(options)
     before = _arrays(model)
     play()
-    made = [data for _, data in play.worlds]
+    extra: list[Data] = []
+    (_, data), (_, other) = play.worlds
     ways: dict[str, Callable[[], object]] = {
         "load": lambda: load(model.path, backend=model.backend),
-        "make": lambda: made.append(make_data(model)),
-        "step": lambda: step(model, made[0], _STEPS),
+        "make": lambda: extra.append(make_data(model)),
+        "step": lambda: step(model, data, _STEPS),
     }
     walls = in_turns(ways, _TIMES, part_of(progress, 0.0, 0.5))
     costs = {name: statistics.median(times) for name, times in walls.items()}
-    shared = all(getattr(data.raw, "model", None) is model.raw for data in made)
-    for data in made[len(play.worlds) :]:
-        data.close()
+    several = (data, other, *extra)
+    shared = all(getattr(each.raw, "model", None) is model.raw for each in several)
+    for each in extra:
+        each.close()
     shares = [part_of(progress, 0.5 + 0.25 * k / worlds, 0.25 / worlds) for k in range(worlds)]
     singly = [_in_turn(model, [k], worlds, shares[k])[0] for k in range(worlds)]
     together = _in_turn(model, range(worlds), worlds, part_of(progress, 0.75, 0.25))
@@ -115,9 +113,8 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
         stepping=costs["step"] / _STEPS,
         worlds=worlds,
         nstep=_STEPS,
-        alone=all(np.array_equal(a, b) for a, b in zip(singly, together, strict=True)),
+        alone=all(map(np.array_equal, singly, together)),
         different=len({end.tobytes() for end in together}),
-        commanded=bool(model.nu),
         arrays=len(before),
         constant=before == after,
         shared=shared,
@@ -145,97 +142,38 @@ def _in_turn(model: Model, numbers: Sequence[int], count: int, progress: Progres
 
 def _arrays(model: Model) -> dict[str, bytes]:
     """The bytes of every array of a Model, and of the engine's own model."""
-    found = {name: getattr(model, name) for name in vars(model)}
-    for name in dir(model.raw):
-        if not name.startswith("_"):
-            found[f"raw.{name}"] = getattr(model.raw, name)
-    return {name: each.tobytes() for name, each in found.items() if isinstance(each, np.ndarray)}
+    fields = {name: getattr(model, name) for name in vars(model)}
+    raw = [name for name in dir(model.raw) if not name.startswith("_")]
+    fields |= {f"raw.{name}": getattr(model.raw, name) for name in raw}
+    return {name: each.tobytes() for name, each in fields.items() if isinstance(each, np.ndarray)}
 
 
-def page(results: Mapping[str, Objects], session: Session) -> Page:
-    """What costs, what is shared, what goes its own way."""
-    first = next(iter(results.values()))
-    stepped = first.provenance.timestep * 100
-    blocks: list[Any] = [
-        Text(words(is_of_the_arm(results))),
-        Text(
-            "Below, a robot's file is loaded once, into a Model. Two Data are made of it, and one "
-            "of them is advanced by 100 steps. What Model and Data are is said after that."
-        ),
-        *typed(
-            session,
-            Question(
-                "only `one` was stepped. What is two.time?",
-                ("0 s", f"{stepped:g} s, like one.time", "an error: a Model has one Data"),
-                0 if first.alone else 1,
-                f"Each of {first.worlds} Data, stepped in turn, ended where it ends alone.",
-            ),
-        ),
-        Text(
-            "A Model is everything that never changes while a simulation runs: shapes, masses, "
-            "limits, gains of the servos, the length of a timestep. A Data is everything that "
-            "does change: positions, velocities, your command, the time, and what follows from "
-            "them. step reads both and overwrites the Data with the next state. That is all; "
-            "nothing runs in the background."
-        ),
-        Table(
-            ("", *results),
-            [
-                ("load: the file, once", *(duration(r.loading) for r in results.values())),
-                ("make_data", *(duration(r.making) for r in results.values())),
-                ("step: one timestep", *(duration(r.stepping) for r in results.values())),
-                ("a load costs as much as", *(f"{r.ratio:,.0f} steps" for r in results.values())),
-            ],
-            title="What each costs on this machine, now (median of five)",
-        ),
-    ]
-    for name, result in results.items():
-        prefix = where(results, name)
-        cheap = result.making < result.loading / _CHEAP
-        blocks += [
-            sentence(
-                results,
-                name,
-                "loading is the slow part, and it is done once. Another Data is cheap, so many "
-                "worlds can be simulated at the same time."
-                if cheap
-                else "here a Data costs nearly as much as a load, because the slow part is done "
-                "again for each Data.",
-            ),
-            Verdict(
-                f"{prefix}{result.worlds} Data of one Model took {count(result.nstep, 'step')} in "
-                f"turn{_commands(result)}. Each ended in the same bits as when it runs alone",
-                result.alone,
-            ),
-            Verdict(
-                f"{prefix}none of the Model's {result.arrays} arrays has changed, those of the "
-                "engine's own model included",
-                result.constant,
-            ),
-            sentence(
-                results,
-                name,
-                "all these Data refer to one and the same model of the engine; it is in memory "
-                "once."
-                if result.shared
-                else "the engine itself has no Model and no Data. This interface makes the "
-                "difference, and loads a world of its own for each Data.",
-            ),
-        ]
-    blocks += differences(
-        results,
+def slots(result: Objects) -> dict[str, Any]:
+    """What the page says."""
+    return {
+        "right": 0 if result.alone else 1,
+        "stepped": f"{100 * result.provenance.timestep:g} s",
+        "steps": count(result.nstep, "step"),
+        "cheap": result.making < result.loading / _CHEAP,
+    }
+
+
+def tables(results: Mapping[str, Objects]) -> dict[str, Any]:
+    """What each part costs."""
+    columns = results.values()
+    costs = Table(
+        ("", *results),
         [
-            ("a load takes", lambda a, b: f"{b.loading / a.loading:.1f} ×"),
-            ("a Data takes", lambda a, b: f"{b.making / a.making:.1f} ×"),
-            ("a step takes", lambda a, b: f"{b.stepping / a.stepping:.1f} ×"),
+            ("load: the file, once", *(duration(r.loading) for r in columns)),
+            ("make_data", *(duration(r.making) for r in columns)),
+            ("step: one timestep", *(duration(r.stepping) for r in columns)),
+            ("a load costs as much as", *(f"{r.ratio:,.0f} steps" for r in columns)),
         ],
+        title="What each costs on this machine, now (median of five)",
     )
-    return page_of("Two objects and one function", results, blocks)
-
-
-def _commands(result: Objects) -> str:
-    if not result.commanded:
-        return ""
-    ends = result.different
-    apart = "no two of them ended alike" if ends == result.worlds else f"they had {ends} ends"
-    return f", each with its own ctrl, and {apart}"
+    against = {
+        "a load takes": lambda a, b: f"{b.loading / a.loading:.1f} ×",
+        "a Data takes": lambda a, b: f"{b.making / a.making:.1f} ×",
+        "a step takes": lambda a, b: f"{b.stepping / a.stepping:.1f} ×",
+    }
+    return {"costs": costs, "differences": differences(results, against)}

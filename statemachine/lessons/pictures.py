@@ -1,4 +1,4 @@
-"""What a reader sees of the robot at each station: one pose or a short run, on MuJoCo.
+"""What a reader sees of the robot in each lesson: one pose or a short run, on MuJoCo.
 
 Nothing is run before a picture is drawn: a terminal shows only how to look at the same in
 a browser.

@@ -1,8 +1,7 @@
-"""What a lesson is: its entry in the table, and the code that was run for it."""
+"""What a lesson is: its entry in the table, and its options."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,23 +30,15 @@ class Option:
 
 @dataclass(frozen=True)
 class Lesson:
-    """An entry of the table of lessons."""
+    """An entry of the table of lessons; `on_path`: whether the guided path has it."""
 
     name: str
     question: str
     model: str
     options: tuple[Option, ...] = ()
-    station: bool = True  # of the path
+    on_path: bool = True
 
     @property
     def whole(self) -> dict[str, Any]:
         """The options that show all of it."""
         return {option.key: True for option in self.options if option.more}
-
-
-@dataclass(frozen=True)
-class Session:
-    """Code as one types it, for the first of the engines, and what it printed on each."""
-
-    code: str
-    printed: Mapping[str, str]

@@ -14,17 +14,15 @@ from ..errors import UnsupportedError, check_name
 from ..interface import Array, Ints, JointType, Model, get_state
 from ..interface.checks import as_count
 from ..measures import largest
-from ..measures.text import count, degrees, millimetres, vector
-from ..page import Page, Question, Table, Text, Verdict
+from ..measures.text import count, degrees, millimetres
+from ..page import Table
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import Provenance, provenance
 from ..runs.robot import command, is_the_arm
-from ._broken import BREAKS, BROKEN, Broken, Paths, course, growth, in_short, traces
-from ._robot import is_of_the_arm
-from ._ways import of_its_own, through_us, ways_back
-from ._words import differences, page_of, sentence, typed, where
-from .records import Session
+from ._restore import of_its_own, through_us, ways_back
+from ._two_runs import BREAKS, Broken, Paths, broken_table, growth
 from .session import CodeRun
+from .template import differences
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -54,7 +52,7 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     }[options["break"]]
     lines = "\n".join(f"    {line}" for line in body)
     start = "    sm.reset(model, data, keyframe=0)\n    data.time = 0\n" if model.keyframes else ""
-    argument, first, second = ("broken", "0", "1") if options["break"] else ("", "", "")
+    argument, *given = ("broken", "0", "1") if options["break"] else ("", "", "")
     return f"""\
 import numpy as np
 import statemachine as sm
@@ -66,8 +64,8 @@ def run({argument}):
 {start}{lines}
     return data.qpos.copy()
 
-one, two = run({first}), run({second})
-print(np.array_equal(one, two), abs(one - two).max())
+first, second = run({given[0]}), run({given[1]})
+print(np.array_equal(first, second), abs(first - second).max())
 """
 
 
@@ -183,183 +181,88 @@ def _finer(model: Model, options: Mapping[str, Any], end: Array) -> Finer | None
     twice = {**options, "steps": 2 * options["steps"]}
     with CodeRun(code(finer, twice, "sm.load()"), finer) as play:
         ends = play()
-    apart = float(np.abs(ends["one"] - end).max())
-    return Finer(finer.timestep, bool(np.array_equal(ends["one"], ends["two"])), apart)
+    apart = float(np.abs(ends["first"] - end).max())
+    return Finer(finer.timestep, bool(np.array_equal(ends["first"], ends["second"])), apart)
 
 
-def page(results: Mapping[str, Replay], session: Session) -> Page:
-    """Equal or not, and what touched on the way."""
-    first = next(iter(results.values()))
-    nstep = len(first.contacts)
-    blocks: list[Any] = [
-        Text(
-            f"Two runs of {count(nstep, 'step')}, each in a new Data: {_start(first)}, one fixed "
-            "command. Equal means np.array_equal on all of qpos: every bit, not nearly. "
-            "Differences are the largest over all numbers of qpos: radians, metres and parts of a "
-            "quaternion."
+def slots(result: Replay) -> dict[str, Any]:
+    """What the page says."""
+    (peak, row), end = largest(result.difference), float(result.difference[-1])
+    steps, finer = len(result.contacts), result.finer
+    # Grown to the end, shrunk, or stayed near its peak.
+    course = 1 if end < peak / 3 else 0 if row == steps else 2
+    return {
+        "steps": count(steps, "step"),
+        "right": course if result.broken_by else 0 if result.identical else None,
+        "start": f'keyframe 0, "{result.keyframe}",' if result.keyframe else "the default state",
+        "peak": f"{peak:.1e}",
+        "peak_step": row,
+        "end": f"{end:.1e}",
+        "shrinks": end < peak / 10,
+        "held_in_state": ", ".join(result.state),
+        "truth": bool(finer and finer.identical and finer.difference > 0),
+        "finer_timestep": f"{finer.timestep * 1e3:g} ms" if finer else "",
+        "finer_off": f"{finer.difference:.1e}" if finer else "",
+    }
+
+
+def tables(results: Mapping[str, Replay]) -> dict[str, Any]:
+    """Equal or not, what touched on the way, and the ways back."""
+    first, columns = next(iter(results.values())), results.values()
+    gaps = {name: result.difference for name, result in results.items()}
+    bodies = {name: result.apart for name, result in results.items()}
+    outcome = [
+        ("np.array_equal", *(str(r.identical) for r in columns)),
+        ("np.allclose", *(str(r.close) for r in columns)),
+        ("difference at the end", *(f"{r.difference[-1]:.1e}" for r in columns)),
+        ("largest on the way", *(f"{r.difference.max():.1e}" for r in columns)),
+        ("a hinge moves by", *(degrees(r.travel, 1) for r in columns)),
+    ]
+    return {
+        "outcome": Table(("", *results), outcome, title="Two runs compared"),
+        "touched": _touched(results),
+        "growth": growth(gaps, bodies) if first.broken_by else [],
+        "ways": through_us({name: result.ways for name, result in results.items()})
+        if first.ways
+        else [],
+        "own": of_its_own({name: result.own_ways for name, result in results.items()}),
+        "breaks": broken_table({name: result.breaks for name, result in results.items()}),
+        "differences": differences(
+            results,
+            {
+                "hinges at the end, worst": _hinges_apart,
+                "free body at the end": _bodies_apart,
+                "contacts a step, on average": _contacts_apart,
+            },
         ),
-        *typed(session, _question(first)),
-    ]
-    if first.broken_by:
-        blocks.append(Text(BROKEN[first.broken_by]))
-    blocks.append(_outcome(results))
-    blocks.append(_contacts(results))
-    if first.broken_by:
-        gaps = {name: result.difference for name, result in results.items()}
-        blocks.append(growth(gaps, {name: result.apart for name, result in results.items()}))
-        blocks.append(traces(gaps))
-    for name, result in results.items():
-        blocks.append(_finding(where(results, name), result))
-    if not first.broken_by:
-        blocks.append(through_us({name: result.ways for name, result in results.items()}))
-        for name, result in results.items():
-            blocks.append(
-                sentence(
-                    results,
-                    name,
-                    "get_state returns a State, and set_state takes one. It holds what decides "
-                    f"the future, as far as the engine shows it: {', '.join(result.state)}.",
-                )
-            )
-        for name, result in results.items():
-            blocks += of_its_own(name, result.own_ways)
-        if all(result.identical for result in results.values()):
-            blocks.append(
-                Text(
-                    "So what a robot does can have a regression test: fix the start and the number "
-                    "of steps, run your controller, and compare the end. The test fails when "
-                    "something has changed, and not by chance."
-                )
-            )
-        blocks += in_short({name: result.breaks for name, result in results.items()})
-        for name, result in results.items():
-            blocks += _truth(where(results, name), result)
-    blocks += differences(
-        results,
-        [
-            ("hinges at the end, worst", _joints_apart),
-            ("free body at the end", _bodies_apart),
-            ("contacts a step, on average", _contacts_apart),
-        ],
-    )
-    return page_of("The same start, the same commands", results, blocks)
+    }
 
 
-def _start(first: Replay) -> str:
-    if first.keyframe is None:
-        return "from the default state"
-    return f"reset to keyframe 0 ({first.keyframe!r}), time set to zero"
-
-
-def _question(first: Replay) -> Question:
-    if first.broken_by:
-        return Question(
-            "one step differs. What becomes of the difference by the end?",
-            ("it grows and grows", "it shrinks again", "it stays as large as its peak"),
-            course(first.difference),
-            f"It peaks at {first.difference.max():.1e} and ends at {first.difference[-1]:.1e}.",
-        )
-    return Question(
-        f"how large is the largest difference after {count(len(first.contacts), 'step')}?",
-        ("0.0, to the last bit", "about 1e-16, rounding", "it depends on the contacts"),
-        0 if first.identical else None,
-        "The same state and the same commands give the same next state, bit by bit.",
-    )
-
-
-def _truth(prefix: str, result: Replay) -> list[Any]:
-    """Determinism is not truth."""
-    finer = result.finer
-    if finer is None or not finer.identical or finer.difference == 0:
-        return []
-    return [
-        Verdict(
-            f"{prefix}reproducible does not mean right. With half the timestep, "
-            f"{finer.timestep * 1e3:g} ms, two runs are bit for bit the same, too; but they end "
-            f"elsewhere, {finer.difference:.1e} away",
-            True,
-        )
-    ]
-
-
-def _joints_apart(one: Replay, two: Replay) -> str:
-    gap = np.abs(one.qpos - two.qpos)[list(one.hinges)]
-    return degrees(float(gap.max()), 3) if len(gap) else "there are none"
-
-
-def _bodies_apart(one: Replay, two: Replay) -> str:
-    if one.free is None:
-        return "there is none"
-    return millimetres(float(np.linalg.norm(one.qpos[list(one.free)] - two.qpos[list(one.free)])))
-
-
-def _contacts_apart(one: Replay, two: Replay) -> str:
-    return f"{two.contacts.mean():.1f} instead of {one.contacts.mean():.1f}"
-
-
-def _outcome(results: Mapping[str, Replay]) -> Table:
-    first = next(iter(results.values()))
-    moves = "the arm moves by" if is_of_the_arm(results) else "a hinge moves by"
-    return Table(
-        ("", *results),
-        [
-            ("np.array_equal", *(str(r.identical) for r in results.values())),
-            ("np.allclose", *(str(r.close) for r in results.values())),
-            ("difference at the end", *(f"{r.difference[-1]:.1e}" for r in results.values())),
-            ("largest on the way", *(f"{r.difference.max():.1e}" for r in results.values())),
-            *[(moves, *(degrees(r.travel, 1) for r in results.values()))] * bool(first.hinges),
-            # Two of them do not fit side by side; how far they are apart stands at the end.
-            *(("qpos[:6] at the end", vector(r.qpos[:6], 3)) for r in _alone(results)),
-        ],
-        title="Two runs compared",
-    )
-
-
-def _alone(results: Mapping[str, Replay]) -> list[Replay]:
-    """The only result, or none where there are several."""
-    return list(results.values()) if len(results) == 1 else []
-
-
-def _contacts(results: Mapping[str, Replay]) -> Table:
+def _touched(results: Mapping[str, Replay]) -> Table:
+    columns = results.values()
+    pairs = dict.fromkeys(pair for r in columns for pair in r.pairs)
     rows = [
-        (
-            "contacts a step",
-            *(
-                f"{r.contacts.min()} to {r.contacts.max()}, {r.contacts.mean():.1f} on average"
-                if r.contacts.min() < r.contacts.max()
-                else f"{r.contacts.min()} in every step"
-                for r in results.values()
-            ),
-        )
+        ("fewest contacts in a step", *(str(r.contacts.min()) for r in columns)),
+        ("most", *(str(r.contacts.max()) for r in columns)),
+        ("on average", *(f"{r.contacts.mean():.1f}" for r in columns)),
+        *(
+            (pair, *(f"{r.pairs.get(pair, 0)} of {len(r.contacts)} steps" for r in columns))
+            for pair in pairs
+        ),
     ]
-    pairs = dict.fromkeys(pair for r in results.values() for pair in r.pairs)
-    for pair in pairs:
-        rows.append(
-            (
-                pair,
-                *(f"{r.pairs.get(pair, 0)} of {len(r.contacts)} steps" for r in results.values()),
-            )
-        )
     return Table(("", *results), rows, title="What touched, in the first run")
 
 
-def _finding(prefix: str, result: Replay) -> Text | Verdict:
-    steps = count(len(result.contacts), "step")
-    if result.identical and not result.broken_by:
-        return Verdict(
-            f"{prefix}bit for bit the same after {steps}: largest difference "
-            f"{result.difference.max():.1e}",
-            True,
-        )
-    if result.identical:
-        return Text(f"{prefix}The two runs are the same all the same: the break changed nothing.")
-    peak, row = largest(result.difference)
-    text = (
-        f"{prefix}not the same: the difference peaks at {peak:.1e} after step "
-        f"{row} and is {result.difference[-1]:.1e} at the end"
-    )
-    if result.difference[-1] < peak / 10:
-        text += ". A small divergence need not grow: here it shrinks again"
-    if result.close:
-        text += "; np.allclose would call the two runs equal, np.array_equal does not"
-    return Verdict(text, result.broken_by is not None)
+def _hinges_apart(left: Replay, right: Replay) -> str:
+    gaps = np.abs(left.qpos - right.qpos)[list(left.hinges)]
+    return degrees(float(gaps.max()), 3) if len(gaps) else "there are none"
+
+
+def _bodies_apart(left: Replay, right: Replay) -> str:
+    if left.free is None:
+        return "there is none"
+    return millimetres(float(np.linalg.norm((left.qpos - right.qpos)[list(left.free)])))
+
+
+def _contacts_apart(left: Replay, right: Replay) -> str:
+    return f"{right.contacts.mean():.1f} instead of {left.contacts.mean():.1f}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -12,14 +11,13 @@ import numpy as np
 
 from ..interface import INPUTS, Data, JointType, Model, forward, make_data, reset, step
 from ..measures.text import count, millimetres
-from ..page import Page, Question, Table, Text, Verdict
+from ..page import Table
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
 from ..runs.robot import body_pairs, carried_by, moved_by_actuators
 from ._robot import read_derived, read_stored
-from ._words import differences, emulation, page_of, sentence, typed, where
-from .records import Session
 from .session import CodeRun
+from .template import differences, emulated
 
 _STEPS = 100  # before the reset, and after it
 _WATCHED = 600  # steps under the keyframe's own ctrl
@@ -54,7 +52,7 @@ class KeyframeScene:
         contacts: How many contacts each pair of bodies has at the keyframe.
         on_robot, on_world: How many of the body's are with the robot, with the world.
         nstep: Steps taken then, under the keyframe's ctrl.
-        both: In how many of them the robot touched the body; world: the world did.
+        robot_steps: In how many of them the robot touched the body; world_steps: the world did.
         rise: How much the body's origin rose in them [m].
     """
 
@@ -73,12 +71,8 @@ class KeyframeScene:
     @property
     def held(self) -> bool:
         """Whether the robot alone holds the body, from the first step to the last."""
-        return (
-            self.on_robot > 0
-            and self.on_world == 0
-            and self.robot_steps == self.nstep
-            and self.world_steps == 0
-        )
+        alone = self.on_world == self.world_steps == 0
+        return alone and self.on_robot > 0 and self.robot_steps == self.nstep
 
 
 @dataclass(frozen=True)
@@ -148,24 +142,21 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
 
 def _scene(model: Model, data: Data, key: int) -> KeyframeScene:
     """What a Data that was just reset to a keyframe shows, and what becomes of it."""
-    frame = model.keyframes[key]
-    free = np.flatnonzero(model.jnt_type == int(JointType.FREE))
-    body = int(model.jnt_bodyid[free[0]]) if len(free) else None
-    height = int(model.jnt_qposadr[free[0]]) + 2 if len(free) else None
+    frame, now = model.keyframes[key], read_stored(data)
     wanted = {name: getattr(frame, name).tobytes() for name in INPUTS}
     wanted["time"] = np.array(frame.time).tobytes()
-    now = read_stored(data)
-    began = 0.0 if height is None else float(data.qpos[height])
+    free = np.flatnonzero(model.jnt_type == int(JointType.FREE))
+    body = int(model.jnt_bodyid[free[0]]) if len(free) else None
+    height = model.jnt_qposadr[free[:1]] + 2
+    start = data.qpos[height].sum()  # 0 without a free body
     forward(model, data)
-    contacts = body_pairs(model, data.contacts)
-    on_robot, on_world = _who(model, data, body)
-    steps: Counter[str] = Counter()
+    contacts, (on_robot, on_world) = body_pairs(model, data.contacts), _touches(model, data, body)
+    robot_steps = world_steps = 0
     for _ in range(_WATCHED):
         step(model, data)
-        robot, world = _who(model, data, body)
-        steps["robot"] += robot > 0
-        steps["world"] += world > 0
-    ended = 0.0 if height is None else float(data.qpos[height])
+        robot, world = _touches(model, data, body)
+        robot_steps += robot > 0
+        world_steps += world > 0
     return KeyframeScene(
         name=frame.name,
         time=frame.time,
@@ -175,94 +166,69 @@ def _scene(model: Model, data: Data, key: int) -> KeyframeScene:
         on_robot=on_robot,
         on_world=on_world,
         nstep=_WATCHED,
-        robot_steps=steps["robot"],
-        world_steps=steps["world"],
-        rise=ended - began,
+        robot_steps=robot_steps,
+        world_steps=world_steps,
+        rise=float(data.qpos[height].sum() - start),
     )
 
 
-def _who(model: Model, data: Data, body: int | None) -> tuple[int, int]:
+def _touches(model: Model, data: Data, body: int | None) -> tuple[int, int]:
     """How many contacts a body has with the robot, and with what does not move."""
-    if body is None:
-        return 0, 0
-    robot = moved_by_actuators(model)
-    static = frozenset(range(model.nbody)) - carried_by(model, set(model.jnt_bodyid.tolist()))
-    on_robot = on_world = 0
-    for pair in data.contacts.geom.tolist():
-        bodies = {int(model.geom_bodyid[geom]) for geom in pair}
-        if body in bodies:
-            on_robot += bool(bodies & robot)
-            on_world += bool(bodies & static)
-    return on_robot, on_world
+    robot, moving = moved_by_actuators(model), carried_by(model, set(model.jnt_bodyid.tolist()))
+    pairs = [set(pair) for pair in model.geom_bodyid[data.contacts.geom].tolist()]
+    others = [pair - {body} for pair in pairs if body in pair]
+    return sum(bool(pair & robot) for pair in others), sum(not pair <= moving for pair in others)
 
 
-def page(results: Mapping[str, Reset], session: Session) -> Page:
-    """What a reset takes back, and what the keyframes show."""
+def slots(result: Reset) -> dict[str, Any]:
+    """What the page says."""
+    frame = result.scenes[0] if result.scenes else None
+    public = result.provenance.model_file.startswith("robotstudio_so101")
+    return {
+        "simulated": f"{result.simulated:g} s",
+        "steps": count(result.steps, "step"),
+        "asks": frame is not None and frame.time != 0,
+        "right": 2 if frame and "time" in frame.exact else 0,
+        "frame": frame and frame.name,
+        "frame_time": f"{frame.time:g} s" if frame else "",
+        "same": len(result.restored) == 4 and result.same_future,
+        "emulated": emulated(result, "zeros when fresh"),
+        "body": frame and frame.body,
+        "held": ", ".join(scene.name for scene in result.scenes if scene.held),
+        "public": public and frame is not None and frame.on_robot == 0,
+    }
+
+
+def tables(results: Mapping[str, Reset]) -> dict[str, Any]:
+    """What each keyframe shows, and what becomes of it."""
     first = next(iter(results.values()))
-    blocks: list[Any] = [
-        Text(
-            f"Velocity and command are changed, and {first.simulated:g} s is simulated. Then the "
-            "Data is reset: first to the default state, then to one that the model file names."
-        ),
-        *typed(session, _question(first)),
-        Text(
-            "reset puts a Data back to the model's default state: positions, velocities, "
-            "command and time. With keyframe=… it goes to a state that the model file names. "
-            "reset computes nothing that is derived: call forward for that."
-        ),
-    ]
-    for name, result in results.items():
-        prefix, steps = where(results, name), count(result.steps, "step")
-        blocks += [
-            Verdict(
-                f"{prefix}after {steps} and a reset, qpos, qvel, ctrl and time have the same bits "
-                f"as in a new Data. The next {steps} end in the same bits, too",
-                len(result.restored) == 4 and result.same_future,
-            ),
-            Verdict(f"{prefix}every derived array is zero after a reset", result.empty),
-        ]
-    blocks += emulation(results, "zeros when fresh")
-    if not first.scenes:
-        blocks.append(Text("This model's file names no keyframe: try --model so101/scene_box."))
-    for number, scene in enumerate(first.scenes):
-        scenes = {name: result.scenes[number] for name, result in results.items()}
-        blocks.append(_contacts(number, scene, scenes))
-        blocks += [_finding(results, name, number, first.provenance.model_file) for name in results]
-    blocks += differences(
-        results,
-        [
-            (f"rise of the {scene.body}, {scene.name}", partial(_rise, k))
-            for k, scene in enumerate(first.scenes)
-            if scene.body
+    rises = {
+        f"rise of the {scene.body}, {scene.name}": partial(_rise, k)
+        for k, scene in enumerate(first.scenes)
+        if scene.body
+    }
+    return {
+        "keyframes": [
+            _keyframe(k, {name: result.scenes[k] for name, result in results.items()})
+            for k in range(len(first.scenes))
         ],
-    )
-    return page_of("Back to a known state", results, blocks)
+        "differences": differences(results, rises),
+    }
 
 
-def _question(first: Reset) -> Question | None:
-    if not first.scenes:
-        return None
-    frame = first.scenes[0]
-    if frame.time == 0:
-        return None
-    return Question(
-        f"what is data.time after the reset to keyframe 0 ({frame.name!r})?",
-        (
-            "0 s: a reset begins anew",
-            f"{first.simulated:g} s: as before",
-            f"{frame.time:g} s: what the file says",
-        ),
-        2 if "time" in frame.exact else 0,
-        "Time is a number of the state, and a keyframe has one of its own.",
-    )
-
-
-def _contacts(number: int, first: KeyframeScene, scenes: Mapping[str, KeyframeScene]) -> Table:
-    pairs = dict.fromkeys(pair for scene in scenes.values() for pair in scene.contacts)
+def _keyframe(number: int, scenes: Mapping[str, KeyframeScene]) -> Table:
+    each, first = list(scenes.values()), next(iter(scenes.values()))
+    pairs = dict.fromkeys(pair for scene in each for pair in scene.contacts)
     rows = [
-        (pair, *(count(scene.contacts.get(pair, 0), "contact") for scene in scenes.values()))
-        for pair in pairs
+        (pair, *(count(scene.contacts.get(pair, 0), "contact") for scene in each)) for pair in pairs
     ]
+    after = f"of the next {first.nstep} steps: "
+    if first.body is not None:
+        rows += [
+            (f"{after}the robot touches the {first.body}", *(str(s.robot_steps) for s in each)),
+            (f"{after}the world touches it", *(str(s.world_steps) for s in each)),
+            ("it rises meanwhile by", *(millimetres(s.rise) for s in each)),
+        ]
     return Table(
         ("what touches", *scenes),
         rows or [("nothing", *("" for _ in scenes))],
@@ -270,36 +236,6 @@ def _contacts(number: int, first: KeyframeScene, scenes: Mapping[str, KeyframeSc
     )
 
 
-def _finding(results: Mapping[str, Reset], name: str, number: int, file: str) -> Text | Verdict:
-    """What a keyframe is, by what touches what, then and in the steps that follow."""
-    scene = results[name].scenes[number]
-    if scene.body is None:
-        return sentence(results, name, "there is no free body in this scene.")
-    moved = f"it {'rises' if scene.rise > 0 else 'sinks'} by {millimetres(abs(scene.rise))}"
-    steps = f"in {scene.robot_steps} of the next {scene.nstep} steps"
-    if scene.held:
-        return Verdict(
-            f"{where(results, name)}the {scene.body} is held: it touches the robot and nothing "
-            f"else, right after the reset and {steps}. Meanwhile {moved}",
-            True,
-        )
-    if scene.on_robot == 0 and scene.on_world:
-        text = (
-            f"the {scene.body} is not held: it has {count(scene.on_world, 'contact')} with what "
-            f"does not move, and none with the robot. The robot touches it {steps}. Meanwhile "
-            f"{moved}"
-        )
-        if number == 0 and file.startswith("robotstudio_so101"):
-            text += ". A lesson that calls this a grasp with the box lifted is mistaken"
-        return sentence(results, name, f"{text}.")
-    return sentence(
-        results,
-        name,
-        f"the {scene.body} has {count(scene.on_robot, 'contact')} with the robot and "
-        f"{scene.on_world} with what does not move; the robot touches it {steps}, and {moved}.",
-    )
-
-
-def _rise(number: int, one: Reset, two: Reset) -> str:
-    rises = [millimetres(each.scenes[number].rise, 3) for each in (two, one)]
+def _rise(number: int, left: Reset, right: Reset) -> str:
+    rises = [millimetres(result.scenes[number].rise, 3) for result in (right, left)]
     return " instead of ".join(rises)

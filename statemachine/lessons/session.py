@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import builtins
 import io
+import itertools
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from types import ModuleType
@@ -15,10 +16,12 @@ import statemachine
 
 from ..backends import backend_engine
 from ..interface import Data, Model, make_data, step
-from ..page import Page
+from ..page import Code, Page, Printed
 from ..probes.calls import CallRecording, record, recorded_engines, statements
-from . import module
-from .records import Lesson, Session
+from ..runs.drive import steps_in
+from ..runs.robot import is_the_arm
+from . import module, template
+from .records import Lesson
 
 
 class CodeRun:
@@ -115,14 +118,16 @@ class Taken:
     """A lesson on one backend.
 
     Attributes:
-        result: What its module found.
+        result: What its module measured.
         code: As it was typed; printed: what it printed.
+        arm: Whether it was taken on an SO-101, which is what its text is about.
         calls: What the engine was made to do by it, if that was to be recorded and can be.
     """
 
     result: Any
     code: str
     printed: str
+    arm: bool
     calls: CallRecording | None = None
 
 
@@ -149,15 +154,14 @@ def take(
         calls: Whether to run the code once more, recording what it makes the engine do, if the
             engine's room can tell.
     """
-    station = module(lesson.name)
     values = fitted(lesson, model, options or {})
-    code = station.code(model, values, load_line(name or lesson.model, backend, menagerie))
+    lesson_module = module(lesson.name)
+    code = lesson_module.code(model, values, load_line(name or lesson.model, backend, menagerie))
     with CodeRun(code, model) as play:
-        result = station.run(play, values, progress)
+        result = lesson_module.run(play, values, progress)
     engine = backend_engine(backend) or backend
-    if not calls or engine not in recorded_engines():
-        return Taken(result, code, play.printed)
-    return Taken(result, code, play.printed, record(code, engine))
+    recorded = record(code, engine) if calls and engine in recorded_engines() else None
+    return Taken(result, code, play.printed, is_the_arm(model), recorded)
 
 
 def fitted(lesson: Lesson, model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -172,11 +176,34 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
     first, *others = taken
     code = taken[first].code
     if others:  # each ran with its own name there
-        both = ", then ".join(f'"{name}"' for name in others)
+        then = ", then ".join(f'"{name}"' for name in others)
         loads = re.compile(f'^.*backend="{re.escape(first)}".*$', re.MULTILINE)
-        code = loads.sub(lambda line: f"{line[0]}  # then {both}", code)
-    session = Session(code, {name: each.printed for name, each in taken.items()})
-    return module(lesson.name).page({name: t.result for name, t in taken.items()}, session)
+        code = loads.sub(lambda line: f"{line[0]}  # then {then}", code)
+    lesson_module = module(lesson.name)
+    results = {name: run.result for name, run in taken.items()}
+    slots = {name: vars(result) | lesson_module.slots(result) for name, result in results.items()}
+    blocks = {
+        "code": Code(code.splitlines()),
+        "printed": Printed({name: run.printed for name, run in taken.items()}),
+        **lesson_module.tables(results),
+    }
+    return template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
+
+
+def stepping_loop(model: Model, marks: Sequence[float], seconds: float) -> tuple[str, str]:
+    """The head of a loop that steps from mark to mark, and what it gives `step` as nstep.
+
+    Args:
+        model: Its timestep counts.
+        marks: Times at which the loop stops [s]; seconds: the last.
+        seconds: See marks.
+    """
+    total = steps_in(model, seconds)
+    ends = sorted({0, total, *(k for t in marks if 0 < (k := round(t / model.timestep)) < total)})
+    counts = [end - start for start, end in itertools.pairwise(ends)]
+    if len(set(counts)) == 1:
+        return f"for _ in range({len(counts)}):", str(counts[0])
+    return f"for n in ({', '.join(map(str, counts))}):", "n"
 
 
 def load_line(model: str, backend: str, menagerie: str | None = None) -> str:

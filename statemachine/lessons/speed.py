@@ -10,15 +10,13 @@ from ..backends import load as load_model
 from ..engines import room
 from ..interface import Data, Model
 from ..interface.checks import as_count
-from ..measures.text import capital, count, duration
-from ..page import Page, Question, Table, Text
+from ..measures.text import count, duration
+from ..page import Table
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
-from . import _worlds
-from ._words import differences, page_of, sentence, typed
-from .in_turns import FEWEST, Ratio, in_turns
-from .records import Session
+from .in_turns import Ratio, in_turns
 from .session import CodeRun
+from .template import differences
 
 _ROUNDS = 20
 _MOST = 20_000  # steps of a call or a round; between two the progress moves and Ctrl-C is heard
@@ -26,9 +24,7 @@ _BULK, _AGAIN, _LOOP, _OWN = "in bulk", "in bulk again", "step by step", "as it 
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
-    """The same steps by the clock, both ways, once; or some worlds of one Model."""
-    if options.get("worlds"):
-        return _worlds.code(load)
+    """The same steps by the clock, both ways, once."""
     steps = as_count(options["steps"], "steps")
     whole, rest = divmod(steps, _MOST)
     bulk = f"[{steps}]" if not whole else f"[{_MOST}] * {whole}" + f" + [{rest}]" * bool(rest)
@@ -100,12 +96,8 @@ class Speed:
         return self.loop.differs_from(self.null)
 
 
-def run(
-    play: CodeRun, options: Mapping[str, Any], progress: Progress
-) -> Speed | _worlds.WorldsSpeed:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Speed:
     """Measure the same steps again with the code's own functions, in rounds, the ways in turns."""
-    if options.get("worlds"):
-        return _worlds.run(play, progress)
     model, total = play.model, options["steps"]
     names = play()
     size = max(1, min(total // _ROUNDS, _MOST))
@@ -115,8 +107,8 @@ def run(
         as_it_comes = load_model(model.path, backend=model.backend, defaults="engine")
         models[_OWN] = as_it_comes.replace(gravity=model.gravity, timestep=model.timestep)
     ways = {
-        name: _way(names["wall"], each, names["start"](each), rounds, bulk=name != _LOOP)
-        for name, each in models.items()
+        name: _way(names["wall"], variant, names["start"](variant), rounds, bulk=name != _LOOP)
+        for name, variant in models.items()
     }
     walls = in_turns(ways, len(rounds), progress)
     return Speed(
@@ -145,97 +137,59 @@ def _way(
     return advance
 
 
-def page(results: Mapping[str, Any], session: Session) -> Page:
+def slots(result: Speed) -> dict[str, Any]:
+    """What the page says."""
+    slower = result.told_apart and result.loop.median > 1
+    return {
+        "right": 0 if not slower else 1 if result.loop.median <= 2 else 2,
+        "simulated": f"{result.simulated:g}",
+        "steps": count(result.nstep, "step"),
+        "timestep": f"{result.provenance.timestep:g} s",
+        "rounds": count(result.loop.rounds, "round"),
+        "told_apart": result.told_apart,
+        "loop_cost": f"{result.loop.median:.2f}",
+        "step_cost": duration(result.bulk / result.nstep),
+        "emulated": result.as_it_comes is not None,
+    }
+
+
+def tables(results: Mapping[str, Speed]) -> dict[str, Any]:
     """Times and factors; they are this machine's, now."""
-    first = next(iter(results.values()))
-    if isinstance(first, _worlds.WorldsSpeed):
-        return _worlds.page(results, session)
-    blocks: list[Any] = [
-        Text(
-            f"{first.simulated:g} simulated seconds, {count(first.nstep, 'step')} of "
-            f"{first.provenance.timestep:g} s, as fast as possible. In bulk: one call for many "
-            "steps. Step by step: a Python loop of single calls, as a controller needs it. How "
-            "much an experiment may cost follows from the ratio of simulated to real time."
-        ),
-        *typed(session, _question(first)),
-        Text(
-            "One measurement says little: something else may have run on this machine meanwhile. "
-            f"So the same steps are measured again in {count(first.loop.rounds, 'round')}. Each "
-            "round measures both ways, and the bulk way a second time. How much the two bulk "
-            "measurements differ is the noise; smaller differences cannot be seen here."
-        ),
-    ]
+    columns = results.values()
     rows = [
-        ("in bulk", *(_cell(r.bulk, r.bulk_factor) for r in results.values())),
-        ("step by step", *(_cell(r.one_by_one, r.one_by_one_factor) for r in results.values())),
-        (
-            "one step, in bulk",
-            *(f"{r.bulk / r.nstep * 1e6:.1f} µs" for r in results.values()),
-        ),
+        ("in bulk", *(_cell(r, r.bulk) for r in columns)),
+        ("step by step", *(_cell(r, r.one_by_one) for r in columns)),
+        ("one step, in bulk", *(f"{r.bulk / r.nstep * 1e6:.1f} µs" for r in columns)),
     ]
-    emulated = any(r.as_it_comes is not None for r in results.values())
-    if emulated:
-        rows.append(("in bulk, as the engine comes", *(_own(r) for r in results.values())))
-    blocks += [
-        Table(("", *results), rows, title="Wall time, and × real time, on this machine, now"),
-        Table(
+    if any(r.as_it_comes is not None for r in columns):
+        rows.append(("in bulk, as the engine comes", *(_cell(r, r.as_it_comes) for r in columns)))
+    relative = [
+        ("step by step", *(r.loop.spread() for r in columns)),
+        ("in bulk again", *(r.null.spread() for r in columns)),
+    ]
+    return {
+        "times": Table(
+            ("", *results), rows, title="Wall time, and × real time, on this machine, now"
+        ),
+        "relative": Table(
             ("", *results),
-            [
-                ("step by step", *(r.loop.spread() for r in results.values())),
-                ("in bulk again", *(r.null.spread() for r in results.values())),
-            ],
+            relative,
             title="Cost relative to bulk: median of the rounds, and their middle half",
         ),
-        *(sentence(results, name, _told(result)) for name, result in results.items()),
-    ]
-    if emulated:
-        blocks.append(
-            Text(
-                "As the engine comes: driven by its own position control, without the model's "
-                "servo, armature and friction, which the other rows emulate."
-            )
-        )
-    blocks += differences(results, [("time of a step, in bulk", _against)])
-    return page_of("The speed budget", results, blocks)
+        "differences": differences(results, {"time of a step, in bulk": _against}),
+    }
 
 
-def _question(first: Speed) -> Question:
-    slower = first.told_apart and first.loop.median > 1
-    return Question(
-        "how much longer does a Python loop with one call a step take than one call for all steps?",
-        ("no longer, as far as can be told here", "longer, up to twice as long", "more than twice"),
-        0 if not slower else 1 if first.loop.median <= 2 else 2,
-        capital(_told(first)),
-    )
-
-
-def _told(result: Speed) -> str:
-    """Whether the two ways can be told apart, in a sentence."""
-    if result.told_apart:
-        text = f"step by step takes {result.loop.median:.2f} times as long as in bulk"
-    else:
-        text = "step by step and in bulk cannot be told apart here: "
-        text += (
-            "the bulk way differs from itself by as much"
-            if result.loop.rounds >= FEWEST
-            else f"{count(result.loop.rounds, 'round')} cannot tell"
-        )
-    return f"{text}. In bulk, a step takes {duration(result.bulk / result.nstep)}."
-
-
-def _against(one: Speed, two: Speed) -> str:
+def _against(left: Speed, right: Speed) -> str:
     """How much longer a step takes on another engine; the engines were measured one by one."""
-    ratio = Ratio.of("", two.bulk_rounds, one.bulk_rounds)
-    if not (ratio.differs_from(one.null) and ratio.differs_from(two.null)):
+    ratio = Ratio.of("", right.bulk_rounds, left.bulk_rounds)
+    if not (ratio.differs_from(left.null) and ratio.differs_from(right.null)):
         return "cannot be told apart here"
     return ratio.spread(" ×", 1)
 
 
-def _own(result: Speed) -> str:
-    if result.as_it_comes is None:
+def _cell(result: Speed, wall: float | None) -> str:
+    """A wall time [s], and how much faster that is than real time; None is as the rest."""
+    if wall is None:
         return "the same"
-    return _cell(result.as_it_comes, result.simulated / result.as_it_comes)
-
-
-def _cell(wall: float, factor: float) -> str:
-    return f"{wall:.3f} s, {factor:.0f} × real time"
+    return f"{wall:.3f} s, {result.simulated / wall:.0f} × real time"

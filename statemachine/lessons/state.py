@@ -9,12 +9,15 @@ from typing import Any
 from ..engines import room
 from ..engines.records import Term
 from ..interface import JointType, Model, make_data, reset
-from ..page import Page, Question, Slots, Table, Text
+from ..measures.text import listed
+from ..page import Slots, Table
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
-from ._words import alike, differences, page_of, typed
-from .records import Session
 from .session import CodeRun
+from .template import differences
+
+NO_NAME = "(no name)"
+_SIZES = ("nq", "nv", "nu", "nbody")
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -63,26 +66,30 @@ class Layout:
     terms: tuple[Term, ...]
     provenance: Provenance
 
+    def shifted(self) -> tuple[Joint, ...]:
+        """Joints whose slots differ between qpos and qvel."""
+        return tuple(
+            joint
+            for joint in self.joints
+            if (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
+        )
+
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout:
     """Read the layout off the Model, and the time off a Data at keyframe 0."""
     play()
     model = play.model
-    joints = []
-    for name, kind, place, dof in zip(
-        model.joint_names, model.jnt_type, model.jnt_qposadr, model.jnt_dofadr, strict=True
-    ):
-        known = JointType(int(kind))
-        joints.append(
-            Joint(
-                name=name,
-                type=known.name.lower(),
-                qpos_start=int(place),
-                qpos_stop=int(place) + known.nq,
-                qvel_start=int(dof),
-                qvel_stop=int(dof) + known.nv,
-            )
-        )
+    rows = zip(
+        model.joint_names,
+        (JointType(int(kind)) for kind in model.jnt_type),
+        model.jnt_qposadr.tolist(),
+        model.jnt_dofadr.tolist(),
+        strict=True,
+    )
+    joints = tuple(
+        Joint(name, kind.name.lower(), place, place + kind.nq, dof, dof + kind.nv)
+        for name, kind, place, dof in rows
+    )
     with make_data(model) as data:
         fresh, name, time = data.time, None, None
         if model.keyframes:
@@ -93,7 +100,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout
         nv=model.nv,
         nu=model.nu,
         nbody=model.nbody,
-        joints=tuple(joints),
+        joints=joints,
         fresh_time=fresh,
         keyframe=name,
         keyframe_time=time,
@@ -102,104 +109,70 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout
     )
 
 
-def page(results: Mapping[str, Layout], session: Session) -> Page:
-    """Sizes, slots, the keyframe's time."""
+def slots(result: Layout) -> dict[str, Any]:
+    """What the page says."""
+    return {
+        "shifted": ", ".join(joint.name or NO_NAME for joint in result.shifted()),
+        "right": 0 if result.nv == result.nq else 2,
+    }
+
+
+def tables(results: Mapping[str, Layout]) -> dict[str, Any]:
+    """Sizes, and who owns which slots; engines that say the same share a table."""
     first = next(iter(results.values()))
-    blocks: list[Any] = [
-        Text(
-            "The array qpos says where the joints of a Data are, and qvel says how fast they "
-            "move. qpos has nq numbers, qvel has nv, and ctrl has nu. jnt_qposadr says where a "
-            "joint begins in qpos, and jnt_dofadr where it begins in qvel."
-        ),
-        *typed(session, _question(first)),
-        Text(
-            "A hinge takes one number in each. A free body takes seven in qpos (three of "
-            "position, four of a quaternion) and six in qvel (three linear, three angular): a "
-            "rotation has three degrees of freedom, but a quaternion describes it by four numbers."
-        ),
-        Table(
-            ("", "nq", "nv", "nu", "nbody"),
-            [
-                (name, str(layout.nq), str(layout.nv), str(layout.nu), str(layout.nbody))
-                for name, layout in results.items()
-            ],
+    sizes = [
+        (name, *(str(getattr(layout, size)) for size in _SIZES)) for name, layout in results.items()
+    ]
+    owners: dict[tuple[Joint, ...], list[str]] = {}
+    for name, layout in results.items():
+        owners.setdefault(layout.joints, []).append(name)
+    return {
+        "sizes": Table(
+            ("", *_SIZES),
+            sizes,
             title="Lengths of qpos, qvel and ctrl; number of bodies, the world included",
         ),
-    ]
-    for names, layout in alike(results, lambda each: each.joints):
-        blocks.append(
+        "owners": [
             Table(
                 ("joint", "type", "qpos", "qvel"),
                 [
                     (
-                        joint.name or "(no name)",
+                        joint.name or NO_NAME,
                         joint.type,
                         _slots(joint.qpos_start, joint.qpos_stop),
                         _slots(joint.qvel_start, joint.qvel_stop),
                     )
-                    for joint in layout.joints
+                    for joint in joints
                 ],
-                title=f"{names}Who owns which slots",
+                title=f"Which slots are whose, on {listed(names)}",
                 words=frozenset({0, 1}),
             )
-        )
-    blocks.append(
-        Slots(
-            "Who owns which slots",
+            for joints, names in owners.items()
+        ],
+        "picture": Slots(
+            "Which slots are whose",
             {
                 "qpos": [(j.name, j.qpos_start, j.qpos_stop) for j in first.joints],
                 "qvel": [(j.name, j.qvel_start, j.qvel_stop) for j in first.joints],
             },
-        )
-    )
-    apart = [
-        joint.name or "(no name)"
-        for joint in first.joints
-        if (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
-    ]
-    if apart:
-        blocks.append(
-            Text(
-                f"qpos has {first.nq} numbers and qvel {first.nv}. The slots of {', '.join(apart)} "
-                "differ, and so would those of any joint after it. So look addresses up in "
-                "jnt_qposadr and jnt_dofadr; do not compute them."
+        ),
+        "terms": [
+            Table(
+                ("", "here", f"in {name} itself"),
+                [(term.thing, term.ours, term.engine) for term in layout.terms],
+                title=f"What {name} calls it",
+                words=frozenset({0, 1, 2}),
             )
-        )
-    else:
-        blocks.append(
-            Text(
-                "In this model every joint has the same slots in qpos and qvel. This is not so in "
-                "every model."
-            )
-        )
-    for name, layout in results.items():
-        if layout.terms:
-            blocks.append(
-                Table(
-                    ("", "here", f"in {name} itself"),
-                    [(term.thing, term.ours, term.engine) for term in layout.terms],
-                    title=f"What {name} calls it",
-                    words=frozenset({0, 1, 2}),
-                )
-            )
-    blocks += differences(results, [("names, sizes and slots", _layouts)])
-    return page_of("Positions and velocities do not line up", results, blocks)
+            for name, layout in results.items()
+            if layout.terms
+        ],
+        "differences": differences(results, {"names, sizes and slots": _compared}),
+    }
 
 
-def _layouts(one: Layout, two: Layout) -> str:
-    sizes = [(each.nq, each.nv, each.nu, each.nbody, each.joints) for each in (one, two)]
-    return "none" if sizes[0] == sizes[1] else "they differ: see above"
-
-
-def _question(first: Layout) -> Question:
-    return Question(
-        f"qpos has nq = {first.nq} numbers. How many has qvel?",
-        (f"{first.nq}: one velocity for each position", f"{first.nu}, as ctrl has", f"{first.nv}"),
-        {first.nq: 0}.get(first.nv, 2),
-        f"nv = {first.nv}: a free body has seven positions and six velocities."
-        if first.nv != first.nq
-        else "Here no joint has more positions than velocities; a free body would.",
-    )
+def _compared(left: Layout, right: Layout) -> str:
+    same = all(getattr(left, name) == getattr(right, name) for name in (*_SIZES, "joints"))
+    return "none" if same else "they differ: see above"
 
 
 def _slots(start: int, stop: int) -> str:

@@ -12,14 +12,11 @@ import numpy as np
 from ..errors import BadInputError
 from ..interface import Data, Model
 from ..measures.text import count, duration
-from ..page import Page, Question, Table, Text, Verdict
+from ..page import Table
 from ..runs.drive import Progress, steps_in
 from ..runs.provenance import Provenance, provenance
-from ._words import page_of, typed, where
-from .records import Session
 from .session import CodeRun
 
-_BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
 _NAP = 0.2  # s
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
 
@@ -77,7 +74,7 @@ class Pace:
     Attributes:
         nstep: Steps of each run; simulated: their simulated time [s].
         free: Wall time of the run that does not wait [s].
-        paced: Wall time of the run that waits [s].
+        paced: Wall time of the run that waits [s]; realtime: whether that one was typed.
         waited: How much of it was waiting [s].
         latest: How far behind the clock a step was at worst, after its waiting [s].
         identical: Whether both runs end in the same bits.
@@ -91,6 +88,7 @@ class Pace:
     simulated: float
     free: float
     paced: float
+    realtime: bool
     waited: float
     latest: float
     identical: bool
@@ -116,153 +114,74 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
     """Watch the loop that is typed, and the other of the two on another Data."""
     model, total = play.model, _steps(play.model, options)
     also = (_free if options["realtime"] else _paced)(total, "sm.load()")
+    moments: list[tuple[float, float, bytes]] = []  # clock, data.time, qpos; after each line
+    waits: list[tuple[float, float]] = []  # of each step: its waiting, and how late it was then
+
+    def after_line(_source: str, names: Mapping[str, Any]) -> None:
+        if "data" in names:
+            data: Data = names["data"]
+            moments.append((time.perf_counter(), data.time, data.qpos.tobytes()))
+
+    def waited(data: Data) -> None:
+        if "ahead" in paced.names:
+            late = time.perf_counter() - paced.names["began"] - data.time
+            waits.append((max(0.0, paced.names["ahead"]), late))
+            progress(len(waits) / total)
+
     with CodeRun(also, model) as second:
         free, paced = (second, play) if options["realtime"] else (play, second)
-        nap, waiting = _Nap(), _Waiting(paced.names, total, progress)
-        for loop in (play, second):
-            if loop is paced:
-                loop(before=waiting.before, after=waiting.after, line=waiting.line)
-            else:
-                loop(line=nap.line)
+        free(line=after_line)
+        paced(before=lambda _model, data: waited(data))
         (_, data), (_, other) = free.worlds[0], paced.worlds[0]
+        waited(other)  # after the last step
+        began, stepped, printed, slept, _ = moments
         return Pace(
             nstep=total,
             simulated=total * model.timestep,
-            free=nap.stepping,
+            free=stepped[0] - began[0],
             paced=paced.names["wall"],
-            waited=waiting.waited,
-            latest=waiting.latest,
+            realtime=options["realtime"],
+            waited=sum(wait for wait, _ in waits),
+            latest=max(0.0, *(late for _, late in waits)),
             identical=bool(np.array_equal(data.qpos, other.qpos)) and data.time == other.time,
-            nap=nap.length,
-            passed=nap.passed,
-            moved=nap.moved,
+            nap=slept[0] - printed[0],
+            passed=slept[1] - printed[1],
+            moved=slept[2] != printed[2],
             end=data.time,
-            exact=other.time == waiting.added,
+            # One after the other, as `step` adds them.
+            exact=other.time == np.cumsum(np.full(total, model.timestep))[-1],
             provenance=provenance(model),
         )
 
 
-class _Nap:
-    """What the steps of the code that does not wait take, and what happens while it sleeps."""
-
-    stepping = length = passed = 0.0
-    moved = False
-
-    def __init__(self) -> None:
-        self._line_over, self._before = 0.0, (0.0, b"")
-
-    def line(self, source: str, names: Mapping[str, Any]) -> None:
-        took = time.perf_counter() - self._line_over
-        if "data" in names:
-            data: Data = names["data"]
-            now = data.time, data.qpos.tobytes()
-            if source.startswith("sm.step"):
-                self.stepping = took
-            elif source.startswith("time.sleep"):
-                self.length, self.passed = took, now[0] - self._before[0]
-                self.moved = now[1] != self._before[1]
-            self._before = now
-        self._line_over = time.perf_counter()
+def slots(result: Pace) -> dict[str, Any]:
+    """What the page says."""
+    still = result.passed == 0 and not result.moved
+    return {
+        "right": 0 if still else 1,
+        "nap": f"{result.nap:.2f} s",
+        "still": still,
+        "end": f"{result.end:g}",
+        "later": f"{result.end + _NAP:g}",
+        "whole_end": repr(result.end),
+        "inexact": result.end != round(result.end, 9),
+        "steps": count(result.nstep, "step"),
+        "timestep": f"{result.provenance.timestep:g}",
+    }
 
 
-class _Waiting:
-    """How long the loop that waits does so, and how late its steps are."""
-
-    def __init__(self, names: Mapping[str, Any], total: int, progress: Progress) -> None:
-        self.waited = self.latest = self.added = 0.0
-        self._names, self._total, self._progress = names, total, progress
-        self._steps = 0
-
-    def before(self, _model: Model, data: Data) -> None:
-        if self._steps:
-            self._look(data)
-
-    def after(self, model: Model, _data: Data) -> None:
-        self.added += model.timestep
-        if self._steps % 20 == 0:
-            self._progress(self._steps / self._total)
-        self._steps += 1
-
-    def line(self, source: str, names: Mapping[str, Any]) -> None:
-        if source.startswith("for"):
-            self._look(names["data"])
-
-    def _look(self, data: Data) -> None:
-        """The waiting after a step is over."""
-        late = time.perf_counter() - self._names["began"] - data.time
-        self.latest = max(self.latest, late)
-        self.waited += max(0.0, self._names["ahead"])
-
-
-def page(results: Mapping[str, Pace], session: Session) -> Page:
-    """Nothing waits unless the loop does, and waiting changes nothing."""
-    first = next(iter(results.values()))
-    blocks: list[Any] = [
-        Text(_BEFORE),
-        *typed(
-            session,
-            None
-            if "sleep(0.2)" not in session.code
-            else Question(
-                "what does the second line print?",
-                (
-                    f"{first.end:g}, like the first",
-                    f"{first.end + _NAP:g}",
-                    "it depends on the machine",
-                ),
-                0 if first.passed == 0 and not first.moved else 1,
-                f"While nobody called anything for {first.nap:.2f} s, nothing moved.",
-            ),
-        ),
-        Text(
-            "data.time grows because step adds the timestep to it. Nothing in the simulator "
-            "looks at a clock, and nothing waits. If a person is to watch, the loop has to wait "
-            "until the clock has caught up."
-        ),
-        _table(results),
+def tables(results: Mapping[str, Pace]) -> dict[str, Any]:
+    """Both loops by the clock."""
+    columns, first = results.values(), next(iter(results.values()))
+    rows = [
+        ("not waiting", *(f"{duration(r.free)}, {_times(r.factor)}" for r in columns)),
+        ("paced", *(f"{r.paced:.3f} s, {_times(r.paced_factor)}" for r in columns)),
+        ("of that waiting", *(f"{r.waited / r.paced:.0%}" for r in columns)),
+        ("latest step, late by", *(duration(r.latest) for r in columns)),
     ]
-    if first.end != round(first.end, 9):
-        blocks.append(
-            Text(
-                f"After {count(first.nstep, 'step')} data.time is {first.end!r}: a timestep like "
-                f"{first.provenance.timestep:g} has no exact binary form, and the errors add up. "
-                "Count steps; do not compare times."
-            )
-        )
-    for name, result in results.items():
-        prefix = where(results, name)
-        blocks += [
-            Verdict(
-                f"{prefix}after {result.nap:.2f} s in which nothing was called, data.time and "
-                "qpos are the same",
-                result.passed == 0 and not result.moved,
-            ),
-            Verdict(
-                f"{prefix}both runs end in the same bits: waiting is no part of the physics",
-                result.identical,
-            ),
-            Verdict(
-                f"{prefix}data.time is the sum of the timesteps, to the last bit", result.exact
-            ),
-        ]
-    if "sleep(0.2)" in session.code:
-        blocks.append(Text("The loop that waits: statemachine lesson time --realtime."))
-    return page_of("Time is a number", results, blocks)
-
-
-def _table(results: Mapping[str, Pace]) -> Table:
-    first, each = next(iter(results.values())), results.values()
-    span = f"{first.simulated:g} s of simulated time, {count(first.nstep, 'step')}"
-    return Table(
-        ("", *results),
-        [
-            ("not waiting", *(f"{duration(r.free)}, {_times(r.factor)}" for r in each)),
-            ("paced", *(f"{r.paced:.3f} s, {_times(r.paced_factor)}" for r in each)),
-            ("of that waiting", *(f"{r.waited / r.paced:.0%}" for r in each)),
-            ("latest step, late by", *(duration(r.latest) for r in each)),
-        ],
-        title=f"{span}, by the clock",
-    )
+    steps = count(first.nstep, "step")
+    title = f"{first.simulated:g} s of simulated time, {steps}, by the clock"
+    return {"paces": Table(("", *results), rows, title=title)}
 
 
 def _times(factor: float) -> str:

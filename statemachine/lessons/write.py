@@ -23,13 +23,12 @@ from ..interface import (
 )
 from ..interface.checks import as_scalar
 from ..measures.text import count, position
-from ..page import Page, Question, Table, Text, Verdict
+from ..page import Table
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
 from ._robot import coordinate, read_derived, with_joint
-from ._words import emulation, page_of, sentence, typed, where
-from .records import Session
 from .session import CodeRun
+from .template import emulated
 
 fit = with_joint  # a joint of this robot, and a value in its range
 
@@ -60,16 +59,15 @@ class Write:
         joint, place, value: qpos[place] of the joint was written [rad; of a slide, m].
         slide: Whether the joint is one.
         view, copy: What a name for the array, and a copy made before, say afterwards.
-        kept: Inputs that were the same array after each of `calls`.
-        calls: What was called between.
+        same_arrays: Whether the inputs were the same arrays after step, forward, reset and
+            set_state.
         in_engine: The entry as the engine's own memory shows it right after the write;
             None where the engine keeps its state elsewhere.
         changed: Derived arrays that the write changed.
-        assigned: What the view says after `data.qpos = other`.
         refused: What was refused, and with which words.
-        felt: How much the first step after the write differs from one without it, in
+        speed_change: How much the first step after the write differs from one without it, in
             the velocity of that joint [rad/s or m/s].
-        found: How many contacts it found; otherwise: how many the one without it found.
+        contacts: How many that step found; contacts_without: how many the other.
     """
 
     joint: str
@@ -78,15 +76,13 @@ class Write:
     value: float
     view: float
     copy: float
-    kept: tuple[str, ...]
-    calls: tuple[str, ...]
+    same_arrays: bool
     in_engine: float | None
     changed: tuple[str, ...]
-    assigned: float
     refused: tuple[tuple[str, str], ...]
-    felt: float
-    found: int
-    otherwise: int
+    speed_change: float
+    contacts: int
+    contacts_without: int
     provenance: Provenance
 
 
@@ -106,22 +102,18 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
     before, after, *_ = looks
     view, in_engine = float(data.qpos[place]), _in_engine(data, place)
     step(model, data)
-    found = len(data.contacts)
-    with make_data(model) as other:
+    contacts = len(data.contacts)
+    with make_data(model) as other:  # the same without the write
         step(model, other)
-        felt, otherwise = float(data.qvel[dof] - other.qvel[dof]), len(other.contacts)
-    arrays = {name: getattr(data, name) for name in INPUTS}
-    state = get_state(model, data)
-    calls = {
-        "step": lambda: step(model, data),
-        "forward": lambda: forward(model, data),
-        "reset": lambda: reset(model, data),
-        "set_state": lambda: set_state(model, data, state),
-    }
-    same = set(INPUTS)
-    for call in calls.values():
-        call()
-        same &= {name for name in INPUTS if getattr(data, name) is arrays[name]}
+        speed_change, contacts_without = (
+            float(data.qvel[dof] - other.qvel[dof]),
+            len(other.contacts),
+        )
+    arrays, state = {name: getattr(data, name) for name in INPUTS}, get_state(model, data)
+    same_arrays = True
+    for call in (step, forward, reset, lambda model, data: set_state(model, data, state)):
+        call(model, data)
+        same_arrays &= all(getattr(data, name) is arrays[name] for name in INPUTS)
     data.qpos = copy
     return Write(
         joint=joint,
@@ -130,15 +122,13 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
         value=options["value"],
         view=view,
         copy=float(copy[place]),
-        kept=tuple(name for name in INPUTS if name in same),
-        calls=tuple(calls),
+        same_arrays=same_arrays,
         in_engine=in_engine,
         changed=tuple(name for name in before if before[name] != after[name]),
-        assigned=float(names["view"][place]),
         refused=_refused(data),
-        felt=felt,
-        found=found,
-        otherwise=otherwise,
+        speed_change=speed_change,
+        contacts=contacts,
+        contacts_without=contacts_without,
         provenance=provenance(model),
     )
 
@@ -167,80 +157,25 @@ def _refused(data: Data) -> tuple[tuple[str, str], ...]:
     return tuple(refused)
 
 
-def page(results: Mapping[str, Write], session: Session) -> Page:
-    """The same memory, what it changes, what is refused."""
+def slots(result: Write) -> dict[str, Any]:
+    """What the page says."""
+    return {
+        "right": 0 if result.view == result.value else 1,
+        "in_memory": result.in_engine is not None,
+        "in_engine": f"{result.in_engine or 0:g}",
+        "engine_agrees": result.in_engine == result.value,
+        "unchanged": not result.changed,
+        "what_changed": ", ".join(result.changed) or "no derived array",
+        "contacts_without": count(result.contacts_without, "contact"),
+        "speed_change": f"{position(result.speed_change, result.slide, 1)}/s",
+        "emulated": emulated(result, "stale after a write"),
+    }
+
+
+def tables(results: Mapping[str, Write]) -> dict[str, Any]:
+    """What is refused."""
     first = next(iter(results.values()))
-    blocks: list[Any] = [
-        Text("One number is written into data.qpos, through a second name for that array."),
-        *typed(
-            session,
-            Question(
-                f"view[slot] was set to {first.value:g}. What does data.qpos[slot] say?",
-                (f"{first.value:g}", f"{first.copy}, until forward or step is called", "an error"),
-                0 if first.view == first.value else 1,
-                f"The view and data.qpos are one array; the copy still says {first.copy:g}.",
-            ),
-        ),
-        Text(
-            "data.qpos is no copy. A second name for it is the same array, and the next call "
-            "starts from what you write there. There is nothing else to do. (To keep a value, "
-            "copy it: data.qpos.copy().)"
-        ),
-    ]
-    for name, result in results.items():
-        prefix = where(results, name)
-        blocks.append(
-            Verdict(
-                f"{prefix}qpos, qvel and ctrl are the same arrays after "
-                f"{', '.join(result.calls)}: a name for one of them stays valid",
-                len(result.kept) == 3,
-            )
-        )
-        if result.in_engine is None:
-            blocks.append(
-                sentence(
-                    results,
-                    name,
-                    "the engine does not give access to its own memory. The arrays belong to "
-                    "this interface, and the next call passes their numbers on to the engine.",
-                )
-            )
-        else:
-            blocks.append(
-                Verdict(
-                    f"{prefix}the array is the engine's own memory: right after the write "
-                    f"data.raw.qpos[{result.place}] is {result.in_engine:g}",
-                    result.in_engine == result.value,
-                )
-            )
-        blocks.append(
-            Verdict(
-                f"{prefix}the write alone changed {_changed(result)}. The next lesson is about "
-                "that",
-                not result.changed,
-            )
-        )
-        blocks.append(
-            sentence(
-                results,
-                name,
-                "the next step starts from what you wrote. To see that, the same step is taken "
-                f"without the write, too. It finds {count(result.otherwise, 'contact')}; the step "
-                f"after the write finds {result.found}. The write changes the speed of "
-                f"{result.joint} after the step by {position(result.felt, result.slide, 1)}/s.",
-            )
-        )
-    blocks += emulation(results, "stale after a write")
-    blocks.append(
-        Table(
-            ("you type", "and read"),
-            first.refused,
-            title="What is refused",
-            words=frozenset({0, 1}),
-        )
-    )
-    return page_of("Writing into the state", results, blocks)
-
-
-def _changed(result: Write) -> str:
-    return ", ".join(result.changed) or "no derived array"
+    words = frozenset({0, 1})
+    return {
+        "refused": Table(("you type", "and read"), first.refused, "What is refused", words=words)
+    }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .contacts import ContactNames, same_pairs, together
+from .contacts import ContactNames, overlaps, same_pairs, together
 from .gap import (
     Deviation,
     Gap,
@@ -45,6 +45,7 @@ __all__ = [
     "largest",
     "largest_or_inf",
     "nearest",
+    "overlaps",
     "parse_tolerances",
     "same_pairs",
     "together",

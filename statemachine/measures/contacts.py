@@ -6,9 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
-from ..interface import Model
+from ..interface import Array, Ints, Model
+from .text import few, rounded
 
 _T = TypeVar("_T")
+_LISTED = 8  # pairs in a sentence
+_DEEP = 1e-3  # m; what rests on a floor sinks in by less
 
 
 class ContactNames:
@@ -88,10 +91,28 @@ def together(contacts: Iterable[str]) -> str:
     for contact in contacts:
         pair, _, told = contact.partition(" (")
         geoms.setdefault(pair, []).append(told.removesuffix(")"))
-    return ", ".join(
+    pairs = [
         f"{pair} ({', '.join(filter(None, told))})" if any(told) else pair
         for pair, told in geoms.items()
-    )
+    ]
+    return few(pairs, _LISTED)
+
+
+def overlaps(names: ContactNames, geoms: Ints, distances: Array) -> list[str]:
+    """Shapes inside each other by more than 1 mm, the deepest first: "gripper on box by 151 mm".
+
+    Args:
+        names: What contacts are called.
+        geoms: (n, 2) of each contact; negative where it is of no geom, which is left out.
+        distances: (n,) [m], negative where shapes overlap.
+    """
+    nearest: dict[str, float] = {}
+    for pair, distance in zip(geoms.tolist(), distances.tolist(), strict=True):
+        if distance < -_DEEP and min(pair) >= 0:
+            name = names.pair(*pair)
+            nearest[name] = min(distance, nearest.get(name, 0.0))
+    deepest = sorted(nearest.items(), key=lambda item: item[1])
+    return [f"{pair} by {rounded(-distance, 'm')}" for pair, distance in deepest]
 
 
 def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:

@@ -14,6 +14,7 @@ from .text import milliseconds, rounded
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
 COUNT = 2 * np.pi / 4096
 _COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as in the SO-101's servos"
+_LEVER = 0.065  # m; what is shorter moves by less than 0.1 mm with one count
 _ENERGY = 0.01  # of what the energy changes by in the run
 _FORCE = 0.05  # of its mean while it acts
 
@@ -87,7 +88,8 @@ def tolerance_of(
         timestep: The longer of the two [s].
         given: Values by kind that win over ours [SI].
     """
-    known = QUANTITIES[kind]
+    # A site that has hardly a lever arm goes where its foot goes, as a slide does.
+    known = QUANTITIES["slide" if kind == "tip" and reach < _LEVER else kind]
     if given and kind in given:
         return Tolerance(given[kind], "as given")
     if known.tolerance is not None:

@@ -11,6 +11,7 @@ import ast
 import functools
 import io
 import linecache
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
@@ -93,14 +94,6 @@ class CallRecording:
         return "".join(statement.printed for statement in self.statements)
 
 
-class _Tally:
-    """The calls of one function on one thing, within a statement."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self.changed: dict[tuple[WatchedObject, str], None] = {}
-
-
 class CallRecorder:
     """Functions of engines replaced while it is entered; one at a time in a process."""
 
@@ -109,9 +102,8 @@ class CallRecorder:
     def __init__(self, watches: Sequence[CallWatch]) -> None:
         self._watches = watches
         self._replaced: list[tuple[Any, str, Any]] = []
+        self.begin()
         self._listening = False  # only while a statement runs, and not within a call
-        self._tallies: dict[tuple[str, str, WatchedObject | None], _Tally] = {}
-        self._written: dict[tuple[WatchedObject, str], set[str]] = {}
 
     def __enter__(self) -> CallRecorder:
         if CallRecorder._active:
@@ -150,7 +142,10 @@ class CallRecorder:
 
     def begin(self) -> None:
         """A statement is about to run."""
-        self._tallies, self._written = {}, {}
+        # By engine, function and what it was called on: how often, and what it changed there.
+        self._counts: Counter[tuple[str, str, WatchedObject | None]] = Counter()
+        self._changed = defaultdict[Any, dict[tuple[WatchedObject, str], None]](dict)
+        self._written = defaultdict[tuple[WatchedObject, str], set[str]](set)
         self._listening = True
 
     def end(
@@ -167,16 +162,16 @@ class CallRecorder:
                 self._note_writes(watched, thoroughly=True)
                 if watched.due():
                     due.append(watched.title)
-        merged: dict[tuple[str, str, str], tuple[int, dict[str, None]]] = {}
-        for (engine, function, on), tally in self._tallies.items():
-            key = engine, function, on.title if on else ""
-            count, names = merged.get(key, (0, {}))
-            for watched, field in tally.changed:
-                names[field if watched is on else watched.spelled(field)] = None
-            merged[key] = count + tally.count, names
+        counts, names = Counter[tuple[str, str, str]](), defaultdict[Any, dict[str, None]](dict)
+        for called, count in self._counts.items():
+            engine, function, on = called
+            titled = engine, function, on.title if on else ""
+            counts[titled] += count
+            for watched, field in self._changed[called]:
+                names[titled][field if watched is on else watched.spelled(field)] = None
         calls = tuple(
-            Call(function, on, count, tuple(names), engine)
-            for (engine, function, on), (count, names) in merged.items()
+            Call(function, title, count, tuple(names[engine, function, title]), engine)
+            for (engine, function, title), count in counts.items()
         )
         changed = tuple(
             watched.spelled(field if len(entries) > 1 else next(iter(entries)))
@@ -201,15 +196,14 @@ class CallRecorder:
                 made = watch.made(function, args, result)
                 return result
             finally:
-                on = made or (objects[0] if objects else None)
-                tally = self._tallies.setdefault((watch.engine, function, on), _Tally())
-                tally.count += 1
+                called = watch.engine, function, made or next(iter(objects), None)
+                self._counts[called] += 1
                 if made:
                     made.seen = made.look()
-                    tally.changed[made, NEW] = None
+                    self._changed[called][made, NEW] = None
                 for watched in objects:
                     for field in _changed(watched):
-                        tally.changed[watched, field] = None
+                        self._changed[called][watched, field] = None
         finally:
             self._listening = True
 
@@ -220,8 +214,8 @@ class CallRecorder:
             return
         if before is not None:
             for field in watched.differing(before, now):
-                entries = self._written.setdefault((watched, field), set())
-                entries.add(watched.entry(field, before.get(field, b""), now[field]))
+                entry = watched.entry(field, before.get(field, b""), now[field])
+                self._written[watched, field].add(entry)
         watched.seen = {**(before or {}), **now}
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -72,14 +72,16 @@ class Scratch:
     """Another Data of a Model, in which the present of any Data of it is computed."""
 
     def __init__(self, model: Model) -> None:
-        self._model = model
-        self._data = make_data(model)
+        self._model, self._data = model, make_data(model)
+        self._now: tuple[State | None, Readings] = None, {}
 
     def now(self, state: State) -> Readings:
         """All that `forward` would compute in a state."""
-        set_state(self._model, self._data, state)
-        forward(self._model, self._data)
-        return readings(self._data, copied=True)
+        if self._now[0] != state:
+            set_state(self._model, self._data, state)
+            forward(self._model, self._data)
+            self._now = state, readings(self._data, copied=True)
+        return self._now[1]
 
     def one_step_back(self, state: State) -> Array:
         """The poses (nbody, 7) of the bodies in the state that a step led to this one from.
@@ -121,22 +123,22 @@ def stale_row(model: Model, name: str, age: Age, found: tuple[Gap, ...]) -> Row:
     return Row(name, False, age.steps, writes, of, found)
 
 
-def age_of(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Age:
+def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Age:
     """How old derived values are, from nothing but their values.
 
     Args:
         model: Of the Data.
         state: What the Data is in now.
         held: What it says.
-        now: What it would say now.
         scratch: Where other states are tried.
     """
+    now = scratch.now(state)
     if all(same(held[name], now[name]) for name in held):
         return Age(steps=0)
-    if not _array(held, "xquat").any():  # a rotation is never zero
+    poses, current = _poses(held), _poses(now)
+    if not poses[:, 3:].any():  # a rotation is never zero
         return Age(never=True)
-    poses = np.hstack((_array(held, "xpos"), _array(held, "xquat")))
-    lag = np.abs(np.hstack((_array(now, "xpos"), _array(now, "xquat"))) - poses).max(axis=1)
+    lag = np.abs(current - poses).max(axis=1)
     if not lag.any():  # the poses, which alone can be retraced, are of now
         return Age()
     off = np.abs(scratch.one_step_back(state) - poses).max(axis=1)
@@ -181,10 +183,8 @@ def back(model: Model, qpos: Array, qvel: Array, seconds: float) -> Array:
     return found
 
 
-def _array(found: Readings, name: str) -> Array:
-    array = found[name]
-    assert isinstance(array, np.ndarray)
-    return array
+def _poses(found: Mapping[str, Any]) -> Array:
+    return np.hstack([found["xpos"], found["xquat"]])
 
 
 def engine_step(model: Model) -> float:
@@ -218,14 +218,10 @@ def freshness(model: Model, data: Data) -> Freshness:
     with nullcontext() if watch is None else watch.aside():
         held = readings(data)
     if watch is not None:
-        now, age = watch.now(state), watch.age()
+        now, age = watch.scratch.now(state), watch.age()
     else:
-        scratch = Scratch(model)
-        try:
-            now = scratch.now(state)
-            age = age_of(model, state, held, now, scratch)
-        finally:
-            scratch.close()
+        with closing(Scratch(model)) as scratch:
+            now, age = scratch.now(state), age_of(model, state, held, scratch)
     touching = any(len(cast("Contacts", found["contacts"])) for found in (held, now))
     rows = tuple(row(model, name, held[name], now[name], age) for name in held)
     return Freshness(

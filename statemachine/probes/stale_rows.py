@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import unknown_name
+from ..errors import check_name
 from ..interface import Array, Contacts, JointType, Model
 from ..measures import ContactNames, Gap
 from ..measures.text import TINY
@@ -72,20 +72,14 @@ class Freshness:
         return not self.stale
 
     def __getitem__(self, name: str) -> Row:
-        for row in self.rows:
-            if row.name == name:
-                return row
-        raise unknown_name("derived array", name, (row.name for row in self.rows))
+        check_name("derived array", name, [row.name for row in self.rows])
+        return next(row for row in self.rows if row.name == name)
 
     def __str__(self) -> str:
         title = f"Derived values of {self.model} on {self.backend} {self.engine_version}"
         cells = [(row.name, row.of, told(row.gaps) or "–") for row in self.rows]
-        lines = [
-            f"{title} at {self.time:g} s",
-            *table(("array", "of", "how far off"), cells),
-            *wrapped(self.notes),
-        ]
-        return "\n".join(lines)
+        lines = table(("array", "of", "how far off"), cells)
+        return "\n".join([f"{title} at {self.time:g} s", *lines, *wrapped(self.notes)])
 
     __repr__ = __str__
 

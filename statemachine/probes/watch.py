@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,7 +19,7 @@ import numpy as np
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from ..measures import Gap
-from ..measures.readings import Readings, readings
+from ..measures.readings import readings
 from ..measures.text import few
 from .freshness import DEPEND, Age, Scratch, age_of, row, stale_row
 from .stale_rows import Row, StaleRead, table, told
@@ -88,16 +89,15 @@ class Watch:
         if hasattr(type(data), "_watch"):
             raise BadInputError("this Data is watched already")
         state = get_state(model, data)
-        self._scratch = Scratch(model)
-        self._present: tuple[bytes, Readings] | None = None
+        self.scratch = Scratch(model)
         try:
-            age = age_of(model, state, readings(data), self.now(state), self._scratch)
+            age = age_of(model, state, readings(data), self.scratch)
         except BaseException:
-            self._scratch.close()
+            self.scratch.close()
             raise
-        self._begin(age.steps, age.never, state if age.steps == 0 else None)
+        self.begin(age.steps, age.never, present=age.steps == 0)
         self._kind, self._advance = type(data), data._advance
-        data._advance = self._advancing(self._advance)
+        data._advance = _after(self._advance, lambda *_: self.begin(1))
         data.__class__ = _guarded(self._kind, self)
         return self
 
@@ -105,7 +105,7 @@ class Watch:
         self._data.__class__ = self._kind
         if self._data._advance is not None:  # it was not closed meanwhile
             self._data._advance = self._advance
-        self._scratch.close()
+        self.scratch.close()
 
     @contextmanager
     def aside(self) -> Iterator[None]:
@@ -116,21 +116,11 @@ class Watch:
         finally:
             self._aside = before
 
-    def now(self, state: State) -> Readings:
-        """What `forward` would compute in a state."""
-        if self._present is None or self._present[0] != state.blob:
-            self._present = state.blob, self._scratch.now(state)
-        return self._present[1]
-
     def age(self) -> Age:
         """How old derived values are, as counted."""
         self.touch()
-        return Age(
-            self._steps,
-            None if self._steps is None else dict(self._writes),
-            self._never,
-            tuple(self._entries()),
-        )
+        writes = None if self._steps is None else dict(self._writes)
+        return Age(self._steps, writes, self._never, tuple(self._entries()))
 
     def touch(self) -> None:
         """See whether an input was written since the last time."""
@@ -151,22 +141,19 @@ class Watch:
             return
         if self._raise:
             raise _stale_read(found, [e for e in self._entries() if e.startswith(DEPEND[name])])
-        place = _place()
-        known = self._found.get((name, place, found.of))
-        if known is None:
-            worst, count = found.gaps, 0
-        else:
-            worst, count = _worst(known.gaps, found.gaps), known.count
-        self._found[name, place, found.of] = StaleRead(name, place, count + 1, found.of, worst)
+        key = name, _place(), found.of
+        known = self._found.get(key, StaleRead(name, key[1], 0, found.of, ()))
+        worst = _worst(known.gaps, found.gaps)
+        self._found[key] = replace(known, count=known.count + 1, gaps=worst)
 
     def _row(self, name: str, held: Array | Contacts) -> Row | None:
         age = self.age()
         state = self._state()
         if state is None:
             return stale_row(self._model, name, age, ())
-        if self._fresh is not None and self._fresh == state.blob:
+        if self._fresh == state:
             return None
-        return row(self._model, name, held, self.now(state)[name], age)
+        return row(self._model, name, held, self.scratch.now(state)[name], age)
 
     def _state(self) -> State | None:
         """The present state; None where what was written is no number: there is no now."""
@@ -175,16 +162,16 @@ class Watch:
         except BadInputError:
             return None
 
-    def _begin(self, steps: int | None, never: bool, state: State | None) -> None:
+    def begin(self, steps: int | None, never: bool = False, present: bool = False) -> None:
         """From here on things are counted.
 
         Args:
             steps: How many steps ago derived values are of.
-            never: Whether there are none.
-            state: The state that they belong to, if that is the present one.
+            never: Whether there are none: the Data was reset, or set to a State.
+            present: Whether they are of the present state: `forward` was called.
         """
         self._steps, self._never = steps, never
-        self._fresh = None if state is None else state.blob
+        self._fresh = self._state() if present else None
         self._at = {name: np.array(_SLOTS[name].__get__(self._data)) for name in INPUTS}
         self._seen = {name: array.tobytes() for name, array in self._at.items()}
         self._writes: dict[str, int] = dict.fromkeys(INPUTS, 0)
@@ -198,35 +185,23 @@ class Watch:
             for place in np.flatnonzero(before != after).tolist():
                 yield f"{name}[{place}]{self._model._coordinate_name(name, place)}"
 
-    def _advancing(self, advance: Callable[..., None]) -> Callable[..., None]:
-        def counted(*args: Any) -> None:
-            advance(*args)
-            self._begin(1, False, None)
-
-        return counted
-
-    def computed(self) -> None:
-        """`forward` was called."""
-        self._begin(0, False, self._state())
-
-    def forgotten(self) -> None:
-        """The Data was reset, or set to a State."""
-        self._begin(None, True, None)
-
 
 _SLOTS: Mapping[str, Any] = {name: vars(Data)[name] for name in INPUTS}
 
 
+def _after(function: Callable[..., Any], tell: Callable[..., None]) -> Callable[..., Any]:
+    """A function that tells what it gave and was given."""
+
+    def hook(*arguments: Any) -> Any:
+        value = function(*arguments)
+        tell(value, *arguments)
+        return value
+
+    return hook
+
+
 def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
     """A subclass whose instances tell a Watch what is done with them."""
-
-    def after(name: str, tell: Callable[..., None]) -> Callable[..., Any]:
-        def hook(self: Any, *arguments: Any) -> Any:
-            value = getattr(kind, name)(self, *arguments)
-            tell(value, *arguments)
-            return value
-
-        return hook
 
     def seen(slot: Any) -> property:
         def get(self: Any) -> Array:
@@ -236,13 +211,13 @@ def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
         return property(get, slot.__set__)
 
     tells: dict[str, Callable[..., None]] = {
-        "_derive": lambda value, name: watch.check(name, value),
-        "_find_contacts": lambda value: watch.check("contacts", value),
-        "_recompute": lambda _: watch.computed(),
-        "_reset": lambda *_: watch.forgotten(),
-        "_set_state": lambda *_: watch.forgotten(),
+        "_derive": lambda value, _, name: watch.check(name, value),
+        "_find_contacts": lambda value, _: watch.check("contacts", value),
+        "_recompute": lambda *_: watch.begin(0, present=True),
+        "_reset": lambda *_: watch.begin(None, never=True),
+        "_set_state": lambda *_: watch.begin(None, never=True),
     }
-    hooks = {name: after(name, tell) for name, tell in tells.items()}
+    hooks = {name: _after(getattr(kind, name), tell) for name, tell in tells.items()}
     inputs = {name: seen(slot) for name, slot in _SLOTS.items()}
     # Without slots of its own it has the layout that a change of class needs.
     members = {"__slots__": (), "_watch": watch, **hooks, **inputs}
@@ -267,11 +242,8 @@ def _stale_read(found: Row, entries: list[str]) -> StaleReadError:
 
 def _worst(one: tuple[Gap, ...], two: tuple[Gap, ...]) -> tuple[Gap, ...]:
     """Of each kind the larger gap."""
-    found: dict[str, Gap] = {}
-    for gap in (*one, *two):
-        if gap.unit not in found or gap.shown > found[gap.unit].shown:
-            found[gap.unit] = gap
-    return tuple(found.values())
+    by_unit = {gap.unit: gap for gap in sorted((*two, *one), key=lambda gap: gap.shown)}
+    return tuple(by_unit[unit] for unit in dict.fromkeys(gap.unit for gap in (*one, *two)))
 
 
 def _place() -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -27,8 +26,6 @@ from .compose import compose, halved
 
 def main() -> None:
     """Draw what standard input asks for."""
-    with suppress(ValueError, OSError):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started this ends it
     facts = json.loads(sys.stdin.buffer.readline())
     # What a driver prints must not get in between the pictures.
     out = os.fdopen(os.dup(1), "wb")
@@ -75,3 +72,7 @@ def _poses(bodies: list[int]) -> Iterator[list[Array]]:
     while len(content := told.get()) == size:
         rows = np.frombuffer(content).reshape(-1, 7)
         yield np.split(rows, np.cumsum(bodies)[:-1])
+
+
+if __name__ == "__main__":
+    main()

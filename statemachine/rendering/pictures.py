@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
-import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,23 +15,19 @@ from ..drawing.camera import Camera, framed
 from ..drawing.shots import Pixels
 from ..engines import room
 from ..errors import BadInputError, EngineError
+from ..installed import DEFAULT
 from ..interface import Array, Model
+from ..processes import fresh_python
+from ..processes.pipes import PipedChild
 from ..runs import Trace
 from .motion import Motion, corners, models_of, motion_of
-from .probe import Renderer, environment_of, renderer_here
+from .probe import Renderer, renderer_here
 
 LONGEST = 5000  # pictures of one film
 _SMALLEST, _LARGEST = (64, 48), (1920, 1440)
 # From the front, to the right or to the left of the arm, which reaches along x; and below them.
 _AZIMUTHS, _ELEVATION = (140.0, 220.0, 110.0, 250.0), -20.0
 _BIAS = 2  # pixels that the ghost must be nearer by than the solid side before it is seen
-_PACKAGES = Path(__file__).resolve().parents[2]
-_CHILD = """
-import sys
-sys.path.insert(0, sys.argv[1])
-from statemachine.rendering._child import main
-main()
-"""
 
 
 @dataclass(frozen=True)
@@ -176,7 +168,7 @@ def drawn(
         yield pictures.take()
 
 
-class LivePictures:
+class LivePictures(PipedChild):
     """A process that draws bodies wherever they are told to be, one picture after the other."""
 
     def __init__(
@@ -207,14 +199,8 @@ class LivePictures:
             "camera": asdict(camera),
             "bias": _BIAS * 2 * camera.distance * math.tan(math.radians(camera.fovy) / 2) / size[1],
         }
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the process)
-        self._child = subprocess.Popen(
-            [sys.executable, "-P", "-c", _CHILD, str(_PACKAGES)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            env=environment_of(renderer),
-        )
+        command, environment = fresh_python(f"{__package__}._child")
+        super().__init__(command, room(DEFAULT).drawing_environment(renderer.opengl, environment))
         self._send(json.dumps(facts).encode() + b"\n")
 
     def ask(self, poses: Sequence[tuple[Array, Array]]) -> None:
@@ -229,33 +215,17 @@ class LivePictures:
             EngineError: The process gave up.
         """
         width, height = self._size
-        assert self._child.stdout is not None
-        picture = self._child.stdout.read(3 * width * height)
+        picture = self.out.read(3 * width * height)
         if len(picture) < 3 * width * height:
-            raise EngineError(_why(self._child, self._said, self._renderer))
+            raise EngineError(f"{self._renderer} gave up drawing: {self.how_it_ended()}")
         return np.frombuffer(picture, dtype=np.uint8).reshape(height, width, 3)
 
     def close(self) -> None:
         """End the process, at once. Idempotent."""
-        self._child.kill()
-        for stream in (self._child.stdin, self._child.stdout):
-            if stream is not None:
-                with suppress(OSError):  # what it was still to be told
-                    stream.close()
-        self._child.wait()
-        self._said.close()
+        self.kill()
+        super().close()
 
     def _send(self, content: bytes) -> None:
-        assert self._child.stdin is not None
         with suppress(OSError):  # it gave up: `take` says why
-            self._child.stdin.write(content)
-            self._child.stdin.flush()
-
-
-def _why(child: subprocess.Popen[bytes], said: Any, renderer: Renderer) -> str:
-    with suppress(subprocess.TimeoutExpired):
-        child.wait(5)
-    said.seek(0)
-    lines = said.read().decode(errors="replace").strip().splitlines()
-    reason = lines[-1] if lines else f"it ended with code {child.returncode}"
-    return f"{renderer} gave up drawing: {reason}"
+            self.to.write(content)
+            self.to.flush()

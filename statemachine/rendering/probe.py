@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 
 from ..engines import room, rooms_with
@@ -58,8 +57,3 @@ def renderer_here(name: str | None = None) -> Renderer:
     raise MissingEngineError(
         f"nothing here can draw a film: {because}", engine=reasons[0].engine
     ) from reasons[0]
-
-
-def environment_of(renderer: Renderer) -> dict[str, str]:
-    """The environment of a process that draws; the model is read by the default engine there."""
-    return room(DEFAULT).drawing_environment(renderer.opengl, dict(os.environ))

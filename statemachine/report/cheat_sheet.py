@@ -18,7 +18,7 @@ OURS = {
     "save": "saved = sm.get_state(m, d)\nsm.step(m, d, 100)\nsm.set_state(m, d, saved)  # back",
     "many worlds": "worlds = [sm.make_data(m) for _ in range(3)]",
 }
-# What each station of the path shows, in a line.
+# What each lesson of the path shows, in a line.
 REMEMBER = (
     ("objects", "A Model never changes. A Data is everything that does."),
     ("state", "A joint's slots in qpos and in qvel differ: jnt_qposadr, jnt_dofadr."),

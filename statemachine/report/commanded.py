@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..interface import Array, JointType
-from ..measures import largest
-from ..measures.text import figure, on, quantity
+from ..measures.text import figure, quantity
 from ..page import Block, Section, Table, Text
 from ..runs import Trace
 
 _NEAR = 0.2  # rad: joints that end as near as this to their ctrl were told an angle
+OFF = "The actuators are off on both sides: nothing is commanded."
+TITLE = "{what}, by actuator"
+HEADING = "What was commanded ({same} on both sides)"
 
 
 def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> list[Block]:
@@ -18,38 +20,26 @@ def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> list[Block]:
     if not one.header.nu or one.header.actuators != two.header.actuators:
         return []
     if all(trace.header.options.get("actuation") is False for trace in (one, two)):
-        return [Text("The actuators are off on both sides: nothing is commanded.")]
-    angles = [_is_angle(trace) for trace in (one, two)]
-    angle = angles[0] and angles[1]
-    unit = "°" if angle else ""
-    scale = 180 / np.pi if angle else 1.0
-    first, last = one.ctrl[0] * scale, one.ctrl[-1] * scale
+        return [Text(OFF)]
+    misses = [_ends(trace) for trace in (one, two)]
+    # The trace does not say so, but ctrl is an angle where most joints end near it.
+    angle = all(np.isfinite(miss).all() and np.median(miss) < _NEAR for miss in misses)
+    unit, scale = ("°", 180 / np.pi) if angle else ("", 1.0)
     same = _same(one.ctrl, two.ctrl)
-    constant = all((trace.ctrl == trace.ctrl[0]).all() for trace in (one, two))
-    what = "Commanded" if angle else "ctrl"
-    if same and constant:
-        listed = "; ".join(
-            f"{name} {_amount(float(value))}{unit}"
-            for name, value in zip(one.header.actuators, first, strict=True)
-        )
-        text = f"{what} from the first moment to the last, the same on both sides: {listed}."
-        if angle:
-            text += _misses(one, two, labels)
-        return [Section("", "", [Text(text)], detail=True)]
-    columns = [("at the start", first), ("in the end", last)]
-    if not same:
-        columns = [
-            (f"{label}, {when}", trace.ctrl[row] * scale)
-            for trace, label in zip((one, two), labels, strict=True)
-            for when, row in (("at the start", 0), ("in the end", -1))
-        ]
-    rows = [
-        (name, *(f"{_amount(float(values[k]))}{unit}" for _, values in columns))
-        for k, name in enumerate(one.header.actuators)
-    ]
-    table = Table(("actuator", *(name for name, _ in columns)), rows, f"{what}, by actuator")
-    told = f"What was commanded ({'' if same else 'not '}the same on both sides)"
-    return [Section("", told, [table], folded=True, detail=True)]
+    columns = {}
+    for trace, label in zip((one, two), labels, strict=True):
+        who = "" if same else f"{label}, "
+        for when, row in (("at the start", 0), ("in the end", -1)):
+            values = trace.ctrl[row] * scale
+            columns[who + when] = [f"{_amount(value)}{unit}" for value in values.tolist()]
+    if angle:
+        for miss, label in zip(misses, labels, strict=True):
+            columns[f"missed in the end, {label}"] = [quantity(far, "rad") for far in miss.tolist()]
+    rows = list(zip(one.header.actuators, *columns.values(), strict=True))
+    title = TITLE.format(what="Commanded" if angle else "ctrl")
+    heading = HEADING.format(same="the same" if same else "not the same")
+    table = Table(("actuator", *columns), rows, title)
+    return [Section("", heading, [table], folded=True, detail=True)]
 
 
 def _amount(value: float) -> str:
@@ -68,24 +58,8 @@ def _same(one: Array, two: Array) -> bool:
 def _ends(trace: Trace) -> Array:
     """How far each actuator's joint is from its ctrl in the end (nu,) [rad]; NaN for no hinge."""
     header = trace.header
-    found = np.full(header.nu, np.nan)
+    misses = np.full(header.nu, np.nan)
     for k, joint in enumerate(header.actuator_jntid):
         if joint >= 0 and JointType(header.jnt_type[joint]) is JointType.HINGE:
-            found[k] = abs(trace.qpos[-1, header.jnt_qposadr[joint]] - trace.ctrl[-1, k])
-    return found
-
-
-def _is_angle(trace: Trace) -> bool:
-    """Whether ctrl is an angle: the trace does not say so, but most joints end near it."""
-    far = _ends(trace)
-    return bool(np.isfinite(far).all() and np.median(far) < _NEAR)
-
-
-def _misses(one: Trace, two: Trace, labels: tuple[str, str]) -> str:
-    each = []
-    for trace, label in zip((one, two), labels, strict=True):
-        far = _ends(trace)
-        most, worst = largest(far)
-        name = trace.header.actuators[worst]
-        each.append(f"{name} {on(label)}, by {quantity(most, 'rad')}")
-    return f" In the end farthest from that is {' and '.join(each)}."
+            misses[k] = abs(trace.qpos[-1, header.jnt_qposadr[joint]] - trace.ctrl[-1, k])
+    return misses

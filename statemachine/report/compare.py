@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from ..compare import (
     Agreement,
     ChaosFloor,
@@ -17,13 +15,13 @@ from ..compare import (
     series,
     touches,
 )
-from ..compare.why import Attribution, Explanation
+from ..compare.why import Explanation
 from ..measures import QUANTITIES
 from ..measures.text import NONE, milliseconds, quantity, sentence
 from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
 from ..runs import Trace
 from ..witness import SAME_READING
-from . import explain, why
+from . import why
 from .commanded import commanded
 from .contacts import contact_words
 from .events import Event, events_of, events_table
@@ -39,11 +37,13 @@ from .finding import (
 )
 from .floor import floor_words
 from .loops import also_open, loops, told, unmatched
-from .over_time import BothRuns, QuantityChart, chart_of, foot_of
+from .over_time import BothRuns, QuantityChart, charts_of
 from .provenance import emulated, provenance
 
 _ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
 _HEADERS = ("quantity", "verdict", "largest", "at, s", "RMS", "settled", "from, s", "tolerance")
+AGREEING = "Those that agree: {count}"
+MORE = "Quantities that have no chart, because they are nearer to agreement or not finite: {count}."
 _EMULATED = ("emulated", "What is emulated")
 
 
@@ -55,7 +55,6 @@ def page(
     tip: str | None = None,
     said: Sequence[str] = (),
     witness: Witness | None = None,
-    attribution: Attribution | None = None,
     explanation: Explanation | None = None,
     why_not: str = "",
     models: Page | None = None,
@@ -73,7 +72,6 @@ def page(
         tip: The site that was compared, as given to `compare`.
         said: What stood in for a run, line by line.
         witness: What a third party says of both sides' fingertips, if asked.
-        attribution: How much each factor explains, if that was asked.
         explanation: What two sides differ in, and what each of it explains, if that was asked.
         why_not: Why there is none, as a sentence.
         models: The differences between what the engines make of the model, if asked.
@@ -87,19 +85,19 @@ def page(
     touching = touches(one, two)
     events = events_of(comparison, touching)
     notes = [sentence(line) for line in (*said, *comparison.notes)]
-    both = _over_time(comparison, one, two, curves, events, attribution, tip, floor)
+    both = _over_time(comparison, one, two, curves, events, explanation, tip, floor)
     reasons: list[Block] = [Text(why_not)] if why_not else []
-    if attribution is not None:
-        reasons = [*_rerun(attribution), *why.causes(attribution)]
-    elif explanation is not None:
-        reasons = [*explain.causes(explanation), *explain.three_of(explanation)]
+    if explanation is not None:
+        reasons = [*why.causes(explanation), *_three(explanation)]
     kept = emulated(comparison)
-    agree = why.steps(attribution) if attribution is not None and attribution.alone else []
+    agree = why.steps(explanation) if explanation is not None else []
     made_by = [Text("This page was made by:"), Code([command])] if command else []
     origin = [provenance((one.header, two.header), comparison), *made_by]
     sections = [
         Section("why", "What causes it", reasons),
-        Section("curves", "How far apart, over time", _sorted(both.charts), detail=True),
+        Section(
+            "curves", "How far apart, over time", _sorted(both.charts, len(curves)), detail=True
+        ),
         Section("figures", "The figures", _figures(comparison, witness, floor)),
         Section("events", "What happens when", [events_table(events, labels)], detail=True),
         *([_models(models, bool(kept))] if models is not None else []),
@@ -112,7 +110,7 @@ def page(
         *([Text(one.header.says)] if one.header.says else []),
         *told(run),
         *commanded(one, two, labels),
-        *in_words(comparison, events, attribution),
+        *in_words(comparison, events, explanation),
         *(() if comparison.ended else contact_words(comparison, touching)),
         *([Items(notes)] if notes else []),
         both,
@@ -123,7 +121,7 @@ def page(
         f"{one.header.experiment}: {comparison.one.label} and {comparison.two.label}",
         _origin(comparison),
         blocks,
-        also_open(headline(comparison, events, attribution, curves), played),
+        also_open(headline(comparison, events, explanation, curves), played),
     )
 
 
@@ -133,26 +131,14 @@ def _over_time(
     two: Trace,
     curves: Sequence[Series],
     events: Sequence[Event],
-    attribution: Attribution | None,
+    explanation: Explanation | None,
     tip: str | None,
     floor: ChaosFloor | None,
 ) -> BothRuns:
     """The scene and a chart for each quantity that is a number throughout."""
-    labels = long_labels(comparison)
     found = {each.name: each for each in comparison.agreements}
-    bands = {} if floor is None else {band.name: band.width for band in floor.bands}
-    charts = tuple(
-        chart_of(
-            curve,
-            found[curve.name],
-            labels,
-            foot_of(curve, one, two, labels),
-            bands.get(curve.name),
-        )
-        for curve in curves
-        if np.isfinite(curve.difference).all()
-    )
-    of, most = subject(comparison, attribution), leading(comparison)
+    charts = charts_of(comparison, one, two, curves, floor)
+    of, most = subject(comparison, explanation), leading(comparison)
     lead = [k for k, chart in enumerate(charts) if most and chart.curve.name == most.name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
     moments = {each.at for each in found.values()}
@@ -161,7 +147,7 @@ def _over_time(
         comparison.one.experiment,
         one,
         two,
-        labels,
+        long_labels(comparison),
         short_labels(comparison),
         default_tip(one.header, two.header) if tip is None else tip,
         comparison.until,
@@ -173,28 +159,23 @@ def _over_time(
     )
 
 
-def _rerun(attribution: Attribution) -> list[Block]:
-    """How the causes were looked for."""
-    if not attribution.alone:
+def _three(explanation: Explanation) -> list[Block]:
+    """The three parts of the gap, and what they mean; nothing where there is none to explain."""
+    if explanation.is_rounding:
         return []
-    text = (
-        f"Both sides were run again, {attribution.runs} runs in all, with less and less between "
-        "them. What a thing explains is the part of the gap that goes when it is made the same on "
-        "both sides or, where it is each engine's own doing, left out on both."
-    )
-    return [Text(text)]
+    return [Text(f"{why.parts(explanation)}."), Text(why.THREE, small=True)]
 
 
-def _sorted(charts: Sequence[QuantityChart]) -> list[Block]:
+def _sorted(charts: Sequence[QuantityChart], total: int) -> list[Block]:
     """Charts, those that differ first; those that agree folded away if they are not all."""
     order = {"differs": 0, "settles": 1, "agrees": 2}
     ranked = sorted(charts, key=lambda c: (order[c.found.verdict], -c.found.tolerances()))
     beyond: list[Block] = [chart for chart in ranked if chart.found.verdict != "agrees"]
     within: list[Block] = [chart for chart in ranked if chart.found.verdict == "agrees"]
-    if not beyond or not within:
-        return beyond or within
-    told = f"The {len(within)} that agree" if len(within) > 1 else "The one that agrees"
-    return [*beyond, Section("", told, within, folded=True)]
+    if beyond and within:
+        within = [Section("", AGREEING.format(count=len(within)), within, folded=True)]
+    more = [Text(MORE.format(count=total - len(charts)))] if total > len(charts) else []
+    return [*beyond, *within, *more]
 
 
 def _figures(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib
 import io
+import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,18 +14,28 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..installed import require_extra
+from ..interface import Array
 from ..page import Bars, Block, HeatMap, Pipeline, Slots, Traces
 from ..runs.whole import replace_bytes
-from .log_axis import LogAxis
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
-_INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
+INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
 _WIDE = 30.0  # times the least value: beyond, colours are logarithmic
 _WRITTEN, _LONG = 150, 60  # cells whose figures are written; letters that fit under a map
 _UP = 24  # letters that fit beside a map
-_POWERS = 8  # that a log axis names, at most
+_DARK = 0.7  # of the scale: beyond, figures are white
+_POWERS = 8  # that the colours of a map name, at most
+_WRITTEN_OUT = range(-3, 4)  # powers of ten; others as 1e6
 _TITLE = 80  # letters of a line of it
-
+_LINES = ("-", "--", ":", "-.")
+_FLOOR = "#bdbdbd"
+# A colour-blind-safe pair, pale and broad under dark and dashed: told apart in grey too.
+SIDES: tuple[dict[str, Any], ...] = (
+    {"color": "#f0a830", "linewidth": 2.0, "linestyle": "-", "solid_capstyle": "butt"},
+    {"color": "#4b1f78", "linewidth": 0.8, "linestyle": (0, (4, 1.6))},
+)
+GAP: dict[str, Any] = {"color": INK, "linewidth": 1.0}  # of the sides
+Box = tuple[float, float, float, float]
 
 Drawn = Traces | Slots | Pipeline | HeatMap | Bars
 _DOTS = 150  # a PNG has to an inch
@@ -36,6 +47,8 @@ SETTINGS: dict[str, Any] = {
     "svg.hashsalt": "statemachine",
     "pdf.fonttype": 42,
     "text.parse_math": False,  # a name may have a $ in it
+    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor"), INK),
+    **dict.fromkeys(("xtick.color", "ytick.color"), INK),
 }
 _METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
@@ -69,14 +82,16 @@ def require_matplotlib() -> Any:
     return importlib.import_module("matplotlib")
 
 
-def saved(draw: Callable[[], Any], form: str, settings: dict[str, Any], **how: Any) -> bytes:
+def saved(
+    draw: Callable[[], Any], form: str, settings: Mapping[str, Any] = SETTINGS, dpi: int = _DOTS
+) -> bytes:
     """What is drawn, as svg, png or pdf; the same gives the same bytes.
 
     Args:
         draw: Makes a figure of matplotlib's.
         form: "svg", "png" or "pdf".
         settings: Of matplotlib.
-        how: What `savefig` takes.
+        dpi: Dots of a png to an inch.
 
     Raises:
         MissingEngineError: matplotlib is not installed.
@@ -86,7 +101,7 @@ def saved(draw: Callable[[], Any], form: str, settings: dict[str, Any], **how: A
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(settings)
         out = io.BytesIO()
-        draw().savefig(out, format=form, metadata=_METADATA[form], **how)
+        draw().savefig(out, format=form, metadata=_METADATA[form], dpi=dpi)
     return out.getvalue()
 
 
@@ -129,57 +144,122 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
         from matplotlib.figure import Figure
 
         size = max(width for width, _ in sizes), sum(heights)
-        figure = Figure(
-            figsize=size, facecolor=_PAPER, layout="constrained" if heights[1:] else None
-        )
+        figure = Figure(size, facecolor=_PAPER, layout="constrained")
         rows = figure.subplots(len(pictures), height_ratios=heights, squeeze=False)[:, 0]
         for axes, picture in zip(rows, pictures, strict=True):
-            cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
+            draw_picture(axes, picture)
             if heights[1:]:
                 title = textwrap.fill(picture.title, _TITLE)
                 axes.set_title(title, fontsize="medium", loc="left")
         return figure
 
-    return saved(draw, form, SETTINGS, dpi=_DOTS, bbox_inches="tight")
+    return saved(draw, form)
+
+
+def draw_picture(axes: Any, picture: Drawn) -> None:
+    """Draw a picture on axes of matplotlib's."""
+    cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
+
+
+def chart(picture: Traces, form: str, size: tuple[float, float], box: Box) -> bytes:
+    """Curves without a legend, where something of the caller's goes along the axis of time.
+
+    Args:
+        picture: The curves.
+        form: "svg" or "png".
+        size: Width and height [inches].
+        box: Left, bottom, width and height of the axes, as shares of that.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+
+    def draw() -> Any:
+        from matplotlib.figure import Figure
+
+        figure = Figure(size, facecolor="none" if form == "svg" else _PAPER)
+        draw_picture(figure.add_axes(box), picture)
+        return figure
+
+    settings = {"font.size": 8, "axes.linewidth": 0.6, "axes.facecolor": "none"}
+    return saved(draw, form, {**SETTINGS, **settings}, 100)
 
 
 def _traces(axes: Any, picture: Traces) -> None:
     # "engine: what": one colour for what, one kind of line for an engine.
     parts = {name: name.rpartition(": ")[::2] for name in picture.curves}
-    engines = list(dict.fromkeys(engine for engine, _ in parts.values()))
-    things = list(dict.fromkeys(thing for _, thing in parts.values()))
-    log = None
-    if picture.log:
-        log = LogAxis.around(np.concatenate([np.asarray(y) for _, y in picture.curves.values()]))
-    for name, (x, y) in picture.curves.items():
-        engine, thing = parts[name]
-        style = ("-", "--", ":", "-.")[engines.index(engine) % 4]
+    engines, things = (list(dict.fromkeys(words)) for words in zip(*parts.values(), strict=True))
+    curves = [(np.asarray(x, float), np.asarray(y, float)) for x, y in picture.curves.values()]
+    every = np.concatenate([y for _, y in curves])
+    least = _log_axis(axes, every, picture.tolerance) if picture.log else -np.inf
+    for k, ((x, y), (name, (engine, thing))) in enumerate(zip(curves, parts.items(), strict=True)):
         colour = _COLOURS[things.index(thing) % len(_COLOURS)]
-        along, up = log.line(np.asarray(x), np.asarray(y)) if log else (x, y)
-        axes.plot(along, up, style, color=colour, label=name)
-    if log is not None:
-        log_scale(axes, log, _POWERS)
+        style: dict[str, Any] = {"linestyle": _LINES[engines.index(engine) % 4], "color": colour}
+        if picture.sides:
+            style = GAP if picture.log else SIDES[k]
+        places = _parted(x, np.where(y == 0, 0.0, np.maximum(y, least))) if picture.log else (x, y)
+        axes.plot(*places, label=name, **style)
+    _spanned(axes, every, picture.least)
+    if picture.tolerance:
+        axes.axhline(picture.tolerance, color=INK, linewidth=0.7, linestyle=(0, (1, 1.5)))
+    if picture.floor is not None:
+        x, y = map(np.asarray, picture.floor)
+        axes.fill_between(x, axes.get_ylim()[0], y, where=y > least, color=_FLOOR, linewidth=0,
+                          zorder=0.5)  # fmt: skip
     axes.set_xlabel(picture.across)
     axes.set_ylabel(picture.up)
-    axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)
+    if picture.sides:
+        axes.set_xlim(0, max(curves[0][0][-1], 1e-9))
+        return
+    axes.grid(alpha=0.3)
     if len(picture.curves) > 1:
         beside = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
         axes.legend(fontsize="small", frameon=False, **beside)
 
 
-def log_scale(axes: Any, log: LogAxis, most: int) -> None:
-    """Give the vertical axis of matplotlib's axes the places of a log axis.
+def _spanned(axes: Any, values: Array, least: float) -> None:
+    """Let the vertical axis go over so much at least: what does not matter is not blown up."""
+    values = values[np.isfinite(values)]
+    if len(values) and least > np.ptp(values):
+        middle = (values.min() + values.max()) / 2
+        axes.set_ylim(middle - 0.58 * least, middle + 0.58 * least)
 
-    Args:
-        axes: On which places are drawn.
-        log: What gives the places.
-        most: How many powers of ten are named.
+
+def _log_axis(axes: Any, values: Array, tolerance: float | None) -> float:
+    """A log axis with a level of its own for what is exactly zero, parted from the rest.
+
+    Returns:
+        The least value that has a place: below a thousandth of the tolerance nothing matters.
     """
-    axes.set_ylim(log.bottom, log.high)
-    axes.set_yticks(*zip(*log.ticks(most), strict=True))
-    if log.edge is not None:
-        axes.axhspan(log.bottom, log.edge, color=_BELOW, linewidth=0, zorder=0)
+    shown = values[np.isfinite(values) & (values > 0)]
+    shown = np.append(shown, tolerance) if tolerance else shown
+    most, least = (shown.max(), shown.min()) if len(shown) else (1.0, 1.0)
+    high = math.ceil(math.log10(most) + 0.05)
+    low = min(math.floor(math.log10(least)), high - 2)
+    if tolerance:
+        low = max(low, math.floor(math.log10(tolerance)) - 3)
+    below, has_zero = 10.0**low, bool((values == 0).any())
+    axes.set_yscale("symlog", linthresh=below, linscale=0.2 * (high - low))
+    axes.set_ylim(-0.25 * below if has_zero else below, 10.0**high)
+    if has_zero:
+        axes.axhspan(-0.25 * below, 0.5 * below, color=_BELOW, linewidth=0, zorder=0)
+    room = max(2, int(axes.bbox.height / axes.figure.dpi / 0.35))
+    powers = range(high, low - 1, -(high - low + 1) // room)[::-1]
+    names = [f"{10.0**k:g}" if k in _WRITTEN_OUT else f"1e{k}".replace("-", "−") for k in powers]
+    zero = [0.0] if has_zero else []
+    axes.set_yticks([*zero, *(10.0**k for k in powers)], [*(["0"] * len(zero)), *names])
+    axes.minorticks_off()
+    return below
+
+
+def _parted(x: Array, y: Array) -> tuple[Array, Array]:
+    """Points of a line that is broken where it comes from zero or goes there.
+
+    Between zero and another value lie all powers of ten, and the line was at none of them.
+    """
+    breaks = np.flatnonzero(np.diff(y == 0)) + 1
+    return np.insert(x, breaks, np.nan), np.insert(y, breaks, np.nan)
 
 
 def _slots(axes: Any, picture: Slots) -> None:
@@ -188,12 +268,12 @@ def _slots(axes: Any, picture: Slots) -> None:
     widest = max(stop for row in picture.rows.values() for _, _, stop in row)
     for level, (name, row) in enumerate(picture.rows.items()):
         y = -2.0 * level
-        axes.text(-0.3, y + 0.5, name, ha="right", va="center", family="monospace", color=_INK)
+        axes.text(-0.3, y + 0.5, name, ha="right", va="center", family="monospace", color=INK)
         for owner, start, stop in row:
             colour = _COLOURS[owners.index(owner) % len(_COLOURS)]
             for slot in range(start, stop):
                 axes.add_patch(_box(slot, y, 1, 1, colour))
-                axes.text(slot + 0.5, y + 0.5, str(slot), ha="center", va="center", color=_INK)
+                axes.text(slot + 0.5, y + 0.5, str(slot), ha="center", va="center", color=INK)
             if level == 0:
                 alone = stop == start + 1  # a name does not fit over one slot
                 axes.text(
@@ -204,7 +284,7 @@ def _slots(axes: Any, picture: Slots) -> None:
                     va="bottom",
                     rotation=35 if alone else 0,
                     fontsize="small",
-                    color=_INK,
+                    color=INK,
                 )
     axes.set_xlim(-1.5, widest + 0.5)
     axes.set_ylim(-2.0 * len(picture.rows) + 1.7, 3.2)
@@ -219,14 +299,14 @@ def _pipeline(axes: Any, picture: Pipeline) -> None:
     for k, (heading, content) in enumerate(picture.stages):
         x = 3.2 * k
         axes.add_patch(_box(x, 0, 2.6, top, _COLOURS[k % len(_COLOURS)]))
-        axes.text(x + 1.3, top - 0.35, heading, ha="center", va="center", weight="bold", color=_INK)
+        axes.text(x + 1.3, top - 0.35, heading, ha="center", va="center", weight="bold", color=INK)
         for line, text in enumerate(content):
             y = top - 0.85 - 0.32 * line
-            axes.text(x + 0.2, y, text, va="center", family="monospace", fontsize=8, color=_INK)
+            axes.text(x + 0.2, y, text, va="center", family="monospace", fontsize=8, color=INK)
         if k:
             axes.annotate(
                 "", (x - 0.05, top / 2), (x - 0.55, top / 2),
-                arrowprops={"arrowstyle": "->", "color": _INK},
+                arrowprops={"arrowstyle": "->", "color": INK},
             )  # fmt: skip
     for k, (name, first, last) in enumerate(picture.spans):
         y, left, right = -0.5 - 0.6 * k, 3.2 * first, 3.2 * last + 2.6
@@ -235,7 +315,7 @@ def _pipeline(axes: Any, picture: Pipeline) -> None:
         )
         axes.text(
             (left + right) / 2, y, name, ha="center", va="center", family="monospace",
-            bbox={"facecolor": _PAPER, "edgecolor": "none", "pad": 2}, color=_INK,
+            bbox={"facecolor": _PAPER, "edgecolor": "none", "pad": 2}, color=INK,
         )  # fmt: skip
     axes.set_xlim(-0.2, 3.2 * len(picture.stages) - 0.4)
     axes.set_ylim(-0.6 * len(picture.spans) - 0.5, top + 0.1)
@@ -245,48 +325,42 @@ def _pipeline(axes: Any, picture: Pipeline) -> None:
 def _heat_map(axes: Any, picture: HeatMap) -> None:
     """Cells with their figures; hatched where they are not to be read."""
     import matplotlib
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.colors import ListedColormap, LogNorm, Normalize
     from matplotlib.patches import Rectangle
 
     values = np.array([[np.nan if v is None else v for v in row] for row in picture.values])
-    known = values[np.isfinite(values) & ~np.array(picture.hatched, dtype=bool)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    shown = np.ma.masked_where(~np.isfinite(values) | np.array(picture.hatched, bool), values)
+    low, high = (float(shown.min()), float(shown.max())) if shown.count() else (0.0, 1.0)
     wide = low > 0 and high > _WIDE * low
     norm = (LogNorm if wide else Normalize)(low if wide else 0.0, high or 1.0)
-    colours = matplotlib.colormaps["YlOrBr"]
+    pale = ListedColormap(matplotlib.colormaps["YlOrBr"](np.linspace(0, 0.85, 256)))
+    rows, columns = (np.arange(n + 1) - 0.5 for n in values.shape)
+    cells = axes.pcolormesh(columns, rows, shown, norm=norm, cmap=pale, edgecolors="face")
     axes.set_facecolor(_BELOW)
-    small = values.size <= _WRITTEN
     for r, c in np.ndindex(*values.shape):
-        value = values[r, c]
+        value, corner = values[r, c], (c - 0.5, r - 0.5)
+        centre: dict[str, Any] = {"ha": "center", "va": "center"}
         if not np.isfinite(value):
-            axes.text(c, r, "no run", ha="center", va="center", fontsize=6, color=_INK)
+            axes.text(c, r, "no run", fontsize=6, color=INK, **centre)
             continue
-        hatched = picture.hatched[r][c]
-        face = _PAPER if hatched else colours(0.85 * float(norm(np.clip(value, low, high))))
-        axes.add_patch(
-            Rectangle((c - 0.5, r - 0.5), 1, 1, facecolor=face, edgecolor="#999999",
-                      linewidth=0.3, hatch="////" if hatched else None)
-        )  # fmt: skip
+        paper: dict[str, Any] = {"fill": False}
+        if picture.hatched[r][c]:
+            paper = {"facecolor": _PAPER, "hatch": "////"}
+        axes.add_patch(Rectangle(corner, 1, 1, edgecolor="#999999", linewidth=0.3, **paper))
         if picture.framed[r][c]:
-            axes.add_patch(
-                Rectangle((c - 0.46, r - 0.46), 0.92, 0.92, fill=False, edgecolor=_COLOURS[2],
-                          linewidth=1.6)
-            )  # fmt: skip
-        if small:
-            dark = not hatched and float(norm(np.clip(value, low, high))) > 0.7
-            axes.text(c, r, f"{value:.3g}", ha="center", va="center", fontsize=7,
-                      color=_PAPER if dark else _INK)  # fmt: skip
-    axes.set_xlim(-0.5, values.shape[1] - 0.5)
-    axes.set_ylim(-0.5, values.shape[0] - 0.5)
+            inner = c - 0.46, r - 0.46
+            axes.add_patch(Rectangle(inner, 0.92, 0.92, fill=False, edgecolor=_COLOURS[2], lw=1.6))
+        if values.size <= _WRITTEN:
+            dark = not picture.hatched[r][c] and norm(value) > _DARK
+            colour = _PAPER if dark else INK
+            axes.text(c, r, f"{value:.3g}", fontsize=7, color=colour, **centre)
     axes.set_xticks(range(len(picture.columns)), picture.columns, fontsize=8,
                     rotation=45 if len("".join(picture.columns)) > _LONG else 0)  # fmt: skip
     axes.set_yticks(range(len(picture.rows)), picture.rows, fontsize=8)
     axes.set_xlabel(picture.across)
     axes.set_ylabel(textwrap.fill(picture.up, _UP))
-    scale = ScalarMappable(norm, colours.resampled(256))
     # Beside its map, whatever room the legends of other panels take.
-    bar = axes.figure.colorbar(scale, cax=axes.inset_axes((1.02, 0.0, 0.02, 1.0)))
+    bar = axes.figure.colorbar(cells, cax=axes.inset_axes((1.02, 0.0, 0.02, 1.0)))
     if wide:
         every = 1 + int(np.log10(high / low)) // _POWERS
         mantissas = (1, 2, 5) if high < 1e4 * low else (1,)
@@ -306,7 +380,7 @@ def _bars(axes: Any, picture: Bars) -> None:
                   color=_COLOURS[k], alpha=0.75, label=what)  # fmt: skip
         for place, (_, interval) in zip(places, bars, strict=True):
             if interval is not None:
-                axes.plot(interval, [place, place], color=_INK, linewidth=1.2)
+                axes.plot(interval, [place, place], color=INK, linewidth=1.2)
     axes.set_yticks(range(len(picture.names)), picture.names)
     axes.invert_yaxis()
     axes.set_xlabel(picture.across)

@@ -7,17 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..compare import Comparison, labels_of, series
+from ..compare import Comparison, compare, labels_of, series
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..interface import Model
-from ..measures.text import reading
 from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
 from ..rendering.pictures import check_size
 from ..runs import Trace
 from ..runs.drive import Progress, silent
+from .figures import require_matplotlib
 from .film_files import SUFFIXES, write_mp4, write_webp
-from .film_overlay import Overlay, Strip
+from .film_overlay import Overlay
+from .over_time import QuantityChart, charts_of
 
 SMALLEST = (240, 180)  # in which the strip and the text have room
 
@@ -48,6 +49,7 @@ def check_suffix(path: Path) -> None:
         hint = "; WebP is smaller and has all colours" if suffix == ".gif" else ""
         raise BadInputError(f"a film is a file {' or '.join(SUFFIXES)}; got {path.name!r}{hint}")
     require_extra("PIL.Image", "a film", "Pillow", "render")
+    require_matplotlib()
     if suffix == ".mp4":
         require_extra("imageio_ffmpeg", "mp4", "ffmpeg", "mp4", "WebP needs nothing more")
 
@@ -120,22 +122,15 @@ def _length(path: Path, timing: Timing) -> float:
     return sum(timing.milliseconds) / 1000
 
 
-def _strip(one: Trace, two: Trace | None, comparison: Comparison | None) -> Strip | None:
+def _strip(one: Trace, two: Trace | None, comparison: Comparison | None) -> QuantityChart | None:
     """How far apart the fingertips are; without one, what is farthest beyond its tolerance."""
     if two is None:
         return None
-    worst = comparison.worst.name if comparison is not None and comparison.worst else ""
-    by_rank = sorted(series(one, two), key=lambda each: (each.kind != "tip", each.name != worst))
-    if not by_rank:
-        return None
-    curve = by_rank[0]
-    scale, unit = reading(curve.unit)
-    found = comparison.agreements if comparison is not None else ()
-    tolerances = {each.name: scale * each.tolerance for each in found}
-    return Strip(
-        curve.name.removesuffix(", position"),
-        unit.strip(),
-        curve.time,
-        scale * curve.difference,
-        tolerances.get(curve.name),
+    if comparison is None:
+        comparison = compare(one, two)
+    charts = charts_of(comparison, one, two, series(one, two), None)
+    return max(
+        charts,
+        key=lambda each: (each.curve.kind == "tip", each.found.tolerances()),
+        default=None,
     )

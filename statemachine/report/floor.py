@@ -2,77 +2,62 @@
 
 from __future__ import annotations
 
-from ..compare import ChaosFloor, Comparison, FloorBand
-from ..measures.text import count, listed, quantity, rounded, short_time
+from ..compare import ChaosFloor, Comparison
+from ..measures.text import listed, quantity, rounded, short_time
 from ..page import Block, Text
 from .finding import name_of, short_labels
 
+CHANGED = "start and commands changed by rounding ({rounding:g})"
+CHANGED_START = "{changed}, and its start by {sizes}"
+FLOOR = (
+    "The chaos floor (runs of {side}: {runs} more, {changed}). Where a gap is no larger than what "
+    "that makes of the run, nothing can be concluded."
+)
+ENDED = "Runs of it that ended early: {ended}; from then on it has no bound."
+MOST = "It is at most {sizes}."
+NO_GAP = "No gap ends inside it."
+EVERY_GAP = "Every gap lies inside it, all the time."
+INSIDE = "Inside it in the end: {names}."
+INSIDE_FROM = "{name} from {since} on"
+CHANCE = (
+    "{names}: beyond the tolerance, but never where the gap is beyond the floor, so that may be "
+    "chance."
+)
+
 
 def floor_words(comparison: Comparison, floor: ChaosFloor) -> list[Block]:
-    """How the floor was found, how high it is, and what lies inside it."""
-    return [Text(" ".join([_made(comparison, floor), *_high(floor), *_inside(comparison, floor)]))]
+    """How the floor was made, how high it is, and what lies inside it."""
+    side, changed = short_labels(comparison)[0], changed_by(floor)
+    lines = [FLOOR.format(side=side, runs=floor.runs, changed=changed)]
+    largest = [
+        max((band for band in floor.bands if band.unit == unit), key=lambda b: b.most, default=None)
+        for unit in ("rad", "m")
+    ]
+    sizes = [f"{quantity(b.most, b.unit)} ({name_of(b.name)})" for b in largest if b]
+    if floor.ended:
+        lines.append(ENDED.format(ended=floor.ended))
+    elif sizes:
+        lines.append(MOST.format(sizes=listed(sizes)))
+    motion = [band for band in floor.bands if band.kind != "contact"]
+    within = [band for band in motion if band.inside_from is not None]
+    moving = [
+        INSIDE_FROM.format(name=name_of(b.name), since=short_time(b.inside_from or 0.0))
+        for b in within
+        if b.most > 0
+    ]
+    everywhere = len(within) == len(motion) and all(band.inside_from == 0 for band in within)
+    inside = NO_GAP if not moving else EVERY_GAP if everywhere else INSIDE
+    lines.append(inside.format(names=", ".join(moving)))
+    verdicts = {agreement.name: agreement.verdict for agreement in comparison.agreements}
+    chance = [b.name for b in floor.bands if not b.beyond and verdicts[b.name] != "agrees"]
+    if chance and inside is INSIDE:
+        lines.append(CHANCE.format(names=listed([name_of(name) for name in chance])))
+    return [Text(" ".join(lines))]
 
 
 def changed_by(floor: ChaosFloor) -> str:
     """What was changed in the runs that it is made of."""
     size = floor.uncertain
-    uncertain = [
-        rounded(value, unit)
-        for value, unit in ((size.length, "m"), (size.angle, "rad"))
-        if value > 0
-    ]
-    start = f", and its start by {listed(uncertain)}" if uncertain else ""
-    return f"start and commands changed by rounding ({floor.rounding:g}){start}"
-
-
-def _made(comparison: Comparison, floor: ChaosFloor) -> str:
-    return (
-        f"The chaos floor: {short_labels(comparison)[0]} was run {count(floor.runs, 'time')} more, "
-        f"{changed_by(floor)}. Where a gap is no larger than what that makes of the run, nothing "
-        "can be concluded."
-    )
-
-
-def _high(floor: ChaosFloor) -> list[str]:
-    """The largest floor of each unit of motion."""
-    if floor.ended:
-        return [f"{floor.ended} of these runs ended early: from then on it has no bound."]
-    words = []
-    for unit in ("rad", "m"):
-        bands = [band for band in floor.bands if band.unit == unit]
-        if bands:
-            most = max(bands, key=lambda band: band.most)
-            words.append(f"{quantity(most.most, unit)} ({name_of(most.name)})")
-    return [f"It is at most {listed(words)}."] if words else []
-
-
-def _inside(comparison: Comparison, floor: ChaosFloor) -> list[str]:
-    """Which gaps end inside the floor, and which are never beyond it and their tolerance."""
-    motion = [band for band in floor.bands if band.kind != "contact"]
-    within = [band for band in motion if band.inside_from is not None]
-    moving = [band for band in within if band.most > 0]
-    if not moving:
-        return ["No gap ends inside it."]
-    if len(within) == len(motion) and all(band.inside_from == 0 for band in within):
-        return ["Every gap lies inside it, all the time."]
-    groups: dict[float, list[FloorBand]] = {}
-    for band in moving:
-        groups.setdefault(float(band.inside_from or 0.0), []).append(band)
-    words = [
-        f"{listed([name_of(band.name) for band in bands])} "
-        + (f"from {short_time(since)} on" if since else "all the time")
-        for since, bands in sorted(groups.items())
-    ]
-    found = [f"Inside it: {'; '.join(words)}."]
-    verdicts = {each.name: each.verdict for each in comparison.agreements}
-    chance = [
-        name_of(band.name)
-        for band in floor.bands
-        if not band.beyond and verdicts[band.name] != "agrees"
-    ]
-    if chance:
-        found.append(
-            f"{listed(chance)}: beyond the tolerance, but never where the gap is beyond the floor, "
-            "so that may be chance."
-        )
-    return found
+    sizes = [rounded(v, unit) for v, unit in ((size.length, "m"), (size.angle, "rad")) if v > 0]
+    changed = CHANGED.format(rounding=floor.rounding)
+    return CHANGED_START.format(changed=changed, sizes=listed(sizes)) if sizes else changed

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..compare import Agreement, Comparison, SidesRun
-from ..measures.text import NONE, quantity
+from ..measures.text import NONE, quantity, sentence
 from ..page import Block, Headline, Items, Section, Table, TableCell, Text
 from .finding import name_of, short_labels
+from .why import missing
 
 _MEANS = (
     "Closed loop: each side computes its commands from its own state, so this is what feedback "
@@ -29,12 +30,14 @@ _SAID = {
         "which the recorded commands of the left do not repeat on the right."
     ),
 }
+_LACKING = "Actuators of the left that the right lacks are not commanded there."
+_OPEN = "{lead}; in open loop, with the left's commands on both, they {verdict}"
 
 
 def unmatched(run: SidesRun | None) -> list[Block]:
-    """What could not be matched, and what was matched by more than its name."""
-    lines = run.unmatched if run else ()
-    return [Items([line[:1].upper() + line[1:] + "." for line in lines])] if lines else []
+    """What one side has nothing of, what could not be matched, and what was not by name."""
+    lines = [*missing(run.missing), *run.unmatched] if run else []
+    return [Items([sentence(line) for line in lines])] if lines else []
 
 
 def told(run: SidesRun | None) -> list[Block]:
@@ -42,8 +45,7 @@ def told(run: SidesRun | None) -> list[Block]:
     if run is None or run.commands not in _SAID:
         return []
     lacking = run.matched.only[0].get("actuator", ()) if run.matched else ()
-    deaf = " The right has no counterpart of all actuators, and was told what it can take."
-    return [Text(_SAID[run.commands] + deaf * bool(lacking))]
+    return [Text(_SAID[run.commands]), *([Text(_LACKING)] if lacking else [])]
 
 
 def loops(comparison: Comparison, played: Comparison | None) -> list[Block]:
@@ -70,18 +72,14 @@ def also_open(headline: Headline, played: Comparison | None) -> Headline:
     """The headline, and what the open loop says where it says something else."""
     if played is None or played.agrees == headline.holds:
         return headline
-    if headline.holds:
-        lead = f"{headline.lead}; in open loop, with the left's commands on both, they do not agree"
-        return replace(headline, lead=lead, holds=False)
-    lead = f"{headline.lead}; in open loop, with the left's commands on both, they agree"
-    return replace(headline, lead=lead)
+    verdict = "agree" if played.agrees else "do not agree"
+    lead = _OPEN.format(lead=headline.lead, verdict=verdict)
+    return replace(headline, lead=lead, holds=headline.holds and played.agrees)
 
 
-def _cells(found: Agreement | None) -> tuple[str, str]:
-    if found is None:
+def _cells(agreement: Agreement | None) -> tuple[str, str]:
+    if agreement is None:
         return NONE, NONE
-    largest = found.note if found.kind == "contact" and found.note else ""
-    return (
-        TableCell(found.verdict, verdict=found.verdict),
-        largest or quantity(found.max, found.unit),
-    )
+    note = agreement.note if agreement.kind == "contact" else ""
+    verdict = TableCell(agreement.verdict, verdict=agreement.verdict)
+    return verdict, note or quantity(agreement.max, agreement.unit)

@@ -24,8 +24,9 @@ from ..page import (
 from .quiz import answer_of, lettered
 from .terminal import together
 
-# What Markdown would take for its own; underscores within words it leaves alone.
-_SPECIAL = re.compile(r"([\\`*\[\]<>|])")
+# Code between backticks, which stays; and what else Markdown would take for its own, but for
+# underscores, which it leaves alone within words.
+_SPECIAL = re.compile(r"(`[^`|\n]+`)|([\\`*\[\]<>|])")
 
 
 def markdown(page: Page, picture: Callable[[Picture], str], level: int = 1) -> str:
@@ -159,4 +160,4 @@ def _fenced(text: str, language: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    return _SPECIAL.sub(r"\\\1", text)
+    return _SPECIAL.sub(lambda match: match[1] or f"\\{match[2]}", text)

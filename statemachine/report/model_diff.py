@@ -38,7 +38,18 @@ _LAST = {
 # Figures that say no more than the name of their difference.
 _SAID_BY_ITS_NAME = {
     *("ctrlrange", "forcerange", "gear", "range", "axis", "origin", "moments", "stiffness"),
-    *("friction", "condim", "priority", "active", "jnt", "geom", "shapes", "joint", "actuator"),
+    *(
+        "friction",
+        "condim",
+        "priority",
+        "active",
+        "jnt",
+        "geom",
+        "shape",
+        "type",
+        "joint",
+        "actuator",
+    ),
     *("timestep", "gravity", "integrator", "middle", "frame turned", "place", "zero position"),
 }
 _WHY = {
@@ -114,9 +125,7 @@ def _verdict(result: Compared) -> Verdict:
 
 
 def _subject(subject: str, found: list[Difference], everything: bool) -> Iterator[Block]:
-    rows = (
-        [_row(subject, [each]) for each in found] if everything else list(_together(subject, found))
-    )
+    rows = list(_rows(subject, found, 1 if everything else 3))
     shown = rows if everything else rows[:_ROWS]
     headers: list[str] = ["", "left", "right", "apart", _LAST.get(subject, "")]
     keep = [k for k in range(5) if k < 3 or any(row[k] for row in shown)]
@@ -150,17 +159,14 @@ def _faster(found: list[Difference]) -> Iterator[Block]:
         )
 
 
-def _together(subject: str, found: Sequence[Difference]) -> Iterator[list[str]]:
-    """Rows; where three or more places have one figure with the same values, one for all."""
+def _rows(subject: str, found: Sequence[Difference], together: int) -> Iterator[list[str]]:
+    """Rows; where so many places have one figure with the same values, one for all."""
     groups: dict[tuple[object, ...], list[Difference]] = {}
     for each in found:
         groups.setdefault((each.figure, each.one, each.two, each.size, each.unit), []).append(each)
     for group in groups.values():
-        if len(group) < 3:
-            for each in group:
-                yield _row(subject, [each])
-        else:
-            yield _row(subject, group)
+        for rows in [group] if len(group) >= together > 1 else [[each] for each in group]:
+            yield _row(subject, rows)
 
 
 def _row(subject: str, group: Sequence[Difference]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The path as one Jupyter notebook, and what a notebook shows of a station.
+"""The path as one Jupyter notebook, and what a notebook shows of a lesson.
 
 Jupyter, not marimo: the lesson is about an object that is changed in place, line by line,
 across cells. marimo's cells run by the variables that they assign, and a change inside an
@@ -34,14 +34,14 @@ if importlib.util.find_spec("statemachine") is None:
     subprocess.run([*pip, wheel[-1], "matplotlib"], check=True)
 """
 _START = """\
-from statemachine.report.notebook import station
+from statemachine.report.notebook import lesson
 
 BACKEND = "mujoco"  # or "pybullet": the only word that changes
 """
 _INTRODUCTION = """\
 # A physics simulator is a state machine that you advance
 
-Ten stations. Each has a few sentences, a question, and code to run and to change. **Write your
+Ten lessons. Each has a few sentences, a question, and code to run and to change. **Write your
 prediction between the quotes before you run the code.** The cell after it measures the same on
 your engine, now, and says whether you were right.
 """
@@ -80,7 +80,7 @@ class Shown:
         return f"<Shown {self.page.title!r}: a notebook renders it>"
 
 
-def station(name: str, backend: str = DEFAULT, prediction: str = "", **options: Any) -> Shown:
+def lesson(name: str, backend: str = DEFAULT, prediction: str = "", **options: Any) -> Shown:
     """Run a lesson and show what it says.
 
     Args:
@@ -95,11 +95,10 @@ def station(name: str, backend: str = DEFAULT, prediction: str = "", **options: 
         BadInputError: A prediction is no letter of its question.
     """
     check_name("lesson", name, LESSONS)
-    lesson = LESSONS[name]
-    known = [option.key for option in lesson.options]
+    known = [option.key for option in LESSONS[name].options]
     for key in options:
         check_name("option", key, known)
-    page = _page(lesson, backend, options)
+    page = _page(LESSONS[name], backend, options)
     letters = "".join(prediction.lower().split())
     questions = [block for block in page.blocks if isinstance(block, Question)]
     for letter, question in zip_longest(letters, questions[: len(letters)]):
@@ -119,22 +118,21 @@ def build() -> str:
         _cell("install", "code", _INSTALL),
         _cell("setup", "code", _START),
     ]
-    for number, lesson in enumerate(LESSONS.values(), start=1):
-        page = _page(lesson, DEFAULT, {})
-        title = f"## {number}. {page.title}\n\n" if lesson.station else f"## {page.title}\n\n"
-        cells.append(_cell(f"{lesson.name}-text", "markdown", title + _opening(page)))
+    for number, (name, entry) in enumerate(LESSONS.items(), start=1):
+        page = _page(entry, DEFAULT, {})
+        title = f"{number}. {page.title}" if entry.on_path else page.title
+        cells.append(_cell(f"{name}-text", "markdown", f"## {title}\n\n{_opening(page)}"))
         questions = [block for block in page.blocks if isinstance(block, Question)]
         asks = {0: "", 1: f"  # {_letters(questions)}"}.get(len(questions), _SEVERAL)
         if questions:
-            cells.append(_cell(f"{lesson.name}-prediction", "code", f'prediction = ""{asks}'))
-        line = f'sm.load("{lesson.model}", backend=BACKEND)'
-        model = load(lesson.model)
-        code = module(lesson.name).code(model, fitted(lesson, model, {}), line)
+            cells.append(_cell(f"{name}-prediction", "code", f'prediction = ""{asks}'))
+        line = f'sm.load("{entry.model}", backend=BACKEND)'
+        model = load(entry.model)
+        code = module(name).code(model, fitted(entry, model, {}), line)
         if code:
-            cells.append(_cell(f"{lesson.name}-code", "code", code))
+            cells.append(_cell(f"{name}-code", "code", code))
         given = ", prediction" if questions else ""
-        run = f'station("{lesson.name}", BACKEND{given})'
-        cells.append(_cell(f"{lesson.name}-run", "code", run))
+        cells.append(_cell(f"{name}-run", "code", f'lesson("{name}", BACKEND{given})'))
     cells.append(_cell("end", "markdown", _END))
     notebook = {
         "cells": cells,
@@ -157,9 +155,9 @@ def _letters(questions: list[Question]) -> str:
     return f"{', '.join(first)} or {last}"
 
 
-def _page(lesson: Lesson, backend: str, options: dict[str, Any]) -> Page:
-    taken = take(lesson, load(lesson.model, backend=backend), backend, options)
-    return page_of_lesson(lesson, {backend: taken})
+def _page(entry: Lesson, backend: str, options: dict[str, Any]) -> Page:
+    taken = take(entry, load(entry.model, backend=backend), backend, options)
+    return page_of_lesson(entry, {backend: taken})
 
 
 def _leading(page: Page) -> list[Text]:

@@ -6,8 +6,25 @@ from collections.abc import Sequence
 
 from ..compare import StepComparison
 from ..compare.step_samples import StageGap
-from ..measures.text import NONE, count, figure, quantity, sentence, short_time
+from ..measures.text import NONE, figure, quantity, sentence, short_time
 from ..page import Block, Headline, Items, Page, Table, TableCell, Text
+
+METHOD = (
+    "{right} is put to a state of {left}'s run (every {every} steps), and both take one step: "
+    "nothing drifts, and a difference is of that step. From the step before {right} gets: {primed}."
+)
+TOLERANCE = (
+    "Differs: at how many moments it is beyond {relative} of its usual size, and beyond the null: "
+    "how far {left} gets from its own run when it is put back to its own states, since a restore "
+    "may forget what the engine knows of contacts. Here that is at most {null} ({stage})."
+)
+NOT_COMPARED = "{stage} is not compared: {reason}."
+ORIGIN = "{left} and {right}; moments: {moments}, until {until:g} s"
+SAME_BITS = "From the same state both sides take the same step, to the last bit"
+SAME_STEP = "From the same state both sides take the same step"
+PART = "The sides part in the stage “{stage}”, {when} (at {beyond} of {moments} moments): {where}"
+BEFORE = "What comes before it in a step is the same on both sides."
+_HEADS = ("stage", "differs", "of", "largest", "at, s", "where", "from, s", "null", "tolerance")
 
 
 def page(
@@ -22,41 +39,31 @@ def page(
         said: Lines to say before anything else.
     """
     one, two = labels
-    each = "each" if result.every == 1 else f"every {_ordinal(result.every)}"
-    primed = (
-        f" {two} gets {result.primed}."
-        if result.primed
-        else f" {two} takes nothing of the step before."
-    )
-    blocks: list[Block] = [Text(line) for line in said]
-    blocks += [
-        Text(
-            f"{two} is put to {each} state of {one}'s run, and both take one step: nothing drifts, "
-            f"and a difference is of that step.{primed}"
-        ),
+    sides = {"left": one, "right": two}
+    primed = result.primed or "nothing"
+    blocks: list[Block] = [
+        *(Text(line) for line in said),
+        Text(METHOD.format(every=result.every, primed=primed, **sides)),
         Table(
-            ("stage", "differs", "of", "largest", "at, s", "where", "from, s", "null", "tolerance"),
+            _HEADS,
             [_row(gap, result.moments) for gap in result.stages],
             "The stages of a step, in their order",
             words=frozenset({0, 5}),
             emphasis=frozenset(k for k, gap in enumerate(result.stages) if gap is result.first),
             wide=frozenset({7, 8}),
         ),
-        Text(
-            f"Differs: at how many moments it is beyond {figure(result.relative)} of its usual "
-            f"size, and beyond the null: how far {one} gets from its own run when it is put back "
-            "to its own states, since a restore may forget what the engine knows of contacts. "
-            f"{_null(result)}"
-        ),
+        Text(_tolerance(result, sides)),
     ]
     if result.spikes:
         blocks.append(_spikes(result))
-    reasons = [
-        f"{gap.stage} is not compared: {gap.reason}" for gap in result.stages if not gap.told
+    notes = [
+        NOT_COMPARED.format(stage=gap.stage, reason=gap.reason)
+        for gap in result.stages
+        if not gap.told
     ]
-    notes = [sentence(line) for line in (*reasons, *result.notes)]
+    notes += [sentence(line) for line in result.notes]
     blocks += [Items(notes)] if notes else []
-    origin = f"{one} and {two}, {count(result.moments, 'moment')} until {result.until:g} s"
+    origin = ORIGIN.format(moments=result.moments, until=result.until, **sides)
     return Page(f"{experiment}: one step at a time", origin, blocks, _headline(result))
 
 
@@ -80,12 +87,13 @@ def _size(value: float, gap: StageGap) -> str:
     return quantity(value, gap.unit)
 
 
-def _null(result: StepComparison) -> str:
-    worst = [gap for gap in result.stages if gap.null > gap.tolerance]
-    if not worst:
-        return "Here that is nothing."
-    most = max(worst, key=lambda gap: gap.null / (gap.tolerance or 1e-300))
-    return f"Here that is up to {_size(most.null, most)} ({most.stage})."
+def _tolerance(result: StepComparison, sides: dict[str, str]) -> str:
+    """What a difference is, and how large the largest null is, in its tolerances."""
+    compared = [gap for gap in result.stages if gap.told and gap.unit]
+    most = max(compared, key=lambda gap: gap.null / (gap.tolerance or 1e-300))
+    null = _size(most.null, most)
+    relative = figure(result.relative)
+    return TOLERANCE.format(relative=relative, null=null, stage=most.stage, **sides)
 
 
 def _spikes(result: StepComparison) -> Table:
@@ -106,25 +114,13 @@ def _spikes(result: StepComparison) -> Table:
     )
 
 
-def _ordinal(number: int) -> str:
-    ends = {1: "st", 2: "nd", 3: "rd"}
-    return f"{number}{'th' if number % 100 in (11, 12, 13) else ends.get(number % 10, 'th')}"
-
-
 def _headline(result: StepComparison) -> Headline:
     first = result.first
     if first is None:
-        if all(gap.worst == 0 for gap in result.stages):
-            return Headline("From the same state both sides take the same step, to the last bit")
-        return Headline("From the same state both sides take the same step")
+        same = all(gap.worst == 0 for gap in result.stages)
+        return Headline(SAME_BITS if same else SAME_STEP)
     when = "from the start" if first.first == 0 else f"from {short_time(first.first or 0.0)} on"
-    share = f"at {first.beyond} of {result.moments} moments"
-    later = [gap.stage for gap in result.stages if gap.beyond and gap is not first]
-    end = "What comes before it in a step is the same on both sides."
-    if not later:
-        end += " No later stage shows it."
-    return Headline(
-        f"The sides part in the stage “{first.stage}”, {when} ({share}): {first.where}",
-        end=end,
-        holds=False,
+    lead = PART.format(
+        stage=first.stage, when=when, beyond=first.beyond, moments=result.moments, where=first.where
     )
+    return Headline(lead, end=BEFORE, holds=False)

@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..compare import Agreement, Series
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compare import Agreement, ChaosFloor, Comparison, Series
 from ..compare.series import NORMAL, normal_forces, total_forces
 from ..interface import Array
 from ..measures import same_pairs
-from ..measures.text import capital, figure, on, quantity, reading, short_time
-from ..page import Interactive
+from ..measures.text import figure, quantity, reading, short_time
+from ..page import Interactive, Traces
 from ..runs import Trace
 from .events import Event
 from .finding import name_of
+
+SPOKEN = (
+    "{name}, difference over time: at most {far} at {at}, settled at {settled}; tolerance "
+    "{tolerance}, left: {since}."
+)
+ENERGY = "Computed by {by}, from the masses, the armature and the gravity of the model."
+DRAWN = "Drawn is the sum of the normal forces."
+FORCE = (
+    "{label}: at most {normal} N; the whole force, friction added as vectors: at most {total} N."
+)
+
+MOST = 20  # charts of a page or a figure
+GAP = "how far apart"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +56,36 @@ class QuantityChart(Interactive):
     def unit(self) -> str:
         """What it is drawn in."""
         return reading(self.curve.unit)[1].strip()
+
+    def values(self) -> Traces | None:
+        """Both sides: a position as the way from where the first side began; None without."""
+        curve, scale = self.curve, reading(self.curve.unit)[0]
+        if not curve.one.size:
+            return None
+        sides = [curve.one, curve.two]
+        if curve.one.ndim > 1:
+            sides = [np.linalg.norm(side - curve.one[0], axis=1) for side in sides]
+        curves = dict(zip(self.labels, ((curve.time, scale * side) for side in sides), strict=True))
+        # What does not matter is not blown up to the height of the chart.
+        least = 20 * scale * self.found.tolerance
+        title = f"{self.title}, from its start" if curve.one.ndim > 1 else self.title
+        return Traces(f"{title} [{self.unit}]", "", "", curves, sides=True, least=least)
+
+    def gap(self) -> Traces:
+        """How far apart they are, with the tolerance and the chaos floor."""
+        time, scale = self.curve.time, reading(self.curve.unit)[0]
+        name = "" if self.curve.one.size else f"{self.title}: "
+        verdict = "DIFFERS" if self.found.verdict == "differs" else self.found.verdict
+        return Traces(
+            f"{name}{verdict}, {quantity(self.found.max, self.found.unit)}",
+            "",
+            "",
+            {GAP: (time, scale * self.curve.difference)},
+            log=True,
+            sides=True,
+            tolerance=scale * self.found.tolerance,
+            floor=None if self.floor is None else (time, scale * self.floor),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +118,33 @@ class BothRuns(Interactive):
     lead: tuple[int, ...]
 
 
+def charts_of(
+    comparison: Comparison,
+    one: Trace,
+    two: Trace,
+    curves: Sequence[Series],
+    floor: ChaosFloor | None,
+) -> tuple[QuantityChart, ...]:
+    """A chart for each quantity that is a number throughout; of many, those most beyond."""
+    labels = comparison.one.label, comparison.two.label
+    found = {each.name: each for each in comparison.agreements}
+    bands = {} if floor is None else {band.name: band.width for band in floor.bands}
+    drawn = [curve for curve in curves if np.isfinite(curve.difference).all()]
+    ranked = sorted(drawn, key=lambda curve: (curve.kind != "tip", -found[curve.name].tolerances()))
+    kept = {curve.name for curve in ranked[:MOST]}
+    return tuple(
+        chart_of(
+            curve,
+            found[curve.name],
+            labels,
+            foot_of(curve, one, two, labels),
+            bands.get(curve.name),
+        )
+        for curve in drawn
+        if curve.name in kept
+    )
+
+
 def chart_of(
     curve: Series,
     found: Agreement,
@@ -80,40 +153,49 @@ def chart_of(
     floor: Array | None = None,
 ) -> QuantityChart:
     """The chart of a quantity."""
-    name = name_of(curve.name)
-    since = "never left" if found.since is None else f"left at {short_time(found.since)}"
-    said = (
-        f"{name}, difference over time: at most {quantity(found.max, curve.unit)} at "
-        f"{short_time(found.at)}, settled at {quantity(found.settled, curve.unit)}; tolerance "
-        f"{quantity(found.tolerance, curve.unit)}, {since}."
+    said = SPOKEN.format(
+        name=name_of(curve.name),
+        far=quantity(found.max, curve.unit),
+        at=short_time(found.at),
+        settled=quantity(found.settled, curve.unit),
+        tolerance=quantity(found.tolerance, curve.unit),
+        since="never" if found.since is None else f"at {short_time(found.since)}",
     )
-    return QuantityChart(name, curve, found, labels, said, foot, floor)
+    return QuantityChart(name_of(curve.name), curve, found, labels, said, foot, floor)
 
 
 def foot_of(curve: Series, one: Trace, two: Trace, labels: tuple[str, str]) -> str:
     """Under a chart of the energy by what it was computed; of a force its other figure."""
     if curve.kind == "energy":
         by = [trace.header.energy_by or trace.header.backend for trace in (one, two)]
-        masses = "from the masses, the armature and the gravity of the model"
-        if by[0] == by[1]:
-            return f"For both sides computed by {by[0]}, {masses}."
-        return f"Computed by {by[0]} and by {by[1]}, {masses}."
-    if curve.kind == "force":
-        pair = curve.name.removesuffix(NORMAL)
-        normal, total = (
-            [_most(forces, pair) for forces in (of_one, same_pairs(of_one, kind(two)))]
-            for kind in (normal_forces, total_forces)
-            for of_one in (kind(one),)
-        )
-        each = [
-            f"{capital(on(label))} it is at most {normal[k]} N; the whole force, friction added as "
-            f"vectors, is at most {total[k]} N."
-            for k, label in enumerate(labels)
-        ]
-        return f"Drawn is the sum of the normal forces. {' '.join(each)}"
-    return ""
+        return ENERGY.format(by=" and ".join(dict.fromkeys(by)))
+    if curve.kind != "force":
+        return ""
+    pair, sides = curve.name.removesuffix(NORMAL), []
+    for of in (normal_forces, total_forces):
+        left = of(one)
+        sides.append([_most(forces, pair) for forces in (left, same_pairs(left, of(two)))])
+    each = [
+        FORCE.format(label=label, normal=normal, total=total)
+        for label, normal, total in zip(labels, *sides, strict=True)
+    ]
+    return " ".join([DRAWN, *each])
 
 
 def _most(forces: Mapping[str, Array], pair: str) -> str:
     """The largest force of a pair of bodies [N]."""
     return figure(float(forces[pair].max()) if pair in forces else 0.0)
+
+
+def spans(mask: NDArray[np.bool_], time: Array, step: float, until: float) -> list[list[float]]:
+    """From when to when rows are marked [s]; a row counts until the next one.
+
+    Args:
+        mask: (n,) which rows.
+        time: (n,) of each [s].
+        step: How long the last of some rows lasts [s].
+        until: What is later is cut off [s].
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    pairs = ((float(time[a]), float(time[b - 1]) + step) for a, b in edges.reshape(-1, 2).tolist())
+    return [[start, min(end, until)] for start, end in pairs if start <= until]

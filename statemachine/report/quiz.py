@@ -134,6 +134,7 @@ def _asked(question: Question) -> Iterator[str]:
     """A question and its choices in lines of the window's width."""
     width = max(min(shutil.get_terminal_size().columns, _WIDTH_MOST), 20)
     text = question.text if question.always else f"Before you read on: {question.text}"
-    yield from textwrap.wrap(text, width)
+    yield from textwrap.wrap(text.replace("`", ""), width)
     for choice in lettered(question):
+        choice = choice.replace("`", "")  # noqa: PLW2901
         yield from textwrap.wrap(choice, width, initial_indent="  ", subsequent_indent="     ")

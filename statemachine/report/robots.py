@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from ..measures.text import NONE, count, figure, listed, rough, sentence
+from ..measures.text import NONE, count, few, figure, listed, rough, sentence
 from ..page import Block, Page, Table, Text, Verdict
 from ..robots.examine import TRIED
 from ..robots.gaps import STEPS
@@ -13,6 +13,30 @@ from ..robots.records import RUNS, TOLERANCE, BackendRow, ExaminedModel, RunGap,
 
 _WIDEST = 28  # characters of a name
 _LISTED = 20  # of what is wrong, and of features
+
+LEGEND = (
+    "bits: {default} computes the bits of the engine without us, and two futures of a State are "
+    "the same bits on every engine. no contacts, contacts: the largest gap to {default} within "
+    "{steps} steps under random commands, in rad (hinges) or m (slides and free bodies), whichever "
+    "is larger; h: it vanishes with the timestep; rounding: changed by rounding alone, {default} "
+    "gets as far from its own run; still: nothing in it moves. witness: its reading, and its "
+    "largest gap in m."
+)
+LEGEND_RUNS = " runs: of {tried}, how many run on {backends}."
+SUMS = (
+    "How many of {total} models load, and of how many the gap without contacts to {default} is "
+    "within {tolerance:g} rad or m, no more than rounding makes, or vanishes with the timestep"
+)
+_SUMS_HEADERS = (
+    "engine",
+    "loads",
+    "only without contacts",
+    "bits of the engine",
+    "within",
+    "rounding",
+    "vanishes",
+)
+INSIDE = "Shapes are inside each other at the start of {number} of {total}: {pairs}."
 
 
 def page(survey: Survey, widest: int = _WIDEST) -> Page:
@@ -39,7 +63,7 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
         Table(headers, rows, words=frozenset(words), wide=frozenset(wide)),
         Text(_legend(survey, tried), small=True),
     ]
-    blocks += [Text(text) for text in _sums(survey, others)]
+    blocks += _sums(survey, others)
     for other in others:
         blocks += _refused(survey.models, other)
     if survey.parts:
@@ -99,6 +123,8 @@ def _gap(model: ExaminedModel, other: str, without: bool) -> str:
         return "explodes"
     if gap.ended:
         return "stops"
+    if gap.is_rounding:
+        return "rounding"
     return figure(gap.largest) + (" h" if gap.first_order else "")
 
 
@@ -122,49 +148,38 @@ def _cost(row: ExaminedModel) -> str:
 
 def _legend(survey: Survey, tried: bool) -> str:
     backends = list(dict.fromkeys(name for row in survey.models for name in row.backends))
-    text = (
-        f"bits: {survey.default} computes the bits of the engine without us, and two futures of a "
-        "State are the same bits on every engine. no contacts, contacts: the largest gap to "
-        f"{survey.default} within {STEPS} steps under random commands, in rad (hinges) or m "
-        "(slides and free bodies), whichever is larger; h: it vanishes with the timestep; "
-        "still: nothing in it moves. "
-        "witness: its reading, and its largest gap in m."
-    )
-    if not tried:
-        return text
-    return f"{text} runs: of {', '.join(TRIED)}, how many run on {listed(backends)}."
+    runs = LEGEND_RUNS.format(tried=", ".join(TRIED), backends=listed(backends)) * tried
+    return LEGEND.format(default=survey.default, steps=STEPS) + runs
 
 
-def _sums(survey: Survey, others: Sequence[str]) -> Iterator[str]:
-    rows = survey.models
-    first = [row.backends[survey.default] for row in rows if survey.default in row.backends]
-    same = sum(row.equals_engine is True for row in first)
-    yield (
-        f"{survey.default} loads {sum(row.loads for row in first)} of {len(rows)}, and computes "
-        f"the bits of the engine without us on {same}."
-    )
-    for other in others:
-        found = [row.backends[other] for row in rows if other in row.backends]
-        loads = sum(row.loads for row in found)
-        more = sum(not row.loads and not row.refusal_without for row in found)
+def _sums(survey: Survey, others: Sequence[str]) -> Iterator[Block]:
+    """How many models each engine loads and what becomes of them, and what the witness reads."""
+    models, total = survey.models, len(survey.models)
+    rows = []
+    for name in (survey.default, *others):
+        found = [row.backends[name] for row in models if name in row.backends]
         gaps = [row.without_contacts for row in found if row.without_contacts]
-        small = sum(not gap.ended and gap.largest <= TOLERANCE for gap in gaps)
-        order = sum(not gap.ended and gap.first_order for gap in gaps)
-        text = f"{other} loads {loads} of {len(rows)}" + (
-            f", and {more} more with contacts off" if more else ""
-        )
-        text += (
-            f". Without contacts {small} of {len(gaps)} stay within {TOLERANCE:g} rad or m of "
-            f"{survey.default}"
-        )
-        yield text + (
-            f", and the gap of {order} more vanishes with the timestep." if order else "."
-        )
-    asked = [row.witness for row in rows if row.witness is not None]
+        counts = [
+            sum(row.loads for row in found),
+            sum(not row.loads and not row.refusal_without for row in found),
+            sum(row.equals_engine is True for row in found),
+            sum(not gap.ended and gap.largest <= TOLERANCE for gap in gaps),
+            sum(not gap.ended and gap.is_rounding for gap in gaps),
+            sum(not gap.ended and gap.first_order for gap in gaps),
+        ]
+        known = range(3) if name == survey.default else (0, 1, 3, 4, 5)
+        rows.append((name, *(str(n) if k in known else NONE for k, n in enumerate(counts))))
+    title = SUMS.format(total=total, default=survey.default, tolerance=TOLERANCE)
+    yield Table(_SUMS_HEADERS, rows, title)
+    inside = [f"{row.file}, {row.inside[0]}" for row in models if row.inside]
+    if inside:
+        pairs = few(inside, _LISTED, "; ")
+        yield Text(INSIDE.format(number=len(inside), total=total, pairs=pairs))
+    asked = [row.witness for row in models if row.witness is not None]
+    grades = Counter(witness.grade or "refused" for witness in asked)
     if asked:
-        grades = Counter(witness.grade for witness in asked if witness.grade)
-        said = ", ".join(f"{number} by its {grade}" for grade, number in sorted(grades.items()))
-        yield f"The witness speaks of {sum(grades.values())} of {len(asked)}: {said or 'none'}."
+        rows = [(grade, str(number)) for grade, number in sorted(grades.items())]
+        yield Table(("the witness's reading", "models"), rows)
 
 
 def _refused(rows: Sequence[ExaminedModel], other: str) -> list[Block]:
@@ -262,6 +277,8 @@ def _whole(gap: RunGap | None) -> str:
     text = ", ".join(parts) or NONE
     if gap.shrinks is not None:
         text += f"; {gap.shrinks:.3g} times that at half the timestep"
+    if gap.floor is not None:
+        text += f"; rounding alone makes {rough(gap.floor)}"
     return f"{text}; {gap.ended} (after {count(gap.steps, 'step')})" if gap.ended else text
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..backends import backend_names, load
 from ..compare import Request, compare, series, sides_of, witness
-from ..compare.why import attribute
+from ..compare.why import explain
 from ..errors import MissingEngineError
 from ..installed import available
 from ..lessons import LESSONS
@@ -30,7 +30,7 @@ from .robot_pictures import drawn_picture
 def make_path(
     folder: Path, backends: Sequence[str] | None = None, say: Callable[[str], None] = print
 ) -> list[Path]:
-    """Run every station and write its page; a page that is already the same is left alone.
+    """Run every lesson and write its page; a page that is already the same is left alone.
 
     Args:
         folder: Where the pages go.
@@ -43,7 +43,7 @@ def make_path(
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for number, lesson in enumerate(LESSONS.values(), start=1):
-        say(f"running the station {lesson.name} ...")
+        say(f"running the lesson {lesson.name} ...")
         taken = {}
         for backend in backends or backend_names():
             try:
@@ -115,7 +115,7 @@ def _explain(folder: Path, name: str, backends: tuple[str, str]) -> Path:
     """The page that says why, for engines as they come."""
     asked = scenario(name)
     models = [load(asked.model, backend=backend, defaults="engine") for backend in backends]
-    page = why.page(attribute(models[0], models[1], asked), [])
+    page = why.page(explain(models[0], models[1], asked))
     return _write(
         folder, f"{name}-why", page, "", f"statemachine compare {name} --why --defaults engine"
     )

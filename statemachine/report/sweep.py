@@ -10,10 +10,9 @@ from ..sweep import PreparedSweep, SweepSummary
 def page(ready: PreparedSweep, summary: SweepSummary) -> Page:
     """The summary, and how the dataset is read."""
     asked = ready.sweep
-    varied = [vary.typed for vary in ready.design.factors]
     text = (
         f"{count(summary.points, 'point')}"
-        f"{f' ({listed(varied)})' if varied else ''}, {count(asked.seeds, 'seed')}, "
+        f"{f' ({listed(asked.vary)})' if asked.vary else ''}, {count(asked.seeds, 'seed')}, "
         f"{listed(list(ready.backends))}: {count(summary.cells, 'cell')}. "
         f"{_ran(summary)}"
     )
@@ -35,7 +34,7 @@ def page(ready: PreparedSweep, summary: SweepSummary) -> Page:
     else:
         blocks.append(Verdict(f"{count(summary.done, 'cell')} done, none failed", True))
     versions = ", ".join(f"{name} {version}" for name, version in ready.versions.items())
-    return Page(f"Sweep of {ready.rules.what.rpartition('/')[2]}", versions, blocks)
+    return Page(f"Sweep of {ready.sweep.what.rpartition('/')[2]}", versions, blocks)
 
 
 def _ran(summary: SweepSummary) -> str:

@@ -101,8 +101,8 @@ def fit_curve(found: SweepReport, each: BroughtTogether) -> Traces | None:
         "predicted": (x, [value * scale for value in y]),
         "tolerance": ([x[0], x[-1]], [found.quantity.tolerance * scale] * 2),
     }
-    if each.best is not None:
-        pairs = sorted(zip(*each.best.tried, strict=True))
+    if each.tried is not None:
+        pairs = sorted(zip(*each.tried, strict=True))
         curves["run"] = ([v for v, _ in pairs], [gap * scale for _, gap in pairs])
     elif each.measured is not None:
         value, width = each.fit.value, 0.01 * (x[-1] - x[0])

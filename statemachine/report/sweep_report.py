@@ -2,18 +2,7 @@
 
 from __future__ import annotations
 
-from ..measures.text import (
-    NONE,
-    capital,
-    count,
-    few,
-    fixed,
-    listed,
-    quantity,
-    reading,
-    rough,
-    rounded,
-)
+from ..measures.text import NONE, few, fixed, listed, quantity, reading, rough, rounded
 from ..page import Block, Headline, Page, Section, Table, TableCell, Text
 from ..sweep.analysis import SweepReport
 from ..sweep.analysis_gaps import VERDICTS, GapMap, SettingGap
@@ -22,24 +11,49 @@ from .sweep_pictures import axis, bars, map_picture, setting_word
 
 _SHOWN = 5  # settings of the largest gaps
 _COLUMNS = 7  # of a map that 80 characters have room for
-_SAYS = {
-    "agrees": "agree at every seed",
-    "some seeds": "agree at some seeds",
-    "chaos": "inside the chaos floor",
-    "differs": "differ",
-    "no runs": "no runs on both",
+
+LEAD = "In {agreed} of {settings} settings {pair} agree within {tolerance} ({what})"
+CAUSES = {
+    "rounding": "Every gap is inside the chaos floor: no more than rounding makes of a run.",
+    "rank": "The gap goes most with {label}.",
+    "share": "The gap is most sensitive to {label} (total {total}).",
 }
-_METHODS = {
-    "sobol": "Sobol indices by Saltelli's design and estimators",
+DESIGN = (
+    "{settings} settings{varied}; starts (seeds) of each: {seeds}. The gap of a setting is the "
+    "median over its seeds; that of the fingertip or of the joint angles is the largest of the "
+    "moments that the dataset keeps. A setting agrees if the gap is within tolerance at every seed."
+)
+FLOOR = (
+    "The chaos floor is what rounding alone makes of a run: {backend} ran again, its starts and "
+    "commands changed by {rounding:g}, at {where} of {settings} settings (the nearest one stands "
+    "for others): {cells} cells, {seconds:.2g} s. The largest gap that this makes is {width}. "
+    "Settings in which the gap between the engines is inside it, so that nothing can be concluded: "
+    "{inside}."
+)
+NO_FLOOR = "The chaos floor is not known: {why}."
+LEFT_OUT = "Left out: cells that {what}. Settings that thereby have no gap: {none}."
+MEDIAN = "Each figure is the median over {others}. "
+MIDDLES = "{sampled}: the middles of equal parts of the range. "
+MARKS = "~: inside the chaos floor. =: within tolerance."
+MAP = "The gap of the {what},{unit}: {down}{across} across"
+NO_SHARES = {
+    "rounding": "To nothing: every gap is inside the chaos floor.",
+    "same": "Nothing can be said: the gap is the same everywhere, or there are too few.",
+    "alone": "One parameter was varied: what changes the gap is that alone.",
+}
+METHODS = {
+    "sobol": "Sobol indices by Saltelli's design and estimators; samples in each block: {samples}.",
     "factorial": "Computed from a full factorial, which has every combination of the values "
     "(ANOVA, the analysis of variance): the shares mean what Sobol indices mean, over these "
-    "values",
-    "rank": "squares of Spearman's rank correlation",
+    "values; settings: {samples}.",
+    "rank": "Squares of Spearman's rank correlation; settings: {samples}.",
 }
-_SHARES = (
+SHARES = (
     "First order: the share of the gap's variance that a parameter explains alone. Total: with "
     "what it does together with others. Where the total is near 0 the parameter does not matter."
 )
+INTERVALS = "Intervals: {error}."
+NO_INTERVALS = "They have no error here: it takes three seeds."
 
 
 def page(found: SweepReport, command: str = "") -> Page:
@@ -49,8 +63,9 @@ def page(found: SweepReport, command: str = "") -> Page:
         found: The report.
         command: What was typed, or "".
     """
-    blocks: list[Block] = [Text(_made(found)), Text(_floor(found))]
-    blocks += _left_out(found)
+    varied = f" over {listed(found.parameters)}" if found.parameters else ""
+    design = DESIGN.format(settings=len(found.settings), varied=varied, seeds=found.seeds)
+    blocks: list[Block] = [Text(design), Text(_floor(found)), *_left_out(found)]
     blocks.append(Section("where", "Where they agree", _where(found)))
     if found.parameters:
         blocks.append(Section("sensitive", "What the gap is sensitive to", _sensitive(found)))
@@ -62,34 +77,21 @@ def page(found: SweepReport, command: str = "") -> Page:
 
 
 def _headline(found: SweepReport) -> Headline:
-    main = found.quantity
-    pair = listed(list(found.sides))
-    lead = (
-        f"In {found.agreed} of {count(len(found.settings), 'setting')} {pair} agree within "
-        f"{rounded(main.tolerance, main.unit, 2)} ({main.says})"
+    main, shares, causes = found.quantity, found.sensitivity, []
+    lead = LEAD.format(
+        agreed=found.agreed,
+        settings=len(found.settings),
+        pair=listed(list(found.sides)),
+        tolerance=rounded(main.tolerance, main.unit, 2),
+        what=main.says,
     )
-    causes = []
-    shares = found.sensitivity
     if found.only_rounding:
-        causes.append("Every gap is inside the chaos floor: no more than rounding makes of a run.")
+        causes.append(CAUSES["rounding"])
     elif shares is not None and len(shares.indices) > 1:
-        top = shares.indices[0]
-        how = "goes most with" if shares.method == "rank" else "is most sensitive to"
-        share = "" if shares.method == "rank" else f" (total {fixed(top.total, 2)})"
-        causes.append(f"The gap {how} {top.label}{share}.")
+        top, kind = shares.indices[0], "rank" if shares.method == "rank" else "share"
+        causes.append(CAUSES[kind].format(label=top.label, total=fixed(top.total, 2)))
     causes += [line(found, each) for each in found.together if each.fit is not None]
-    agree = found.agreed == len(found.settings)
-    return Headline(lead, tuple(causes), holds=agree)
-
-
-def _made(found: SweepReport) -> str:
-    varied = f" over {listed(found.parameters)}" if found.parameters else ""
-    return (
-        f"{count(len(found.settings), 'setting')}{varied}, {count(found.seeds, 'seed')} each. The "
-        "gap of a setting is the median over its seeds; that of the fingertip or of the joint "
-        "angles is the largest of the moments that the dataset keeps. A setting agrees if the "
-        "gap is within tolerance at every seed."
-    )
+    return Headline(lead, tuple(causes), holds=found.agreed == len(found.settings))
 
 
 def _quantities(found: SweepReport) -> Table:
@@ -108,7 +110,7 @@ def _quantities(found: SweepReport) -> Table:
     return Table(
         ("gap of", "within", "agree", "some seeds", "chaos", "differ", "median", "worst"),
         rows,
-        f"How many of the {count(len(found.settings), 'setting')}",
+        f"How many settings, of {len(found.settings)}",
         emphasis=frozenset(
             k for k, each in enumerate(found.quantities) if each.name == found.quantity.name
         ),
@@ -117,61 +119,40 @@ def _quantities(found: SweepReport) -> Table:
 
 
 def _floor(found: SweepReport) -> str:
-    floor, main = found.floor, found.quantity
+    floor = found.floor
     if floor is None:
-        return f"The chaos floor is not known: {found.no_floor}."
+        return NO_FLOOR.format(why=found.no_floor)
     widths = [each.floor for each in found.settings if each.floor is not None]
-    inside = sum(each.inside_floor for each in found.settings)
-    where = "each setting" if floor.settings == len(found.settings) else (
-        f"{floor.settings} of {len(found.settings)} settings (the others have that of the nearest "
-        "one)"
-    )  # fmt: skip
-    return (
-        f"The chaos floor is what rounding alone makes of a run: {floor.backend} ran again, its "
-        f"starts and commands changed by {floor.rounding:g}, at {where}: "
-        f"{count(floor.cells, 'cell')}, {floor.seconds:.2g} s. The largest gap that this makes is "
-        f"{rough(max(widths), main.unit)}. "
-        + (
-            f"In {count(inside, 'setting')} the gap between the engines is inside it: nothing can "
-            "be concluded there."
-            if inside
-            else "No gap between the engines is inside it."
-        )
+    return FLOOR.format(
+        backend=floor.backend,
+        rounding=floor.rounding,
+        where=floor.settings,
+        settings=len(found.settings),
+        cells=floor.cells,
+        seconds=floor.seconds,
+        width=rough(max(widths), found.quantity.unit),
+        inside=sum(each.inside_floor for each in found.settings),
     )
 
 
 def _left_out(found: SweepReport) -> list[Block]:
     """What is told of cells that have no run."""
-    said = []
-    if found.failed:
-        kinds = [f"{number} {kind}" for kind, number in found.failed.items()]
-        said.append(f"{count(sum(found.failed.values()), 'cell')} failed ({listed(kinds)})")
-    if found.missing:
-        said.append(f"{count(found.missing, 'cell')} have not run")
-    if not said:
-        return []
+    kinds = {f"failed with {kind}": number for kind, number in found.failed.items()}
+    counts = {**kinds, "have not run": found.missing}
+    what = [f"{kind}: {number}" for kind, number in counts.items() if number]
     none = found.quantity.counts.get("no runs", 0)
-    gone = (
-        f" {count(none, 'setting')} thereby {'has' if none == 1 else 'have'} no gap."
-        if none
-        else ""
-    )
-    return [Text(f"Left out: {listed(said)}.{gone}")]
+    return [Text(LEFT_OUT.format(what=", ".join(what), none=none))] if what else []
 
 
 def _where(found: SweepReport) -> list[Block]:
     blocks: list[Block] = [_quantities(found)]
     picture = map_picture(found)
     if found.map is not None:
-        blocks.append(_map_table(found, found.map))
-        notes = []
-        if found.map.others:
-            notes.append(f"Each figure is the median over {listed(found.map.others)}.")
-        if found.map.sampled:
-            notes.append(f"{listed(found.map.sampled)}: the middles of equal parts of the range.")
-        marks = "~: inside the chaos floor. =: within tolerance."
-        notes.append(marks)
-        blocks.append(Text(" ".join(notes), small=True))
+        blocks += _map_tables(found, found.map)
+        others, sampled = listed(found.map.others), listed(found.map.sampled)
+        notes = MEDIAN.format(others=others) if others else ""
+        notes += MIDDLES.format(sampled=sampled) if sampled else ""
+        blocks.append(Text(notes + MARKS, small=True))
     if picture is not None:
         blocks.append(picture)
     if len(found.settings) > _SHOWN or found.map is None:
@@ -179,7 +160,8 @@ def _where(found: SweepReport) -> list[Block]:
     return blocks
 
 
-def _map_table(found: SweepReport, chart: GapMap) -> Table:
+def _map_tables(found: SweepReport, chart: GapMap) -> list[Table]:
+    """The map; of many columns, in parts that a terminal has room for."""
     unit, tolerance = found.quantity.unit, found.quantity.tolerance
     scale, name = reading(unit)
 
@@ -198,19 +180,20 @@ def _map_table(found: SweepReport, chart: GapMap) -> Table:
         )
         for r in reversed(range(len(chart.gap)))
     ]
-    kept = {round(k * (len(places) - 1) / (_COLUMNS - 1)) for k in range(_COLUMNS)}
-    wide = {k + 1 for k in range(len(places)) if len(places) > _COLUMNS and k not in kept}
-
-    def name_of(label: str) -> str:  # an x behind each value says the rest
-        return label if label in found.scaled else axis(found, label)
-
-    down = f"{name_of(chart.up)} down, " if chart.up else ""
-    return Table(
-        (f"{chart.up or chart.across}", *places),
-        rows,
-        f"The gap of the {found.quantity.says},{name}: {down}{name_of(chart.across)} across",
-        wide=frozenset(wide),
+    up, across = (
+        label if label in found.scaled else axis(found, label)  # an x behind each value says it
+        for label in (chart.up, chart.across)
     )
+    down = f"{up} down, " if chart.up else ""
+    title = MAP.format(what=found.quantity.says, unit=name, down=down, across=across)
+    return [
+        Table(
+            (chart.up or chart.across, *places[k : k + _COLUMNS]),
+            [(row[0], *row[1 + k : 1 + k + _COLUMNS]) for row in rows],
+            title,
+        )
+        for k in range(0, len(places), _COLUMNS)
+    ]
 
 
 def _largest(found: SweepReport) -> Table:
@@ -222,12 +205,12 @@ def _largest(found: SweepReport) -> Table:
             _setting(found, each),
             quantity(each.median, unit),
             quantity(each.worst, unit),
-            _SAYS[each.verdict],
+            each.verdict,
         )
         for each in known[:_SHOWN]
     ]
     return Table(
-        ("setting", "median", "worst", "they"), rows, "The largest gaps", words=frozenset({0, 3})
+        ("setting", "median", "worst", "verdict"), rows, "The largest gaps", words=frozenset({0, 3})
     )
 
 
@@ -239,41 +222,33 @@ def _setting(found: SweepReport, setting: SettingGap) -> str:
 
 def _sensitive(found: SweepReport) -> list[Block]:
     shares = found.sensitivity
-    if found.only_rounding:
-        return [Text("To nothing: every gap is inside the chaos floor.")]
-    if shares is not None and len(shares.indices) == 1:
-        return [Text("One parameter was varied: what changes the gap is that alone.")]
-    if shares is None:
-        return [Text("Nothing can be said: the gap is the same everywhere, or there are too few.")]
+    if found.only_rounding or shares is None:
+        return [Text(NO_SHARES["rounding" if found.only_rounding else "same"])]
+    if len(shares.indices) == 1:
+        return [Text(NO_SHARES["alone"])]
     rank = shares.method == "rank"
-    rows = []
-    for each in shares.indices:
-        rows.append(
-            (
-                each.label,
-                TableCell(fixed(each.first, 2), share=each.first),
-                _interval(each.first_interval),
-                TableCell(fixed(each.total, 2), share=each.total),
-                _interval(each.total_interval),
-            )
+    rows = [
+        (
+            each.label,
+            TableCell(fixed(each.first, 2), share=each.first),
+            _interval(each.first_interval),
+            TableCell(fixed(each.total, 2), share=each.total),
+            _interval(each.total_interval),
         )
+        for each in shares.indices
+    ]
+    heads, title = (
+        ("parameter", "first order", "95 %", "total", "95 %"),
+        "Shares of the gap's variance",
+    )
     if rank:
-        table = Table(("parameter", "rank²"), [row[:2] for row in rows], "What the gap goes with")
-    else:
-        table = Table(
-            ("parameter", "first order", "95 %", "total", "95 %"),
-            rows,
-            "Shares of the gap's variance",
-        )
-    error = f" Intervals: {shares.error}." if shares.error else ""
-    if not (rank or shares.error):
-        error = " They have no error here: it takes three seeds."
-    where = "samples in each block" if shares.method == "sobol" else "settings"
-    says = "" if rank else f"{_SHARES} "
-    text = f"{says}{capital(_METHODS[shares.method])}; {shares.samples} {where}.{error}"
-    blocks: list[Block] = [table, Text(" ".join([text, *shares.notes]), small=True)]
+        heads, rows, title = ("parameter", "rank²"), [r[:2] for r in rows], "What the gap goes with"
+    error = INTERVALS.format(error=shares.error) if shares.error else NO_INTERVALS * (not rank)
+    method = METHODS[shares.method].format(samples=shares.samples)
+    lines = [SHARES * (not rank), method, error, *shares.notes]
+    text = Text(" ".join(text for text in lines if text), small=True)
     picture = bars(found)
-    return [*blocks, picture] if picture else blocks
+    return [Table(heads, rows, title), text, *([picture] if picture else [])]
 
 
 def _interval(pair: tuple[float, float] | None) -> str:

@@ -58,6 +58,7 @@ ASCII = str.maketrans(
 )
 # What would make a terminal do something instead of showing it (a student's text may hold it).
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
+_CODE = re.compile(r"`([^`\n]+)`")
 _WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
@@ -176,10 +177,10 @@ def _print_block(console: Console, block: Block, plain: bool, escape: Callable[[
     match block:
         case Heading(text):
             console.print()
-            console.print(f"[bold]{escape(text)}[/]")
+            console.print(f"[bold]{_coded(escape(text))}[/]")
         case Text(text, (_, linked)):
             console.print()
-            console.print(escape(f"{text} {linked}." if linked else text))
+            console.print(_coded(escape(f"{text} {linked}." if linked else text)))
         case Items(texts, ordered):
             console.print()
             for number, text in enumerate(texts, start=1):
@@ -201,7 +202,12 @@ def _print_block(console: Console, block: Block, plain: bool, escape: Callable[[
             console.print()
             good, bad = ("yes", "NO ") if plain else ("✓", "✗")
             mark = f"[green]{good}[/]" if holds else f"[red]{bad}[/]"
-            console.print(_hanging(mark, escape(text)))
+            console.print(_hanging(mark, _coded(escape(text))))
+
+
+def _coded(text: str) -> str:
+    """An escaped text in which what stands between backticks is shown as code."""
+    return _CODE.sub(r"[cyan]\1[/]", text)
 
 
 def _print_section(console: Console, block: Section, escape: Callable[[str], str]) -> None:

@@ -1,262 +1,393 @@
-"""What an attribution says: what each difference explains, what stays, and what to set."""
+"""What an explanation says: the cause first, then every difference with its part of the gap."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from ..compare.why import UNEXPLAINED, Attribution, FactorTrial
-from ..measures.text import NONE, capital, listed, percent, quantity, short_time
+import numpy as np
+
+from ..compare.labels import lacking
+from ..compare.why import ADDS_UP, CauseShare, Explanation, Located
+from ..measures import Deviation
+from ..measures.text import NONE, capital, percent, quantity, sentence, short_time, significant
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
-from .why_words import (
-    SMALL,
-    THREE,
-    amount,
-    astray,
-    conclusion,
-    gap_sentence,
-    inside,
-    moves,
-    noisy,
-    shown,
-    three,
-    title,
-    titles,
+
+_SHOWN = 12  # rows; the rest is folded away
+_WIDE = 15  # characters of a value
+_SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
+_NO_PART = 1e-3  # of the gap: causes below that are one row
+_PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
+_OFF = ("place", "anchor", "com", "axis")
+_HEADS = ("what", "left", "right", "explains", "alone", "last")
+_MEASURES = {"worst": "at its largest", "end": "in the end", "rms": "as a root mean square"}
+
+# Line one: what a side has nothing of, and what the gap comes from.
+MISSING = {
+    "actuators": "The {side} has no actuators, the {other} has: --actuators {other} gives it those",
+    "floor": "The {side} has no floor, the {other} has: --floor {other} gives it that",
+}
+ANSWERS = {
+    "rounding": "The two sides move alike: {gap} is rounding",
+    "alike": "The two sides move alike, although they differ: {gap} is rounding",
+    "chaos": "Nothing can be concluded: chaos alone makes {floor}, and the gap is {gap}",
+    "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
+    "bare": "{cause}: {part} of the {gap}",
+    "located": "{cause}: {part} of the {gap} goes only where {without} on both sides",
+    "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
+}
+ORIGIN = (
+    "{experiment}; left: {left}; right: {right}; {seconds}, {runs} runs in {took}, compared at "
+    "{moments} moments"
 )
+PLAYED = "the models were run again, with the recorded starts and commands"
+GAP = (
+    "As they come, the {what} is up to {worst} apart, at {at} (root mean square {rms}, in the end "
+    "{end})."
+)
+TOUCH = (
+    "Until the first touch, {what} at {time}, the two are {before} apart: what parts them acts "
+    "where they touch."
+)
+THREE = (
+    "Explained: it goes where settings are brought to the same. Located: it goes only where "
+    "something is left out on both sides, which says where it comes from, and not why. "
+    "Unexplained: it stays."
+)
+PARTS = "{explained} of the gap is explained, {located} is located, {unexplained} is unexplained"
+LOCATED = "* Located: {cause} left out on both sides. That is another motion."
+STILL = "* With {cause} left out nothing moves any more, so there can be no gap: a weak hint."
+CHAOS = (
+    "The left is as far from itself, {floor}, when its start and its commands are changed by no "
+    "more than is known of them (the chaos floor). Of a gap that is not clearly larger nothing can "
+    "be concluded."
+)
+NOISE = "The chaos floor is {floor}, {part} of the gap: smaller parts say nothing."
+NEGLIGIBLE = "What is below {negligible} is taken for rounding."
+BETWEEN = "The timesteps have too few moments in common: rows between were interpolated."
+METHODS = {
+    "nothing": "",
+    "one at a time": "They add up, to within {adds_up} of the gap: each takes away as much alone "
+    "as after all others, and explains the mean of the two.",
+    "all sets": "They interact. Each share is the mean of what a cause takes away over all orders "
+    "in which the causes can be brought to the same (Shapley value), over all sets of them.",
+    "drawn orders": "They interact. Each share is the mean of what a cause takes away over "
+    "{orders} drawn orders in which the causes are brought to the same (Shapley value), with its "
+    "standard error.",
+}
+COLUMNS = "Alone, last: brought to the same first, or after all others."
+WAY = "The right is brought to the left: the other way round the parts are those of another motion."
+NO_FIGURE = "No figure: it can be brought to the same only together with others."
+NEGATIVE = "Below zero: it hides others, so the gap is wider where it is brought to the same."
+REDUNDANT = "Either one alone closes the gap: {causes}."
+REFUSED = "These differ, too, and cannot be brought to the same:"
+IMPOSSIBLE = "{number} of the sets of causes could not be run, such as: {causes}."
+HARDLY_MOVE = (
+    "In this experiment these joints hardly move, so a difference there cannot show: {joints}. "
+    "Another may move them (waves)."
+)
+CHANGE = "What to change on the right:"
+SET = "{place}{cause}: {right} → {left}"
+SAME = (
+    "All that is compared is the same: files, options, starts. What a user's function reads from "
+    "elsewhere is not compared."
+)
+NEXT = {
+    "refused": "What stays may come from what cannot be brought to the same: {causes}. Give both "
+    "sides the same there, and compare again.",
+    "engines": "What stays is between the engines. Look at one step at a time (--one-step), which "
+    "names the stage, and at the timestep (--converge).",
+    "files": "What stays is in nothing that is compared. Look at the function that commands, and "
+    "at the order of ctrl; if the open loop agrees, the difference is in what is commanded. Look "
+    "at one step at a time (--one-step).",
+}
 
 
-def page(result: Attribution, said: Sequence[str] = ()) -> Page:
-    """What the gap is, each factor alone, all of them together, and what follows.
+def page(result: Explanation, said: Sequence[str] = ()) -> Page:
+    """What the gap comes from, what differs, what each difference explains, and what stays.
 
     Args:
-        result: The attribution.
+        result: The explanation.
         said: Lines to say before anything else.
     """
-    one, two = result.names
-    name = f"{result.experiment}: why {two} is not {one}"
-    origin = (
-        f"{result.one} and {result.two}, {result.seconds:g} s, "
-        f"{result.runs} runs compared at {result.moments} moments"
+    origin = ORIGIN.format(
+        experiment=result.experiment,
+        left=result.one,
+        right=result.two,
+        seconds=f"{result.seconds:g} s",
+        runs=result.runs,
+        took=short_time(result.took),
+        moments=result.moments,
     )
-    blocks: list[Block] = [Text(line) for line in (*said, result.says) if line]
-    blocks += causes(result)
-    if result.alone:
-        blocks.append(Section("agree", "To make them agree", steps(result), detail=True))
-        blocks.append(Text(THREE, small=True))
-        blocks.append(
-            Verdict(
-                three(result.explained, result.located, result.unexplained),
-                abs(result.unexplained) <= UNEXPLAINED,
-            )
+    only = lacking(result.unmatched, ("the left", "the right"))
+    lines = [*map(sentence, (*said, *only, *result.notes)), *proofs(result), result.says]
+    title, *further = [*missing(result.missing), answer(result)]
+    first: list[Block] = [Text(line) for line in (*map(sentence, further), *lines) if line]
+    return Page(title, origin, [*first, *causes(result), *_verdict(result)])
+
+
+def missing(parts: Sequence[tuple[str, str]]) -> list[str]:
+    """What one side has nothing of, and how to give it the other's: lines without their end."""
+    other = {"left": "right", "right": "left"}
+    return [MISSING[part].format(side=side, other=other[side]) for side, part in parts]
+
+
+def answer(result: Explanation) -> str:
+    """What the gap comes from, in a sentence without its end."""
+    gap, floor = _amount(result, result.gap), _amount(result, result.floor)
+    if result.is_rounding:
+        differ = "alike" if result.shares else "rounding"
+        kind = differ if result.gap <= result.negligible else "chaos"
+        return ANSWERS[kind].format(gap=gap, floor=floor)
+    first = next((row for row in result.shares if row.share), None)
+    place = max(result.found_in, key=lambda part: part.share, default=None)
+    parts = {
+        "cause": abs(first.share or 0.0) if first else 0.0,
+        "located": place.share if place else 0.0,
+        "unexplained": result.unexplained,
+    }
+    kind = max(parts, key=parts.__getitem__)
+    if kind == "located" and place:
+        return ANSWERS[kind].format(
+            cause=capital(place.name), part=percent(place.share), gap=gap, without=place.without
         )
-    return Page(name, origin, blocks)
+    if kind == "cause" and first:
+        left, right = _values(first)
+        told = NONE not in (left, right)
+        return ANSWERS["cause" if told else "bare"].format(
+            cause=capital(first.name), left=left, right=right, part=percent(first.share), gap=gap
+        )
+    return ANSWERS["unexplained"].format(part=percent(result.unexplained), gap=gap)
 
 
-def causes(result: Attribution) -> list[Block]:
-    """How much of the gap each factor takes away, all on top of each other and alone."""
-    text = gap_sentence(result.first, result.quantity, "Without any change")
+def proofs(result: Explanation) -> tuple[str, ...]:
+    """What the run itself shows of the cause: that the sides are together until they touch."""
+    touch = result.touch
+    if touch is None or not touch.time or touch.before >= _PROOF * result.gap:
+        return ()
+    time, before = short_time(touch.time), _amount(result, touch.before)
+    return (TOUCH.format(what=touch.what, time=time, before=before),)
+
+
+def causes(result: Explanation) -> list[Block]:
+    """How far apart the sides are, and how much of it each difference explains."""
+    blocks: list[Block] = [Text(_gap_sentence(result.first, result.quantity))]
     if result.between:
-        text += " The timesteps have too few moments in common: rows between were interpolated."
-    blocks: list[Block] = [Text(text)]
-    if not result.alone and result.gap > result.negligible:
-        known = math.isfinite(result.floor)
-        return [*blocks, Text(inside(amount(result, result.floor) if known else "without a bound"))]
-    if not result.alone:
-        told = f"What is below {amount(result, result.negligible)} is taken for rounding: "
-        return [*blocks, Text(f"{told}there is nothing to explain.")]
-    if result.floor > SMALL * result.gap:
-        blocks.append(Text(noisy(amount(result, result.floor), result.floor / result.gap)))
-    blocks.append(_ladder(result))
-    starred = any(moves(trial) for trial in result.ladder)
-    if starred:
-        blocks.append(_star(result))
-    marked = False
-    for line in conclusion(result):
-        blocks.append(Text(line))
-        if "!" in line:
-            blocks.append(_astray(result))
-            marked = True
-    return [*blocks, *_detection(result), _alone(result, starred, marked)]
+        blocks.append(Text(BETWEEN))
+    if result.is_rounding and result.gap <= result.negligible:
+        blocks.append(Text(NEGLIGIBLE.format(negligible=_amount(result, result.negligible))))
+    elif result.is_rounding:
+        blocks.append(Text(CHAOS.format(floor=_amount(result, result.floor))))
+    blocks += _table(result)
+    if not result.is_rounding and result.floor > _SMALL * result.gap:
+        floor, part = _amount(result, result.floor), percent(result.floor / result.gap)
+        blocks.append(Text(NOISE.format(floor=floor, part=part)))
+    return blocks
 
 
-def _detection(result: Attribution) -> list[Block]:
-    """Whether the engines find the same contacts at the same states."""
-    found = result.detection
-    if found is None:
+def steps(result: Explanation) -> list[Block]:
+    """What to change on the right, and where, so that the sides agree."""
+    lines = []
+    for row in result.shares:
+        if (row.share or 0.0) >= _NO_PART and not row.note:
+            left, right = _values(row)
+            place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
+            lines.append(SET.format(place=place, cause=row.name, right=right, left=left))
+    return [Text(CHANGE), Items(lines)] if lines and not result.is_rounding else []
+
+
+def parts(result: Explanation) -> str:
+    """The three parts of a gap, in a sentence without its end."""
+    return PARTS.format(
+        explained=percent(result.explained),
+        located=percent(result.located),
+        unexplained=percent(result.unexplained),
+    )
+
+
+def _verdict(result: Explanation) -> list[Block]:
+    if result.is_rounding:
+        refused = any(row.note for row in result.shares)
+        return [Verdict(answer(result), not refused)]
+    blocks = steps(result)
+    if not result.is_explained:
+        blocks.append(Text(_next(result)))
+    return [*blocks, Text(THREE, small=True), Verdict(parts(result), result.is_explained)]
+
+
+def _next(result: Explanation) -> str:
+    """What to look at where something stays."""
+    refused = [row.name for row in result.shares if row.note]
+    engines = {side.backend for side in result.provenance}
+    kind = "refused" if refused else "engines" if len(engines) > 1 else "files"
+    return NEXT[kind].format(causes=", ".join(refused[:4]))
+
+
+def _gap_sentence(gaps: Mapping[str, Deviation], of: str) -> str:
+    """How far apart two runs are in one of some quantities; the others follow."""
+    gap = gaps[of]
+    worst, rms, end = (quantity(size, gap.unit) for size in (gap.worst, gap.rms, gap.end))
+    singular = {"joints": "worst joint", "slides": "worst slide", "ball joints": "worst ball joint"}
+    text = GAP.format(
+        what=singular.get(of, of), worst=worst, at=short_time(gap.at), rms=rms, end=end
+    )
+    others = [f"{name} {quantity(g.worst, g.unit)}" for name, g in gaps.items() if name != of]
+    return f"{text} Elsewhere (--quantity): {', '.join(others)}." if others else text
+
+
+def _table(result: Explanation) -> list[Block]:
+    """The differences, the largest share first; those without an effect folded away."""
+    able = [row for row in result.shares if not row.note]
+    refused = [row for row in result.shares if row.note]
+    if not result.shares and not result.found_in:
+        return [Text(SAME)]
+    rows = [_row(result, row) for row in able if result.is_rounding or _counts(row)]
+    rows += [_located_row(part) for part in result.found_in]
+    small = [row for row in able if not result.is_rounding and not _counts(row)]
+    if small:
+        share = sum(row.share or 0.0 for row in small)
+        name = capital(small[0].name) if len(small) == 1 else f"{len(small)} more, none above 0.1 %"
+        values = _values(small[0]) if len(small) == 1 else (NONE, NONE)
+        rows.append((name, *values, TableCell(percent(share), share=share), NONE, NONE))
+    blocks: list[Block] = []
+    if rows:
+        title = f"What differs, and its part of the {_amount(result, result.gap)} of the "
+        title += f"{result.quantity} ({_MEASURES[result.measure]})"
+        title = "What differs" if result.is_rounding else title
+        words = frozenset({0, 1, 2})
+        most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
+        blocks.append(Table(_HEADS, rows[:most], title, words=words))
+        if rows[most:]:
+            heading = f"{len(rows) - most} more differences, with smaller parts"
+            more = Table(_HEADS, rows[most:], heading, words=words)
+            blocks.append(Section("", heading, [more], folded=True))
+    blocks += [
+        Text((STILL if part.is_still else LOCATED).format(cause=part.name), small=True)
+        for part in result.found_in
+    ]
+    if result.still:
+        blocks.append(Text(HARDLY_MOVE.format(joints=", ".join(result.still))))
+    return [*blocks, *_legend(result, able), *_not_brought(result, refused)]
+
+
+def _counts(row: CauseShare) -> bool:
+    """Whether a cause has a row of its own."""
+    return max(abs(part or 0.0) for part in (row.share, row.alone, row.last)) >= _NO_PART
+
+
+def _legend(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
+    """How the shares were computed, and what the columns are."""
+    if result.method == "nothing":
         return []
-    one, _ = result.names
-    text = f"Contacts found at equal states, {found.moments} of the run on {one}: "
-    if not found.differing:
-        return [Text(f"{text}the same pairs, as deep. What differs of contact is its law.")]
-    return [
-        Text(
-            f"{text}at {found.differing} of them other pairs, or not as deep, first at "
-            f"{short_time(found.first or 0.0)}; by up to {quantity(found.depth, 'm')}, "
-            f"{found.where} (--one-step)."
-        )
-    ]
+    method = METHODS[result.method].format(orders=result.orders, adds_up=f"{100 * ADDS_UP:g} %")
+    lines = [method, COLUMNS, WAY] if len(able) > 1 else [COLUMNS]
+    if any((row.share or 0.0) < -_NO_PART for row in able):
+        lines.append(NEGATIVE)
+    if any(None in (row.alone, row.last) for row in able):
+        lines.append(NO_FIGURE)
+    if result.redundant:
+        lines.append(REDUNDANT.format(causes=", ".join(result.redundant)))
+    return [Text(" ".join(lines))]
 
 
-def steps(result: Attribution) -> list[Block]:
-    """What to set, in order, so that the runs agree, and what stays."""
-    one, two = result.names
-    same = amount(result, result.settings_same)
-    settings = [trial for trial in result.ladder if trial.way == "parity" and trial.did]
-    if settings:
-        blocks: list[Block] = [
-            Text("Bring these to the same, in this order, each kept for the next:"),
-            Items([_step(result, trial) for trial in settings], ordered=True),
-        ]
-        text = f"What remains with all of it: {same}."
-    else:
-        blocks = []
-        text = (
-            f"Every setting that was tried is the same on {one} and {two}: there is nothing to "
-            f"set. What remains is all of the gap, {same}."
-        )
-    rest = [t for t in result.ladder if t.way == "off" and t.explains is not None]
-    if rest:
-        names = listed([title(trial.factor) for trial in rest])
-        text += (
-            f" With {names} left out on both ({rest[-1].did.removesuffix(', both')}) it is "
-            f"{amount(result, rest[-1].worst)}: that is each engine's own doing, and no setting "
-            "that was tried brings it to the same."
-        )
-    return [*blocks, Text(text)]
+def _not_brought(result: Explanation, refused: Sequence[CauseShare]) -> list[Block]:
+    """What could not be brought to the same, and what could not be run."""
+    blocks: list[Block] = []
+    if refused:
+        lines = [f"{capital(row.name)}: {row.note}." for row in refused]
+        blocks += [Text(REFUSED), Items(lines)]
+    if result.impossible:
+        number, first = len(result.impossible), ", ".join(result.impossible[0])
+        blocks.append(Text(IMPOSSIBLE.format(number=number, causes=first)))
+    return blocks
 
 
-def _step(result: Attribution, trial: FactorTrial) -> str:
-    one, two = result.names
-    whose = two if trial.did == f"as {one}" else one
-    left = trial.note or "not known by itself"
-    if trial.worst is not None:
-        left = amount(result, trial.worst)
-    return (
-        f"{capital(title(trial.factor))} of {whose}: {_brought(result, trial)} – the gap is then "
-        f"{left}"
-    )
+def _row(result: Explanation, row: CauseShare) -> tuple[str | TableCell, ...]:
+    what = capital(row.name)
+    if len(row.values) > 1 and len({repr(value[1:]) for value in row.values}) > 1:
+        what += f" ({len(row.values)} figures)"
+    elif row.values and "[" in row.values[0][0] and not row.name.startswith(row.values[0][0]):
+        what += f" ({row.values[0][0]})"
+    left, right = _values(row)
+    if result.is_rounding:
+        return what, left, right, NONE, NONE, NONE
+    noise = result.floor / result.gap
+    if abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
+        explains = f"< {percent(noise)}"
+        return what, left, right, TableCell(explains, share=row.share), NONE, NONE
+    explains = percent(row.share)
+    if row.error and math.isfinite(row.error):
+        explains += f" ± {percent(row.error)}"
+    alone, last = (NONE if part is None else percent(part) for part in (row.alone, row.last))
+    return what, left, right, TableCell(explains, share=row.share), alone, last
 
 
-def _brought(result: Attribution, trial: FactorTrial) -> str:
-    if trial.way == "parity":
-        had = trial.had if trial.did == f"as {result.names[0]}" else trial.had[::-1]
-        return f"{had[1]} → {had[0]}"
-    return trial.did or NONE
+def _located_row(part: Located) -> tuple[str | TableCell, ...]:
+    """What a feature that was left out takes away; of an integrator, which it is on one side."""
+    left, right = part.values or (NONE, NONE)
+    explains = TableCell(f"{percent(part.share)}*", share=part.share)
+    return capital(part.name), left, right, explains, NONE, NONE
 
 
-def _star(result: Attribution) -> Text:
-    text = (
-        f"* With this change {result.names[0]} itself moves differently. The gap is that of "
-        "another motion, so a smaller gap is a hint and no proof."
-    )
-    return Text(text, small=True)
+def _values(row: CauseShare) -> tuple[str, str]:
+    """The left's and the right's value of the figure that differs most."""
+    if not row.values:
+        return NONE, NONE
+    return _sides(max(row.values, key=_relative), row.unit)
 
 
-def _astray(result: Attribution) -> Text:
-    one, two = result.names
-    text = (
-        f"! More than twice what {one} moves at all ({amount(result, result.extent)}), and than "
-        f"the gap itself: {two} does not do the experiment any more."
-    )
-    return Text(text, small=True)
+def _relative(figure: tuple[str, object, object]) -> float:
+    """How far two values are apart, as a part of the larger; 0 where that is no number."""
+    try:
+        one, two = (np.array(value, dtype=float) for value in figure[1:])
+        size = max(float(np.linalg.norm(one)), float(np.linalg.norm(two)))
+        return float(np.linalg.norm(one - two)) / size if size else 0.0
+    except (TypeError, ValueError):
+        return 0.0
 
 
-def _ladder(result: Attribution) -> Table:
-    """All factors, each added to those before."""
-    rows = [
-        (
-            capital(title(trial.factor)),
-            _share(trial.explains, percent(trial.explains), trial),
-            amount(result, trial.worst),
-            _brought(result, trial),
-        )
-        for trial in result.ladder
-    ]
-    gap, left = amount(result, result.gap), amount(result, result.left)
-    return Table(
-        ("what", "explains", "gap left", "brought to"),
-        rows,
-        f"All of them, each added to those before: from {gap} to {left}",
-        words=frozenset({0, 3}),
-    )
+def _sides(figure: tuple[str, object, object], unit: str) -> tuple[str, str]:
+    """Both values; of a place, or a direction, how far the right one is off."""
+    name, one, two = figure
+    if name in _OFF and isinstance(one, tuple) and isinstance(two, tuple):
+        a, b = np.array(one, dtype=float), np.array(two, dtype=float)
+        if unit:
+            return "here", f"{quantity(float(np.linalg.norm(a - b)), unit)} off"
+        angle = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+        return "this way", f"{quantity(angle, 'rad')} off"
+    if isinstance(one, tuple) and isinstance(two, tuple) and len(one) == len(two):
+        texts = [" ".join(_number(number, "") for number in value) for value in (one, two)]
+        if max(map(len, texts)) > _WIDE:  # those that differ, which a cut would hide
+            apart = [pair for pair in zip(one, two, strict=True) if pair[0] != pair[1]]
+            cut = () if len(apart) == len(one) else ("…",)
+            one, two = ((*(pair[k] for pair in apart), *cut) for k in (0, 1))
+    left, right = _value(one, unit), _value(two, unit)
+    if left == right and isinstance(one, float) and isinstance(two, float):
+        return f"{one:.12g}", f"{two:.12g}"
+    return left, right
 
 
-def _alone(result: Attribution, starred: bool, marked: bool) -> Section:
-    """What the gap becomes when one thing alone is changed.
-
-    Args:
-        result: The attribution.
-        starred: Whether it was said already what a star means.
-        marked: The same of an exclamation mark.
-    """
-    set_back = any(trial.put_back is not None for trial in result.alone)
-    rows = []
-    for trial in result.alone:
-        change = None if trial.explains is None else -trial.explains
-        text = NONE if change is None else _signed(change)
-        rows.append(
-            (
-                capital(title(trial.factor)),
-                _share(change, text, trial),
-                shown(result, trial.worst, trial),
-                shown(result, trial.put_back) if set_back else amount(result, trial.moved),
-                _brought(result, trial),
-            )
-        )
-    table = Table(
-        (
-            "what",
-            "change of\nthe gap",
-            "gap",
-            "put back" if set_back else f"moves {result.names[0]} by",
-            "brought to",
-        ),
-        rows,
-        f"One at a time: what becomes of the {amount(result, result.gap)}",
-        words=frozenset({0, 4}),
-    )
-    notes: list[Block] = []
-    if any(moves(trial) for trial in result.alone) and not starred:
-        notes.append(_star(result))
-    given = [t.put_back for t in result.alone] + [t.worst for t in result.alone if not t.moved]
-    if any(astray(result, gap) for gap in given) and not marked:
-        notes.append(_astray(result))
-    order = f"How the order was chosen. {' '.join(result.order)}"
-    notes += [Text(_meaning(result, set_back)), Text(order)]
-    heading = "Each by itself: what the gap becomes when one thing alone is changed"
-    return Section("", heading, [table, *notes], folded=True)
+def _value(value: object, unit: str) -> str:
+    if value is None:
+        return NONE
+    if isinstance(value, tuple):
+        text = " ".join(_number(number, "") for number in value)
+        return text if len(text) <= _WIDE else f"{text[: _WIDE - 1].rstrip()}…"
+    return _number(value, unit)
 
 
-def _meaning(result: Attribution, set_back: bool) -> str:
-    """What the figures of one thing alone mean."""
-    one, two = result.names
-    lines = [
-        "These figures are not shares of the gap and need not add up: one setting can hide "
-        "another, and leaving something out on both sides makes another motion."
-    ]
-    if set_back:
-        lines.append("Put back: the gap when all settings are the same and this one is as it came.")
-    lines += [
-        f"{capital(title(trial.factor))}, put back, takes {titles(trial.along)} back with it: "
-        "they can be set only where it is."
-        for trial in result.alone
-        if trial.along
-    ]
-    lines += [f"{capital(title(t.factor))}: {t.note}." for t in result.alone if t.note]
-    if any(trial.way == "one side" for trial in result.alone):
-        lines.append(f"Integrator: {two} has none to choose from, so only {one} was changed.")
-    return " ".join(lines)
+def _number(value: object, unit: str) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, int | float):
+        return quantity(float(value), unit) if unit else significant(float(value))
+    text = str(value)
+    return text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…"
 
 
-def _share(share: float | None, text: str, trial: FactorTrial) -> TableCell:
-    return TableCell(f"{text}*" if moves(trial) else text, share=share)
+def _amount(result: Explanation, value: float) -> str:
+    """A gap of the explanation's quantity, with its unit."""
+    return quantity(value, result.unit) if math.isfinite(value) else "no bound"
 
 
-def _signed(change: float) -> str:
-    text = percent(abs(change))
-    if change == 0:
-        return text
-    sign = "+" if change > 0 else "-"
-    if text[0] in "<>":
-        return f"{text[0]} {sign}{text[2:]}" if change > 0 else f"{sign}{text[2:]}"
-    return sign + text
+__all__ = ["answer", "causes", "page", "parts", "proofs", "steps"]

@@ -15,7 +15,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from ..backends import backend_names, load
+from ..backends import backend_names, load, overlaps_at_start
 from ..engines import room
 from ..engines.auditing import SavePoint
 from ..errors import (
@@ -163,7 +163,7 @@ class _Examination:
 
     def _sizes(self, model: Model) -> None:
         sizes = {name: int(getattr(model, name)) for name in ("nq", "nv", "nu", "nbody", "ngeom")}
-        self.row = replace(self.row, **sizes)
+        self.row = replace(self.row, inside=tuple(overlaps_at_start(model)), **sizes)
 
     def _equals_engine(self, model: Model) -> bool | None:
         own = room(model.backend)

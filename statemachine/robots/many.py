@@ -16,11 +16,9 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import BadInputError, MissingEngineError
-from ..grading import sandbox
-from ..grading.parallel import in_parallel
-from ..grading.unwinding import unwinding
 from ..installed import DEFAULT, ENGINES, engine_version, require
-from ..processes import ALONE, checked_jobs, fresh_python
+from ..processes import ALONE, checked_jobs, fresh_python, sandbox
+from ..processes.parallel import in_parallel, unwinding
 from ..runs.drive import Progress, silent
 from . import table as tables
 from .files import ModelFile
@@ -154,7 +152,11 @@ def _examined(
         with suppress(OSError, ValueError):
             told = json.loads(answer.read_text(encoding="utf-8"))
             part, row = told["part"], tables.row_of(told["row"])
-    how = "" if outcome.returncode == 0 and not part else _how_it_ended(outcome, seconds, part)
+    how = ""
+    if outcome.end != "code" or outcome.code or part:
+        said = outcome.stderr.strip().splitlines() if outcome.end == "code" else []
+        words = f"its process failed: {said[-1][:200]}" if said else f"it {outcome.how}"
+        how = f"{words} (at: {part or 'the end'})"
     return replace(
         row,
         part_of=model.part_of,
@@ -162,17 +164,3 @@ def _examined(
         limit=seconds,
         took=round(time.monotonic() - began, 1),
     )
-
-
-def _how_it_ended(outcome: sandbox.ProcessOutcome, seconds: float, part: str) -> str:
-    """What became of a process that did not come to its end."""
-    if outcome.out_of_memory:
-        how = f"it asks for more than {_MEMORY // sandbox.GB} GB"
-    elif outcome.timed_out or outcome.out_of_cpu:
-        how = f"not at its end after {seconds:g} s"
-    elif outcome.signal is not None:
-        how = f"it crashed ({sandbox.signal_name(outcome.signal)})"
-    else:
-        said = outcome.stderr.strip().splitlines() or [f"exit code {outcome.returncode}"]
-        how = f"its process failed: {said[-1][:200]}"
-    return f"{how} (at: {part or 'the end'})"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 TOLERANCE = 1e-6  # of a gap without contacts [rad or m]
 PLACES = 1e-9  # of a gap to the witness [m]
 _FAR = 10.0  # times as far as the first engine moves anything
+_ONE_RUN = 3.0  # one run tells a chaos floor to about a factor
 _STILL = 0.3  # [rad or m]: what moves less than this may be pushed about by a contact
 _FIRST_ORDER = 1.5  # by how much a gap shrinks at least with half the timestep
 RUNS = "runs"
@@ -27,6 +28,8 @@ class RunGap:
         fastest: The largest velocity on the other engine [rad/s or m/s].
         ended: Why a side ended early; "" if none did.
         shrinks: The gap divided by that at half the timestep; None where not measured.
+        floor: How far the first engine is from its own run when start and commands are changed by
+            rounding [rad or m]; None where not measured.
     """
 
     steps: int
@@ -38,11 +41,17 @@ class RunGap:
     fastest: float = 0.0
     ended: str = ""
     shrinks: float | None = None
+    floor: float | None = None
 
     @property
     def largest(self) -> float:
         """The largest of them, in SI units; 0 where there is none."""
         return max((self.hinge or 0.0, self.slide or 0.0, self.position or 0.0, self.turn or 0.0))
+
+    @property
+    def is_rounding(self) -> bool:
+        """Whether rounding alone makes about as much: nothing is known of the engines then."""
+        return self.floor is not None and self.largest <= _ONE_RUN * self.floor
 
     @property
     def explodes(self) -> bool:
@@ -97,12 +106,13 @@ class BackendRow:
         """Whether the gap without contacts is one that nothing accounts for.
 
         What accounts for it: a warning at load that names a difference, or that the gap
-        vanishes with the timestep.
+        vanishes with the timestep, or that it is rounding.
         """
         gap = self.without_contacts
         if gap is None:
             return False
-        beyond = gap.largest > TOLERANCE and not gap.first_order and not self.warnings_without
+        accounted = gap.first_order or gap.is_rounding or self.warnings_without
+        beyond = gap.largest > TOLERANCE and not accounted
         return beyond or bool(gap.ended)
 
 
@@ -139,6 +149,7 @@ class ExaminedModel:
         nq, nv, nu, nbody, ngeom: Sizes; None where the default backend cannot read it.
         backends: What was found on each backend that is here.
         witness: What the witness says; None where it is not here.
+        inside: What is inside each other at the start, as `measures.overlaps` has it.
     """
 
     file: str
@@ -156,6 +167,7 @@ class ExaminedModel:
     ngeom: int | None = None
     backends: dict[str, BackendRow] = field(default_factory=dict)
     witness: WitnessRow | None = None
+    inside: tuple[str, ...] = ()
 
     @property
     def is_model(self) -> bool:

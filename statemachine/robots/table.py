@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import io
 import json
 import types
 import typing
@@ -13,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
-from ..grading.class_table import no_formula
-from ..runs.whole import replace_text
+from ..runs.whole import replace_csv, replace_text
 from .records import ExaminedModel
 
 SUFFIXES = (".csv", ".json")
@@ -35,12 +33,7 @@ def write(target: Path, rows: Iterable[ExaminedModel]) -> None:
         return
     flat = [_flat(row) for row in plain]
     head = list(dict.fromkeys(name for row in flat for name in row))
-    out = io.StringIO()
-    writer = csv.DictWriter(out, head, restval="", lineterminator="\n")
-    writer.writeheader()
-    for row in flat:
-        writer.writerow({name: no_formula(cell) for name, cell in row.items()})
-    replace_text(target, out.getvalue(), "utf-8-sig")  # as spreadsheets know UTF-8
+    replace_csv(target, [head, *([row.get(name, "") for name in head] for row in flat)])
 
 
 def read(target: Path) -> dict[tuple[str, str, str], ExaminedModel]:

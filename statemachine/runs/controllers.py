@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, StateMachineError, did_you_mean
+from ..errors import BadInputError, did_you_mean
 from ..interface import Data, Model
 from ..interface.checks import as_vector
 from ..measures.text import count
@@ -20,31 +20,12 @@ from .drive import Controller
 from .scenarios import Scenario
 
 Function = Callable[..., Any]
-_TAKES = ("model", "data")
-
-
-def controller_from(spec: str) -> Controller:
-    """The function (time, data) that "FILE.py:NAME" says; without a name, `controller`.
-
-    The file is run, as Python would run it. A mistake in it, then or later, becomes one
-    line that says where.
-
-    Raises:
-        BadInputError: There is no such file or function, or the file fails.
-    """
-    path, name = _place(spec, "controller")
-    function = _imported(path, name, ("time", "data"))
-
-    def controller(time: float, data: Data) -> Any:
-        with _errors_of(path, time):
-            return function(time, data)
-
-    return controller
+_TAKES = ("model", "data")  # by position
 
 
 def is_function(spec: str) -> bool:
     """Whether a word is FILE.py or FILE.py:NAME."""
-    return Path(_place(spec, "")[0]).suffix == ".py"
+    return Path(_place(spec)[0]).suffix == ".py"
 
 
 def function_scenario(
@@ -67,12 +48,12 @@ def function_scenario(
         BadInputError: There is no such file or function, or the file fails; the controller
             raises it where the function fails, or returns what is no ctrl.
     """
-    path, name = _place(spec, "controller")
+    path, name = _place(spec)
     given = dict(parameters or {})
-    _imported(path, name, _TAKES, given)  # that it fails is said before anything is loaded
+    _imported(path, name, given)  # that it fails is said before anything is loaded
 
     def controller_of(model: Model, _seed: int) -> Controller:
-        function = _imported(path, name, _TAKES, given)
+        function = _imported(path, name, given)
         numbers = itertools.count()
 
         def controller(time: float, data: Data) -> Any:
@@ -80,21 +61,13 @@ def function_scenario(
                 return None
             with _errors_of(path, time):
                 ctrl = function(model, data, **given)
-            if ctrl is None:
-                return None
-            try:
-                return as_vector(ctrl, (model.nu,), "ctrl")
-            except StateMachineError as error:
-                raise BadInputError(
-                    f"what {name} of {path.name} returned at {time:.3f} s is no ctrl of "
-                    f"{model.path.name}: {error}"
-                ) from None
+                return None if ctrl is None else as_vector(ctrl, (model.nu,), "ctrl")
 
         return controller
 
-    called = ":".join(filter(None, (path.name, _place(spec, "")[1])))
+    called = Path(spec).name
     steps = "every step" if every == 1 else f"every {count(every, 'step')}"
-    says = f"{called} is asked for ctrl at {steps}, on each side for its own."
+    says = f"{called} is asked for ctrl at {steps}."
     return Scenario(
         called, says, "", 2.0, controller_of, lambda _model: says, keyframe=keyframe, own=True
     )
@@ -106,9 +79,9 @@ def parameters_of(spec: str) -> tuple[str, ...]:
     Raises:
         BadInputError: There is no such function, or the file fails.
     """
-    path, name = _place(spec, "controller")
+    path, name = _place(spec)
     try:
-        given = inspect.signature(_function(path, name, _TAKES)).parameters.values()
+        given = inspect.signature(_function(path, name)).parameters.values()
     except ValueError:  # something of C's without a signature
         return ()
     kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
@@ -119,26 +92,24 @@ def parameters_of(spec: str) -> tuple[str, ...]:
 
 def function_file(spec: str) -> Path:
     """The file that "FILE.py:NAME" names."""
-    return _place(spec, "controller")[0]
+    return _place(spec)[0]
 
 
-def _place(spec: str, usual: str) -> tuple[Path, str]:
+def _place(spec: str) -> tuple[Path, str]:
     """The file and the name of a function."""
     file, colon, name = spec.rpartition(":")
     if not colon or name.endswith(".py") or "/" in name or "\\" in name:
-        file, name = spec, usual
+        file, name = spec, "controller"
     return Path(file), name
 
 
-def _imported(
-    path: Path, name: str, takes: tuple[str, ...], parameters: Mapping[str, Any] | None = None
-) -> Function:
+def _imported(path: Path, name: str, parameters: Mapping[str, Any]) -> Function:
     """A function of a file, which is run for it, that can be called like this."""
-    function = _function(path, name, takes)
+    function = _function(path, name)
     try:
-        inspect.signature(function).bind(*takes, **(parameters or {}))
+        inspect.signature(function).bind(*_TAKES, **parameters)
     except TypeError:
-        listed = ", ".join((*takes, *(parameters or {})))
+        listed = ", ".join((*_TAKES, *parameters))
         raise BadInputError(
             f"{name} of {path.name} takes {inspect.signature(function)}, and is called with "
             f"({listed})"
@@ -148,7 +119,7 @@ def _imported(
     return function
 
 
-def _function(path: Path, name: str, takes: tuple[str, ...]) -> Function:
+def _function(path: Path, name: str) -> Function:
     """A function of a file, which is run for it."""
     if path.suffix != ".py" or not path.is_file():
         raise _missing(path)
@@ -160,11 +131,10 @@ def _function(path: Path, name: str, takes: tuple[str, ...]) -> Function:
     with _errors_of(path):
         module_spec.loader.exec_module(module)
     function = getattr(module, name, None)
-    listed = ", ".join(takes)
     if not callable(function):
         functions = [key for key, value in vars(module).items() if inspect.isfunction(value)]
         hint = did_you_mean(name, functions)
-        raise BadInputError(f"{path.name} has no function {name}({listed}){hint}")
+        raise BadInputError(f"{path.name} has no function {name}({', '.join(_TAKES)}){hint}")
     return function
 
 

@@ -175,20 +175,29 @@ class Header:
 
     def _check(self) -> None:
         _check_fields(self)
-        lengths = {
-            "jnt_type": len(self.joints),
-            "jnt_qposadr": len(self.joints),
-            "jnt_dofadr": len(self.joints),
-            "geom_bodyid": len(self.geoms),
-            "body_parentid": len(self.bodies),
-            "actuator_jntid": self.nu,
-            "actuators": self.nu,
-            "ctrlrange": self.nu,
-        }
-        for name, length in lengths.items():
-            if len(getattr(self, name)) != length:
-                raise TraceError(f"{name} of the trace has {len(getattr(self, name))} entries")
-        _check_places(self)
+        joints, bodies, nu = len(self.joints), len(self.bodies), self.nu
+        # How many numbers each list has, and between which they lie.
+        for name, length, least, below in (
+            ("jnt_type", joints, 0, len(JointType)),
+            ("jnt_qposadr", joints, 0, self.nq),
+            ("jnt_dofadr", joints, 0, self.nv),
+            ("geom_bodyid", len(self.geoms), 0, bodies),
+            ("body_parentid", bodies, 0, bodies),
+            ("actuator_jntid", nu, -1, joints),
+            ("actuators", nu, None, None),
+            ("ctrlrange", nu, None, None),
+        ):
+            entries = getattr(self, name)
+            if len(entries) != length:
+                raise TraceError(f"{name} of the trace has {len(entries)} entries")
+            if below is not None and not all(least <= number < below for number in entries):
+                raise TraceError(f"{name} of the trace names one that is not there")
+        for name, kind, qpos, dof in zip(
+            self.joint_labels, self.jnt_type, self.jnt_qposadr, self.jnt_dofadr, strict=True
+        ):
+            of = JointType(kind)
+            if qpos + of.nq > self.nq or dof + of.nv > self.nv:
+                raise TraceError(f"{name} of the trace has no place in qpos and qvel")
 
 
 def _frozen(value: Any) -> Any:
@@ -291,29 +300,3 @@ def _check_fields(header: Header) -> None:
         names = Counter(name for name in getattr(header, what) if name)
         if names and (most := names.most_common(1)[0])[1] > 1:
             raise TraceError(f"two {what} of the trace are called {most[0][:40]!r}")
-
-
-def _check_places(header: Header) -> None:
-    """Every number that says where something is says a place that there is.
-
-    Raises:
-        TraceError: One does not.
-    """
-    known = {int(kind) for kind in JointType}
-    for name, kind, qpos, dof in zip(
-        header.joint_labels, header.jnt_type, header.jnt_qposadr, header.jnt_dofadr, strict=True
-    ):
-        if kind not in known:
-            raise TraceError(f"{name} of the trace is a joint of no known kind: {kind}")
-        of = JointType(kind)
-        if not (0 <= qpos <= header.nq - of.nq and 0 <= dof <= header.nv - of.nv):
-            raise TraceError(f"{name} of the trace has no place in qpos and qvel")
-    bodies, joints = len(header.bodies), len(header.joints)
-    for name, most in (
-        ("geom_bodyid", bodies),
-        ("body_parentid", bodies),
-        ("actuator_jntid", joints),
-    ):
-        least = -1 if name == "actuator_jntid" else 0
-        if not all(least <= number < most for number in getattr(header, name)):
-            raise TraceError(f"{name} of the trace names one that is not there")

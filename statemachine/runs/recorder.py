@@ -164,7 +164,7 @@ def record_scenario(
         seed=seed if scenario.seeded else None,
         progress=progress,
     )
-    if trace.header.rewritten:  # a scenario writes nothing but ctrl
+    if trace.header.rewritten and not scenario.own:  # ours write nothing but ctrl
         raise _not_repeated(trace.header.rewritten)
     return trace
 
@@ -197,21 +197,10 @@ def play(
             )
     if (header.nq, header.nv) != (model.nq, model.nv):
         raise TraceError("the trace's joints are of other kinds than the model's")
-    commands, start = trace.ctrl, float(trace.time[0])
-    # A hair early, so that a sum of timesteps does not miss the row that it means.
-    times = trace.time - start - 1e-6 * header.timestep
-    began: list[float] = []
-
-    def controller(time: float, _data: Data) -> Array:
-        if not began:
-            began.append(time)
-        row = int(np.searchsorted(times, time - began[0], side="right")) - 1
-        return commands[max(0, min(row, len(commands) - 1))]
-
     played = record(
         model,
-        controller,
-        float(trace.time[-1]) - start,
+        commands_of(trace),
+        float(trace.time[-1] - trace.time[0]),
         qpos=trace.qpos[0],
         qvel=trace.qvel[0],
         experiment=header.experiment,
@@ -225,6 +214,22 @@ def play(
     if played.header.rewritten:
         raise _not_repeated(played.header.rewritten)
     return played
+
+
+def commands_of(trace: Trace) -> Controller:
+    """A controller that gives the ctrl of a trace; a command holds until the time of the next."""
+    commands, start = trace.ctrl, float(trace.time[0])
+    # A hair early, so that a sum of timesteps does not miss the row that it means.
+    times = trace.time - start - 1e-6 * trace.timestep
+    began: list[float] = []
+
+    def controller(time: float, _data: Data) -> Array:
+        if not began:
+            began.append(time)
+        row = int(np.searchsorted(times, time - began[0], side="right")) - 1
+        return commands[max(0, min(row, len(commands) - 1))]
+
+    return controller
 
 
 def layout_of(model: Model) -> dict[str, Any]:

@@ -78,17 +78,37 @@ def moved_by_actuators(model: Model) -> frozenset[int]:
     return carried_by(model, (int(model.jnt_bodyid[joint]) for joint in joints))
 
 
+def trees_of_actuators(model: Model) -> frozenset[int]:
+    """The whole robot: each tree of bodies of which an actuator drives a joint, its base included.
+
+    Where actuators drive no joint (but a tendon, a site or a body), all trees that move.
+    """
+    joints = [joint for joint in model.actuator_jntid.tolist() if joint >= 0]
+    bodies = {int(model.jnt_bodyid[joint]) for joint in joints or range(model.njnt)}
+    for body in range(model.nbody - 1, 0, -1):  # parents come before children
+        if body in bodies and model.body_parentid[body]:
+            bodies.add(int(model.body_parentid[body]))
+    return carried_by(model, bodies)
+
+
 def touching(
-    model: Model, contacts: Contacts, bodies: frozenset[int] | None = None
+    model: Model,
+    contacts: Contacts,
+    bodies: frozenset[int] | None = None,
+    each_other: bool = False,
 ) -> tuple[str, ...]:
     """What of `bodies` touches what else, as "gripper on floor (fixed_tip)", each once.
 
-    Without `bodies`, whatever touches.
+    Without `bodies`, whatever touches; with `each_other`, also what of them touches one another.
     """
     found = contacts.geom.tolist()
     if bodies is not None:
         owners = [[int(model.geom_bodyid[geom]) in bodies for geom in pair] for pair in found]
-        found = [pair for pair, (one, two) in zip(found, owners, strict=True) if one != two]
+        found = [
+            pair
+            for pair, (one, two) in zip(found, owners, strict=True)
+            if one != two or (one and each_other)
+        ]
     names = ContactNames.of(model) if found else None
     return tuple(dict.fromkeys(names.geoms(*pair) for pair in found)) if names else ()
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import BadInputError, check_name
 from ..interface import Array, Data, Model
-from ..measures.text import count, listed
+from ..measures.text import listed, sentence
 from .commands import hold_ctrl, home, is_servo, waves
 from .drive import Controller
 from .robot import has_floor, is_the_arm
@@ -101,24 +101,14 @@ def _hold_says(model: Model) -> str:
     if is_the_arm(model):
         return "The arm is told one pose and goes there."
     servos = is_servo(model)
-    number, pushes = int(servos.sum()), bool(hold_ctrl(model)[~servos].any())
-    if not number:
-        if not pushes:
-            return "No actuator takes a pose, and all of them are left at the start's ctrl."
-        return "Each motor exerts what holds its joint at the start, and nothing looks after it."
-    says = f"{count(number, 'position servo')} {'is' if number == 1 else 'are'} told a pose"
-    says += f" and {'goes' if number == 1 else 'go'} there"
-    if number < model.nu:
-        rest = "exert what holds at the start" if pushes else "are left at the start's ctrl"
-        says += f"; the other actuators {rest}"
-    return f"{says}."
+    pushes = bool(hold_ctrl(model)[~servos].any())
+    rest = "exerts what holds its joint at the start" if pushes else "is left at the start's ctrl"
+    says = ["each position servo is told a pose and goes there"] if servos.any() else []
+    says += [] if servos.all() else [f"each {'other ' if says else ''}actuator {rest}"]
+    return sentence("; ".join(says))
 
 
-def _box(model: Model, _seed: int) -> Controller:
-    if model.nu != len(MOVING):
-        raise BadInputError(
-            f"this is for {len(MOVING)} actuators; {model.path.name} has {model.nu}"
-        )
+def _box(_model: Model, _seed: int) -> Controller:
     target = np.array(MOVING)
     return lambda _time, _data: target
 
@@ -147,15 +137,13 @@ def _need_actuators(model: Model) -> None:
 
 def _falls(model: Model, onto: bool) -> str:
     _need_joints(model)
-    off = "" if not model.nu else f"The {drives(model)} are off"
-    if not onto:
-        off = f"{off} and nothing" if off else "Nothing"
-        off = f"{off} can touch anything"
+    facts = [f"the {drives(model)} are off"] if model.nu else []
+    facts += [] if onto else ["nothing can touch anything"]
+    facts += [] if model.gravity.any() else ["there is no gravity"]
+    falls = "falls onto the floor" if onto and has_floor(model) else "falls"
+    falls = falls if model.gravity.any() else "coasts"
     what = "the arm" if is_the_arm(model) else "what can move"
-    if not model.gravity.any():
-        return f"{off or 'Nothing is driven'}, and there is no gravity: {what} coasts."
-    floor = " onto the floor" if onto and has_floor(model) else ""
-    return f"{off or 'Nothing is driven'}: {what} falls{floor}."
+    return sentence(f"{listed(facts) or 'nothing is driven'}: {what} {falls}")
 
 
 def drives(model: Model) -> str:

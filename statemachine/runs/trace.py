@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import TraceError
 from ..interface import Array, Ints
 from ..interface.checks import HUGE, index_of
-from ..measures import ContactNames
+from ..measures import ContactNames, overlaps
 from .header import COLUMNS, CONTACTS, INPUTS, Header
 
 # Bytes that a trace may unfold into: this many, or so many times the size of its file.
@@ -166,13 +166,24 @@ class Trace:
         """Which contacts are of each pair of bodies: their places by "gripper on box"."""
         of_pair: dict[str, list[int]] = {}
         if "contact_geom" in self:
-            header = self.header
-            names = ContactNames(
-                header.body_labels, header.geoms, header.geom_bodyid, header.body_parentid
-            )
+            names = self._contact_names
             for place, geoms in enumerate(self["contact_geom"].tolist()):
                 of_pair.setdefault(names.pair(*geoms), []).append(place)
         return {pair: np.array(places) for pair, places in of_pair.items()}
+
+    @cached_property
+    def _contact_names(self) -> ContactNames:
+        known = self.header
+        return ContactNames(known.body_labels, known.geoms, known.geom_bodyid, known.body_parentid)
+
+    @cached_property
+    def overlaps(self) -> list[str]:
+        """Shapes that are inside each other in the first row, as `measures.overlaps` has them."""
+        if "contact_row" not in self:
+            return []
+        first = self["contact_row"] == 0
+        geoms, distances = self["contact_geom"][first], self["contact_dist"][first]
+        return overlaps(self._contact_names, geoms, distances)
 
     def touches(self) -> dict[str, NDArray[np.bool_]]:
         """When each pair of bodies touches: (n,) bool by "gripper on box"."""

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+import csv
 import glob
+import io
 import os
+import secrets
 import shutil
-import sys
 import tempfile
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 from ..errors import BadInputError, StateMachineError
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None
-
+_FORMULA = tuple("=+-@\t\r")  # how a formula begins
 _PART = ".part-"  # in the names of files that are being written
+_ABANDONED = 3600.0  # seconds since anything was written into one: its process is gone
 
 
 def check_place(target: Path) -> None:
@@ -50,8 +50,8 @@ def beside(*targets: Path) -> Iterator[list[str]]:
     later ones are removed before: a process that is killed between leaves a file without its
     companion, and never one with the companion of another.
 
-    What a killed process has left of an earlier attempt is removed, where files can be locked:
-    not on Windows. What is no file, as /dev/null, is written into and stays what it is.
+    What a killed process has left of an earlier attempt is removed an hour later. What is no file,
+    as /dev/null, is written into and stays what it is.
 
     Raises:
         OSError: A file cannot be written; its name is the first place.
@@ -100,59 +100,36 @@ def replace_text(target: Path, text: str, encoding: str = "utf-8") -> None:
     replace_bytes(target, text.encode(encoding, errors="replace"))
 
 
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Rows as CSV. No cell is a formula: a spreadsheet would run what a file is called."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    for row in rows:
+        writer.writerow([f"'{cell}" if str(cell).startswith(_FORMULA) else cell for cell in row])
+    return out.getvalue()
+
+
+def replace_csv(target: Path, rows: Iterable[Iterable[object]]) -> None:
+    """Write a table, with the mark by which a spreadsheet knows UTF-8."""
+    replace_text(target, csv_text(rows), "utf-8-sig")
+
+
 @contextmanager
 def _part_of(target: Path) -> Iterator[str]:
     """A new file beside a place; gone at the end unless it was renamed."""
-    if _special(target):
-        target = Path(tempfile.gettempdir(), target.name)
-    _remove_abandoned(target)
-    handle, name = _new_part(target)
+    folder = Path(tempfile.gettempdir()) if _special(target) else target.parent
+    start = f".{target.name}{_PART}"
+    for part in folder.glob(f"{glob.escape(start)}*{glob.escape(target.suffix)}"):
+        with suppress(OSError):  # another process may remove it, too
+            if time.time() - part.stat().st_mtime > _ABANDONED:
+                part.unlink()
+    name = os.fspath(folder / f"{start}{secrets.token_hex(4)}{target.suffix}")
     try:
-        # mkstemp gives a file that its owner alone may read.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
+        open(name, "xb").close()
+    except OSError as error:  # of the file that was asked for, not of the one beside it
+        raise OSError(error.errno, error.strerror, os.fspath(target)) from None
+    try:
         yield name
     finally:
         with suppress(OSError):
             os.unlink(name)
-        if handle is not None:
-            os.close(handle)
-
-
-def _new_part(target: Path) -> tuple[int | None, str]:
-    """A new file's name, and its handle, which holds a lock until it is closed."""
-    while True:
-        try:
-            handle, name = tempfile.mkstemp(
-                dir=target.parent, prefix=f".{target.name}{_PART}", suffix=target.suffix
-            )
-        except OSError as error:  # of the file that was asked for, not of the one beside it
-            raise OSError(error.errno, error.strerror, os.fspath(target)) from None
-        if fcntl is None:  # an open file could not be renamed
-            os.close(handle)
-            return None, name
-        with suppress(OSError):  # no locks on this filesystem
-            fcntl.flock(handle, fcntl.LOCK_EX)
-        if os.path.exists(name):
-            return handle, name
-        os.close(handle)  # another process took it for abandoned before it was locked
-
-
-def _remove_abandoned(target: Path) -> None:
-    """Remove what is left of attempts to write this file whose process is gone.
-
-    A process that is still writing holds a lock on its part.
-    """
-    if fcntl is None or sys.platform == "win32":
-        return
-    pattern = glob.escape(f".{target.name}{_PART}") + "*" + glob.escape(target.suffix)
-    for name in glob.glob(pattern, root_dir=target.parent):
-        part = target.parent / name
-        with suppress(OSError):  # among them: locked, or no locks on this filesystem
-            handle = os.open(part, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                part.unlink()
-            finally:
-                os.close(handle)

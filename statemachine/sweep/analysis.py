@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import BadInputError, check_name, unknown_name
+from ..errors import BadInputError, StateMachineError, check_name, unknown_name
 from ..interface import Array
 from ..measures.text import listed
 from ..runs.drive import Progress, part_of, silent
@@ -27,11 +27,10 @@ from .analysis_gaps import (
     gap_map,
     only_rounding,
 )
-from .analysis_indices import Sensitivity, sensitivity
+from .analysis_indices import Sensitivity, ranked, sensitivity
 from .analysis_runs import CellRunner, ModelFacts, SweepFloor, facts_of, floor_of, runner_of
 from .analysis_together import BroughtTogether, Varied, brought_together
 from .design import Design
-from .factors import Vary
 from .folder import design_of, read_manifest
 from .rows import read_cells
 
@@ -150,11 +149,13 @@ def sweep_report(
     main = quantity or next(iter(data.gaps))
     runner, floor, no_floor = None, None, "nothing was to be run"
     if run:
-        found = runner_of(manifest, data, facts.hinges, menagerie, jobs)
-        runner, no_floor = (None, found) if isinstance(found, str) else (found, "")
-    if runner is not None:
-        floor = floor_of(data, runner, floor_cells, part_of(progress, 0.0, 0.5))
-        no_floor = "" if floor else "no cell was to be run for it"
+        try:
+            runner = runner_of(manifest, data, facts.hinges, menagerie, jobs)
+        except StateMachineError as error:
+            no_floor = str(error)
+        else:
+            floor = floor_of(data, runner, floor_cells, part_of(progress, 0.0, 0.5))
+            no_floor = "" if floor else "no cell was to be run for it"
     widths = {} if floor is None else floor.width
     agreements = {
         name: agreement_of(data, name, widths.get(name), facts, tolerances) for name in data.gaps
@@ -194,18 +195,13 @@ def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
     for name in asked:
         check_name("backend of this sweep", name, there)
     chosen = list(dict.fromkeys(asked or there[:2]))
-    if len(chosen) != 2:
-        raise BadInputError(
-            "a report is of two engines; "
-            + (
-                f"this sweep has {listed(list(there))}: name two with --backend"
-                if len(there) > 2
-                else f"this sweep has {listed(list(there))} alone"
-                if len(there) < 2
-                else f"got {listed(chosen)} alone"
-            )
-        )
-    return chosen[0], chosen[1]
+    if len(chosen) == 2:
+        return chosen[0], chosen[1]
+    if len(there) > 2:
+        hint = f"this sweep has {listed(list(there))}: name two with --backend"
+    else:
+        hint = f"got {listed(chosen)} alone"
+    raise BadInputError(f"a report is of two engines; {hint}")
 
 
 def _together(
@@ -221,9 +217,16 @@ def _together(
 ) -> tuple[BroughtTogether, ...]:
     """The fit of each parameter that is asked for, else of the one that counts most."""
     chosen = [vary for vary in data.design.factors if vary.label in asked]
-    if not asked:
-        chosen = _candidates(data.design, shares)[:1]
-    floor = _middle(width)
+    if not asked:  # not the timestep, which is no property of the robot
+        chosen = [
+            vary
+            for vary in ranked(data.design, shares)
+            if vary.numeric
+            and vary.name not in ("timestep", "substeps")
+            and (vary.bounds is not None or len(vary.values) >= 3)
+        ][:1]
+    finite = np.empty(0) if width is None else width[np.isfinite(width)]
+    floor = float(np.median(finite)) if len(finite) else 0.0
     found = []
     for k, vary in enumerate(chosen):
         if not vary.numeric:
@@ -237,25 +240,3 @@ def _together(
             )
         )  # fmt: skip
     return tuple(found)
-
-
-def _middle(width: Array | None) -> float:
-    """The median of the floors that are finite."""
-    finite = np.array([]) if width is None else width[np.isfinite(width)]
-    return float(np.median(finite)) if len(finite) else 0.0
-
-
-def _candidates(design: Design, shares: Sensitivity | None) -> list[Vary]:
-    """The parameters that may be fitted, the most sensitive first.
-
-    Not the timestep, unless it is asked for: it is no property of the robot.
-    """
-    order = [each.label for each in shares.indices] if shares else []
-    fine = [
-        vary
-        for vary in design.factors
-        if vary.numeric
-        and vary.name not in ("timestep", "substeps")
-        and (vary.bounds is not None or len(vary.values) >= 3)
-    ]
-    return sorted(fine, key=lambda v: order.index(v.label) if v.label in order else len(order))

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadInputError
-from ..interface import Array
-from .cell import DONE
+from ..interface import Array, Ints
 from .design import Design, DesignPoint
-from .rows import require_parquet
+from .rows import DONE, require_parquet
 
+_RESAMPLES = 400
 Flags = NDArray[np.bool_]
 Runs = NDArray[Any]  # structured, as above
 
@@ -168,23 +168,16 @@ def _nested(column: Any, moments: int) -> Array:
     """
     compute = require_parquet()[0].compute
     column = column.combine_chunks()
-    counts, inner = _lengths(column), compute.list_flatten(column)
-    numbers = _lengths(inner)
-    moments = max(moments, counts.max(initial=0))
-    there = np.arange(moments) >= moments - counts[:, None]
-    lengths = np.zeros(there.shape, dtype=int)
-    lengths[there] = numbers
-    wide = np.arange(numbers.max(initial=1)) < lengths[..., None]
-    values: Array = np.full(wide.shape, np.nan)
-    values[wide] = compute.list_flatten(inner).to_numpy(zero_copy_only=False)
+    inner = compute.list_flatten(column)
+    run = compute.list_parent_indices(column).to_numpy()  # of each moment
+    moment = compute.list_parent_indices(inner).to_numpy()  # of each number
+    counts, widths = np.bincount(run, minlength=len(column)), np.bincount(moment)
+    back = np.cumsum(counts)[run] - np.arange(len(run))  # from the end of its run, at least 1
+    place = np.arange(len(moment)) - (np.cumsum(widths) - widths)[moment]
+    shape = len(column), max(moments, counts.max(initial=0)), widths.max(initial=1)
+    values: Array = np.full(shape, np.nan)
+    values[run[moment], -back[moment], place] = compute.list_flatten(inner).to_numpy()
     return values
-
-
-def _lengths(lists: Any) -> NDArray[np.int64]:
-    """How many elements each has; 0 of what is missing."""
-    compute = require_parquet()[0].compute
-    found = compute.fill_null(compute.list_value_length(lists), 0)
-    return found.to_numpy(zero_copy_only=False).astype(np.int64)
 
 
 def vectors(name: str, runs: Runs) -> Array:
@@ -226,5 +219,16 @@ def median(values: Array, axis: int = -1) -> Array:
     """Of what is a number; NaN where nothing is."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found: Array = np.nanmedian(values, axis=axis)
-    return found
+        return np.asarray(np.nanmedian(values, axis=axis))
+
+
+def drawn_again(count: int) -> Iterator[Ints]:
+    """Places of samples that are drawn again from `count` of them, many times: a bootstrap."""
+    draw = np.random.default_rng(0)
+    for _ in range(_RESAMPLES):
+        yield draw.integers(0, count, count)
+
+
+def known(figure: Array) -> float | None:
+    """A figure; None where it is no number."""
+    return None if np.isnan(figure) else float(figure)

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ..interface import Array
-from .analysis_data import Flags, length
+from .analysis_data import Flags, drawn_again, length
 
 _SCAN = 401  # values that are looked at between the bounds, before the minimum is refined
-_RESAMPLES = 400
-_LEAST_CURVES = 3  # of which a bootstrap says something
-_LEAST_LEVELS = 3
+_LEAST = 3  # values that a fit is of, and curves of which a bootstrap says something
 _EDGE = 0.005  # of the range
-_LESS = 0.9  # of the gap before: what is above it is no improvement
 MOST_CURVES = 200
-
-Verdict = Literal["together", "closer", "edge", "none"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,21 +48,6 @@ class FittedValue:
         fine = [value for value, gap in zip(*self.scan, strict=True) if gap <= good]
         return (fine[0], fine[-1]) if fine else None
 
-    def verdict(self, gap: float, before: float | None, good: float) -> Verdict:
-        """What a value does.
-
-        Args:
-            gap: The gap there, as measured or predicted.
-            before: The gap with the parameter as it is; None where that is not known.
-            good: The gap that is as good as none.
-        """
-        before = max(self.scan[1]) if before is None else before
-        if gap <= good:
-            return "together"
-        if gap > _LESS * before:
-            return "none"
-        return "edge" if self.edge else "closer"
-
 
 def fit_curves(
     name: str, levels: Array, left: Array, right: Array, seeds: Sequence[int]
@@ -89,18 +68,16 @@ def fit_curves(
     Returns:
         The value; None if there are fewer than three values or no whole curve.
     """
-    if len(levels) < _LEAST_LEVELS:
-        return None
-    count = len(right)
+    from scipy.interpolate import PchipInterpolator
+
     used = _comparable(left, right)
     whole = np.flatnonzero(used.any(axis=(1, 2)))
-    if not len(whole):
+    if len(levels) < _LEAST or not len(whole):
         return None
     chosen = whole[np.linspace(0, len(whole) - 1, min(len(whole), MOST_CURVES)).astype(int)]
     used = used[chosen]
     left, right = (np.where(used[:, None], each[chosen], 0.0) for each in (left, right))
-    interpolate = importlib.import_module("scipy.interpolate")
-    difference = interpolate.PchipInterpolator(levels, right - left, axis=1)
+    difference = PchipInterpolator(levels, right - left, axis=1)
 
     def gaps(values: Array) -> Array:
         """(n, c)"""
@@ -111,13 +88,13 @@ def fit_curves(
     table = gaps(scan)
     centre = table.mean(axis=1)
     value = _refined(lambda x: float(gaps(np.array([x])).mean()), scan, centre)
-    each = np.full(count, np.nan)
+    each = np.full(len(seeds), np.nan)
     each[chosen] = gaps(np.array([value]))[0]
     own_seeds = np.array(seeds)[chosen]
     by_seed = [table[:, own_seeds == seed].mean(axis=1) for seed in np.unique(own_seeds)]
     for what, columns in (("seeds", np.array(by_seed).T), ("curves", table)):
-        if (drawn := columns.shape[1]) >= _LEAST_CURVES:
-            error, of = float(np.std(_drawn_again(scan, columns))), f"{drawn} {what} drawn again"
+        if (drawn := columns.shape[1]) >= _LEAST:
+            error, of = float(np.std(_best_again(scan, columns))), f"{drawn} {what} drawn again"
             break
     else:
         error, of = (
@@ -161,11 +138,7 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
 
     found = curve(slice(None))
     place = int(np.argmin(found))
-    draw = np.random.default_rng(0)
-    again = [
-        scan[int(np.argmin(curve(draw.integers(0, len(values), len(values)))))]
-        for _ in range(_RESAMPLES)
-    ]
+    again = [scan[int(np.argmin(curve(rows)))] for rows in drawn_again(len(values))]
     predicted = np.sqrt(np.maximum(found, 0.0))
     value = float(scan[place])
     return FittedValue(
@@ -195,29 +168,28 @@ def _comparable(left: Array, right: Array) -> Flags:
 
 def _refined(gap: Any, scan: Array, centre: Array) -> float:
     """The minimum of a function near the least value of its scan."""
+    from scipy.optimize import minimize_scalar
+
     place = int(np.argmin(centre))
     low, high = scan[max(0, place - 1)], scan[min(len(scan) - 1, place + 1)]
-    optimize = importlib.import_module("scipy.optimize")
-    found = optimize.minimize_scalar(gap, bounds=(low, high), method="bounded",
-                                     options={"xatol": 1e-6 * (scan[-1] - scan[0])})  # fmt: skip
+    found = minimize_scalar(gap, bounds=(low, high), method="bounded",
+                            options={"xatol": 1e-6 * (scan[-1] - scan[0])})  # fmt: skip
     return float(found.x) if found.fun < centre[place] else float(scan[place])
 
 
-def _drawn_again(scan: Array, table: Array) -> Array:
+def _best_again(scan: Array, table: Array) -> Array:
     """The best value (n,) of curves that are drawn again from those there are."""
-    draw = np.random.default_rng(0)
-    count = table.shape[1]
-    found = []
-    for _ in range(_RESAMPLES):
-        centre = table[:, draw.integers(0, count, count)].mean(axis=1)
+    best = []
+    for columns in drawn_again(table.shape[1]):
+        centre = table[:, columns].mean(axis=1)
         place = int(np.argmin(centre))
         shift = 0.0
         if 0 < place < len(scan) - 1:
             a, b, c = centre[place - 1 : place + 2] ** 2  # a parabola, unlike the gap itself
             bend = a - 2 * b + c
             shift = 0.5 * (a - c) / bend if bend > 0 else 0.0
-        found.append(scan[place] + shift * (scan[1] - scan[0]))
-    return np.array(found)
+        best.append(scan[place] + shift * (scan[1] - scan[0]))
+    return np.array(best)
 
 
 def _curvature(difference: Array, slope: Array) -> float | None:

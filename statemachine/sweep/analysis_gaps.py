@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..interface import Array, Ints
-from ..measures import COUNT, QUANTITIES
-from .analysis_data import RUN_QUANTITIES, SweepData, largest_known, median
-from .analysis_indices import Sensitivity
+from ..measures import QUANTITIES, Tolerance, tolerance_of
+from .analysis_data import RUN_QUANTITIES, SweepData, known, largest_known, median
+from .analysis_indices import Sensitivity, ranked
 from .analysis_runs import ModelFacts
 from .factors import Value, Vary
 
@@ -113,56 +112,52 @@ def agreement_of(
         given: Tolerances by kind, instead of ours [SI].
     """
     quantity, gap = RUN_QUANTITIES[name], data.gaps[name]
-    tolerance, reason = _tolerance(data, quantity.kind, facts, given or {})
+    tolerances = _tolerances(data, quantity.kind, facts, given)
+    tolerance = np.array([each.value for each in tolerances])
+    most_tolerant = tolerances[int(np.nanargmax(tolerance))]
     centre, most = median(gap), largest_known(gap)
-    known, within = np.isfinite(gap), gap <= tolerance[:, None]
+    there, within = np.isfinite(gap), gap <= tolerance[:, None]
     floors = [None] * len(gap) if width is None else width.tolist()
     # The first of these that is true of a setting.
-    true = {
-        "no runs": ~known.any(axis=1),
-        "agrees": (within | ~known).all(axis=1),
+    true: dict[SettingVerdict, Any] = {
+        "no runs": ~there.any(axis=1),
+        "agrees": (within | ~there).all(axis=1),
         "chaos": centre <= (-np.inf if width is None else width),
         "some seeds": within.any(axis=1),
-        "differs": np.ones(len(gap), dtype=bool),
     }
-    settings = []
-    for k, point in enumerate(data.points):
-        verdict: SettingVerdict = next(word for word in true if true[word][k])  # pyright: ignore
-        pair = (float(centre[k]), float(most[k])) if known[k].any() else (None, None)
-        settings.append(SettingGap(point.values, *pair, floors[k], verdict))
-    counts = Counter(each.verdict for each in settings)
+    verdicts = np.select([*true.values()], [*true], "differs").tolist()
+    settings = [
+        SettingGap(point.values, known(middle), known(worst), floor, verdict)
+        for point, middle, worst, floor, verdict in zip(
+            data.points, centre, most, floors, verdicts, strict=True
+        )
+    ]
     return (
         QuantityAgreement(
-            name, quantity.says, QUANTITIES[quantity.kind].unit, float(np.nanmax(tolerance)),
-            reason, {verdict: counts[verdict] for verdict in VERDICTS if counts[verdict]},
+            name, quantity.says, QUANTITIES[quantity.kind].unit, most_tolerant.value,
+            most_tolerant.reason,
+            {verdict: verdicts.count(verdict) for verdict in VERDICTS if verdict in verdicts},
             float(median(centre)), float(largest_known(most)),
         ),
         tuple(settings),
     )  # fmt: skip
 
 
-def _tolerance(
-    data: SweepData, kind: str, facts: ModelFacts, given: Mapping[str, float]
-) -> tuple[Array, str]:
-    """(p) at each setting, and why that much: those of `measures`."""
-    everywhere = np.ones(len(data.points))
-    if kind in given:
-        return given[kind] * everywhere, "as given"
-    count = "one count of a 12-bit encoder, 1/4096 turn"
-    if kind == "joint":
-        return COUNT * everywhere, count
+def _tolerances(
+    data: SweepData, kind: str, facts: ModelFacts, given: Mapping[str, float] | None
+) -> list[Tolerance]:
+    """At each setting."""
+    reach = 0.0
     if kind == "tip":
-        far = float(np.nanmax(np.linalg.norm(data.runs["tip"] - facts.foot, axis=-1)))
-        reason = f"what {count}, moves it, {far:.2f} m from the foot"
-        return COUNT * far * everywhere, reason
-    longest = largest_known(np.concatenate(data.runs["timestep"], axis=1)) * (1 + 1e-9)
-    return longest, "one timestep: an engine looks at contacts once in a step"
+        reach = float(np.nanmax(np.linalg.norm(data.runs["tip"] - facts.foot, axis=-1)))
+    steps = largest_known(np.concatenate(data.runs["timestep"], axis=1)).tolist()
+    return [tolerance_of(kind, np.empty(0), np.empty(0), reach, step, given) for step in steps]
 
 
 def only_rounding(settings: Sequence[SettingGap]) -> bool:
     """Whether every gap is inside the chaos floor."""
-    known = [each for each in settings if each.median is not None]
-    return bool(known) and all(each.inside_floor for each in known)
+    there = [each for each in settings if each.median is not None]
+    return bool(there) and all(each.inside_floor for each in there)
 
 
 def gap_map(
@@ -179,33 +174,23 @@ def gap_map(
     if not data.design.factors:
         return None
     centre = median(data.gaps[name])
-    order = [each.label for each in shares.indices] if shares else []
-    ranked = sorted(
-        data.design.factors,
-        key=lambda vary: order.index(vary.label) if vary.label in order else len(order),
-    )
-    axes = [_axis(data, vary) for vary in ranked[:2]]
+    across, *rest = ranked(data.design, shares)
+    axes = [_axis(data, vary) for vary in (across, *rest[:1])]
     (columns, column), (rows, row) = (*axes, ((), np.zeros(len(centre), dtype=int)))[:2]
-    gap: list[tuple[float | None, ...]] = []
-    inside: list[tuple[bool, ...]] = []
-    for r in range(max(1, len(rows))):
-        cells = [np.isfinite(centre) & (row == r) & (column == c) for c in range(len(columns))]
-        gap.append(tuple(float(median(centre[c])) if c.any() else None for c in cells))
-        inside.append(
-            tuple(
-                width is not None and bool(c.any() and (centre[c] <= width[c]).mean() > 0.5)
-                for c in cells
-            )
-        )
+    fine = np.zeros(len(centre), dtype=bool) if width is None else centre <= width
+    cells = [
+        [np.isfinite(centre) & (row == r) & (column == c) for c in range(len(columns))]
+        for r in range(max(1, len(rows)))
+    ]
     return GapMap(
-        ranked[0].label,
-        "".join(vary.label for vary in ranked[1:2]),
+        across.label,
+        "".join(vary.label for vary in rest[:1]),
         tuple(columns),
         tuple(rows),
-        tuple(gap),
-        tuple(inside),
-        tuple(vary.label for vary in ranked[2:]),
-        tuple(vary.label for vary in ranked[:2] if vary.bounds is not None),
+        tuple(tuple(known(median(centre[cell])) for cell in line) for line in cells),
+        tuple(tuple(bool(2 * fine[cell].sum() > cell.sum()) for cell in line) for line in cells),
+        tuple(vary.label for vary in rest[1:]),
+        tuple(vary.label for vary in (across, *rest[:1]) if vary.bounds is not None),
     )
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..installed import require_extra
 from ..interface import Array
-from .analysis_data import SweepData, median
+from .analysis_data import SweepData, drawn_again, median
 from .design import Design
+from .factors import Vary
 
-_RESAMPLES = 400
 _TAIL = 50 * (1 - 0.95)  # percent, on each side of an interval
 _LEAST_SEEDS = 3  # of which a bootstrap says something
 _LEAST_SAMPLES = 4
@@ -76,6 +76,14 @@ def sensitivity(data: SweepData, figures: Array) -> Sensitivity | None:
     return _rank(data, centre) if data.design.sampled else _factorial(data.design, figures)
 
 
+def ranked(design: Design, shares: Sensitivity | None) -> list[Vary]:
+    """What is varied, the most sensitive first."""
+    order = [each.label for each in shares.indices] if shares else []
+    return sorted(
+        design.factors, key=lambda v: order.index(v.label) if v.label in order else len(order)
+    )
+
+
 def _sobol(design: Design, centre: Array) -> Sensitivity | None:
     """Saltelli's design: blocks A, B and A with one range from B."""
     labels = [vary.label for vary in design.sampled]
@@ -99,9 +107,8 @@ def _sobol(design: Design, centre: Array) -> Sensitivity | None:
     found = _stats().sobol_indices(func={"f_A": a, "f_B": b, "f_AB": np.array(mixed)}, n=count)
     # (2, d) each: of all samples, and of samples that are drawn again from those there are.
     shares = np.array([found.first_order, found.total_order]).reshape(2, -1)
-    draw, drawn = np.random.default_rng(0), []
-    for _ in range(_RESAMPLES):
-        rows = draw.integers(0, count, count)
+    drawn = []
+    for rows in drawn_again(count):
         blocks = found._f_A[:, rows], found._f_B[:, rows], found._f_AB[..., rows]
         drawn.append(np.reshape(found._indices_method(*blocks), shares.shape))
     return _result("sobol", labels, shares, count, drawn, "the samples drawn again", notes)
@@ -128,8 +135,7 @@ def _factorial(design: Design, figures: Array) -> Sensitivity | None:
         return None
     seeds, error, drawn = cube.shape[-1], "", []
     if seeds >= _LEAST_SEEDS:
-        draw = np.random.default_rng(0)
-        again = (median(cube[..., draw.integers(0, seeds, seeds)]) for _ in range(_RESAMPLES))
+        again = (median(cube[..., chosen]) for chosen in drawn_again(seeds))
         drawn = [variance_shares(each) for each in again if np.ptp(each) > 0]
         error = f"the {seeds} seeds drawn again"
     labels = [vary.label for vary in design.factors]

@@ -12,17 +12,16 @@ import numpy as np
 
 from ..backends import load
 from ..compare.perturbed import ROUNDING
-from ..errors import StateMachineError
+from ..errors import BadInputError, StateMachineError
 from ..interface import Array, Ints, JointType, Model, forward, make_data, reset
 from ..processes import checked_jobs
 from ..runs.controllers import is_function
 from ..runs.drive import Progress, silent
 from .analysis_data import Runs, SweepData, gap_between, read_runs
 from .apart import apart
-from .cell import SweepCell
-from .factors import UNITS, Value, Vary
+from .factors import Value, Vary
 from .prepare import prepared
-from .request import REQUEST, PreparedSweep, Sweep
+from .request import DESIGN, REQUEST, PreparedSweep, Sweep, SweepCell
 from .rows import require_parquet, schema_of
 from .settings import own_value
 
@@ -62,13 +61,13 @@ class CellRunner:
         """
         nudges = nudges or [0] * len(asked)
         cells = [
-            SweepCell(f"{k}", "", values, seed, backend, nudges[k])  # pyright: ignore
+            SweepCell(f"{k}", "", values, seed, backend, nudges[k])
             for k, (backend, values, seed) in enumerate(asked)
         ]
         size = max(1, len(cells) // (4 * self.jobs))
         batches = [cells[k : k + size] for k in range(0, len(cells), size)]
         rows: dict[str, dict[str, Any]] = {}
-        for done in apart(self.ready.rules, batches, min(self.jobs, len(batches))):
+        for done in apart(self.ready, batches, min(self.jobs, len(batches))):
             rows.update((row["cell"], row) for row in done)
             progress(len(rows) / len(cells))
         table = require_parquet()[0].Table.from_pylist(
@@ -83,25 +82,27 @@ def runner_of(
     hinges: tuple[int, ...] | None,
     menagerie: str | None = None,
     jobs: int | None = None,
-) -> CellRunner | str:
-    """What runs more cells of a sweep, or why nothing can: files or versions are others here."""
+) -> CellRunner:
+    """What runs more cells of a sweep.
+
+    Raises:
+        StateMachineError: Nothing can: files or versions are others here.
+    """
     design, request = manifest["design"], manifest["request"]
     what = request["what"]
     if is_function(what) and not Path(what.rpartition(":")[0]).is_file():
-        return f"{what.rpartition(':')[0]} is not in this folder"
-    given = {name: design[name] for name in ("vary", "seeds", "samples", "indices", "design_seed")}
-    given |= {name: request[name] for name in REQUEST if request.get(name) is not None}
-    try:
-        ready = prepared(Sweep(what, backends=data.sides, menagerie=menagerie, **given))
-    except StateMachineError as error:
-        return str(error)
-    now = ready.manifest()
-    if (now["files"], now["function"]) != (manifest["files"], manifest["function"]):
-        return "the model or the function is another one than that of the sweep"
-    versions = now["versions"], manifest["versions"]
+        raise BadInputError(f"{what.rpartition(':')[0]} is not in this folder")
+    given = {name: request[name] for name in REQUEST} | {name: design[name] for name in DESIGN}
+    ready = prepared(Sweep(what, backends=data.sides, menagerie=menagerie, **given))
+    before = manifest["files"], request["function"]
+    if (ready.files, ready.function) != before:
+        raise BadInputError("the model or the function is another one than that of the sweep")
+    versions = ready.versions, manifest["versions"]
     others = [name for name in data.sides if versions[0].get(name) != versions[1].get(name)]
     if others:
-        return f"{' and '.join(others)} here is of another version than that of the sweep"
+        raise BadInputError(
+            f"{' and '.join(others)} here is of another version than that of the sweep"
+        )
     return CellRunner(ready, hinges, checked_jobs(jobs), data.runs.dtype)
 
 
@@ -207,7 +208,7 @@ def facts_of(
             hinges or None,
             _foot(model),
             {v.label: own_value(v, model) for v in factors},
-            {v.label: _unit(v, model) for v in factors},
+            {v.label: v.unit_on(_joints(model, v)) for v in factors},
         )
     return ModelFacts()
 
@@ -219,20 +220,13 @@ def _foot(model: Model) -> tuple[float, ...]:
         return tuple(data.xpos[min(1, model.nbody - 1)].tolist())
 
 
-def _unit(vary: Vary, model: Model) -> str:
-    """What the numbers of a factor are in."""
-    if vary.times or vary.kind == "parameter":
-        return ""
-    hinge, slide = UNITS.get(vary.name, ("", ""))
-    kinds = set(model.jnt_type.tolist())
+def _joints(model: Model, vary: Vary) -> set[int]:
+    """The types of the joints that a factor is of."""
     if vary.place in model.joint_names:
-        kinds = {int(model.jnt_type[model.joint_id(vary.place)])}
-    if hinge == slide or kinds == {JointType.HINGE}:
-        return hinge
-    return slide if kinds == {JointType.SLIDE} else ""
+        return {int(model.jnt_type[model.joint_id(vary.place)])}
+    return set(model.jnt_type.tolist())
 
 
 def evenly(count: int, most: int) -> Ints:
     """At most so many of `count` numbers from 0, evenly spread."""
-    found: Ints = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
-    return found
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))

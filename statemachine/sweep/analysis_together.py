@@ -4,40 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..interface import Array
 from ..runs.drive import Progress, silent
 from .analysis_data import Runs, SweepData, gap_between, median, vectors
-from .analysis_fit import FittedValue, Verdict, fit_curves, fit_scatter
+from .analysis_fit import FittedValue, fit_curves, fit_scatter
 from .analysis_runs import CellRunner, evenly
 from .factors import Value, Vary
 
 Setting = tuple[tuple[Value | None, ...], int]  # values of the factors, and a seed
 Varied = Literal["right", "both"]
+Verdict = Literal["together", "closer", "edge", "none"]
 MOST_REFERENCES = 24  # runs of the left side at the model's own value
 CHECKED = 4  # pairs of runs at a value
 REFINED = 9  # values that are run where a check contradicts the fit
+_LESS = 0.9  # of the gap before: what is above it is no improvement
 _NEAR = 0.5  # of the measured gap: a prediction that is farther off is contradicted
-
-
-@dataclass(frozen=True)
-class BestRun:
-    """The least gap of runs near a value that a fit got wrong.
-
-    Attributes:
-        value: Of the parameter.
-        gap: There, the mean of its pairs [SI].
-        apart: How far apart the values are that were run: so far is the best one known.
-        tried: (n,) these values, and (n,) the gap of each; NaN where a run failed.
-    """
-
-    value: float
-    gap: float
-    apart: float
-    tried: tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
@@ -52,11 +37,15 @@ class BroughtTogether:
         before: The gap with the parameter as the model has it, as all of these the mean of
             settings and seeds [SI]; None where that is not known.
         fit: The value of the least gap; None where the design does not allow one.
-        measured: The gap of runs at that value; None where none was run.
+        value: The best known: of runs, else of the fit.
+        error: How far it is known: the distance of the runs, else the standard error of the fit.
+        after: The gap there: of runs, else as predicted [SI].
+        measured: The gap of runs at the fitted value; None where none was run.
         predicted: What the fit says of the same runs.
         pairs: How many pairs of runs.
-        best: The best of further runs near that value, where `measured` contradicts `predicted`;
-            else None.
+        tried: Where `measured` contradicts `predicted`, (n,) values near that one which were run,
+            and (n,) the gap of each, NaN where a run failed; the best of them is the value then,
+            and their distance the error.
         verdict: "together": within tolerance or the chaos floor; "closer"; "edge": least at the
             end of the range; "none": no value is better than the model's own; "" without a fit.
         why_not: Why there is no fit, or no measurement.
@@ -69,34 +58,16 @@ class BroughtTogether:
     own: float | None
     before: float | None = None
     fit: FittedValue | None = None
+    value: float | None = None
+    error: float | None = None
+    after: float | None = None
     measured: float | None = None
     predicted: float | None = None
     pairs: int = 0
     verdict: Verdict | Literal[""] = ""
     why_not: str = ""
     cells: int = 0
-    best: BestRun | None = None
-
-    @property
-    def value(self) -> float | None:
-        """The value that is the best known: of runs, else of the fit."""
-        if self.best is not None:
-            return self.best.value
-        return None if self.fit is None else self.fit.value
-
-    @property
-    def error(self) -> float | None:
-        """How far it is known: the distance of the runs, else the standard error of the fit."""
-        if self.best is not None:
-            return self.best.apart
-        return None if self.fit is None else self.fit.error
-
-    @property
-    def after(self) -> float | None:
-        """The gap there: of runs, else as predicted [SI]."""
-        if self.best is not None:
-            return self.best.gap
-        return self.fit.gap if self.measured is None and self.fit else self.measured
+    tried: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
 
 def brought_together(
@@ -124,36 +95,53 @@ def brought_together(
     """
     nothing = BroughtTogether(vary.label, vary.times, varied, own)
     if varied == "right" and vary.kind != "option":
-        why = "the model has no value of its own that the left side could keep"
-        return replace(nothing, why_not=why)
+        return replace(
+            nothing, why_not="the model has no value of its own that the left side could keep"
+        )
     case = _Case(data, vary, quantity, varied, own, runner, progress)
     if runner is None and case.lacks_references:
-        why = (
-            "the design has no run of the left side at the model's own value, and nothing may be "
-            "run"
+        return replace(
+            nothing,
+            why_not="the design has no run of the left side at the model's own value, and nothing "
+            "may be run",
         )
-        return replace(nothing, why_not=why)
     fit = case.scatter() if vary.bounds is not None else case.grid()
     if fit is None:
-        why = "it needs three values of the parameter with runs"
-        return replace(nothing, why_not=why, cells=case.cells)
-    before, measured, best, gap, there = case.own_gap(), None, None, fit.gap, fit
-    if runner is not None:
-        run_before, measured = case.check(fit)
-        before = before if run_before is None else run_before
-    if measured is not None:
-        gap, predicted, _ = measured
-        if abs(predicted - gap) > max(_NEAR * gap, good):
-            best = case.refined(fit, gap)
-            gap = best.gap
-            there = replace(fit, edge=best.value in fit.bounds)
-    return BroughtTogether(
-        vary.label, vary.times, varied, own, before, fit,
-        *(measured or (None, None, 0)),
-        there.verdict(gap, before, good),
-        "" if measured else "nothing was run at that value",
-        case.cells, best,
+        return replace(
+            nothing, why_not="it needs three values of the parameter with runs", cells=case.cells
+        )
+    answer = replace(
+        nothing, before=case.own_gap(), fit=fit, value=fit.value, error=fit.error, after=fit.gap,
+        why_not="nothing was run at that value", cells=case.cells,
     )  # fmt: skip
+    edge = fit.edge
+    if runner is not None:
+        before, gap, predicted, pairs = case.check(fit)
+        answer = replace(answer, before=answer.before if before is None else before)
+        if gap is not None:
+            answer = replace(
+                answer, after=gap, measured=gap, predicted=predicted, pairs=pairs, why_not=""
+            )
+            if abs(predicted - gap) > max(_NEAR * gap, good):
+                values, gaps, apart = case.refined(fit, gap)
+                best = int(np.nanargmin(gaps))
+                answer = replace(
+                    answer, tried=(tuple(values), tuple(gaps)), value=values[best], error=apart,
+                    after=gaps[best],
+                )  # fmt: skip
+                edge = values[best] in fit.bounds
+    before = max(fit.scan[1]) if answer.before is None else answer.before
+    verdict = _verdict(answer.after or 0.0, before, good, edge)
+    return replace(answer, verdict=verdict, cells=case.cells)
+
+
+def _verdict(gap: float, before: float, good: float, edge: bool) -> Verdict:
+    """What a value does whose gap was another one before, where one is as good as none."""
+    if gap <= good:
+        return "together"
+    if gap > _LESS * before:
+        return "none"
+    return "edge" if edge else "closer"
 
 
 class _Case:
@@ -178,7 +166,9 @@ class _Case:
         self._data, self._vary, self._quantity, self._both = data, vary, quantity, varied == "both"
         self._own, self._runner, self._progress, self.cells = own, runner, progress, 0
         self._place = [each.label for each in data.design.factors].index(vary.label)
-        self._levels = np.sort(np.array(vary.values, dtype=float))
+        self._levels = np.sort(
+            np.array(vary.values or np.linspace(*(vary.bounds or (0, 0)), 9), float)
+        )
         self._near = np.flatnonzero(np.isclose(self._levels, np.nan if own is None else own))[:1]
         self.lacks_references = not (self._both or len(self._near))
         self._kept: list[Setting] = []  # those that the fit is of
@@ -235,60 +225,45 @@ class _Case:
         runs = self._runner.run(asked, progress=lambda f: self._progress(start + f / 4))
         return np.split(runs, np.cumsum([len(settings) for _, settings in groups])[:-1])
 
-    def check(self, fit: FittedValue) -> tuple[float | None, tuple[float, float, int] | None]:
+    def _gaps(self, settings: Sequence[Setting], values: Sequence[Any], start: float) -> Array:
+        """(v, n) the gap of each setting at each value, with both sides run there."""
+        at = [setting for value in values for setting in self._at(settings, value)]
+        left_at = at if self._both else self._at(settings, self._own)
+        right, left = self._run([(1, at), (0, left_at)], start)
+        pairs = left.reshape(-1, len(settings)), right.reshape(len(values), -1)
+        return gap_between(self._quantity, *pairs)
+
+    def check(self, fit: FittedValue) -> tuple[float | None, float | None, float, int]:
         """Run both sides at the value.
 
         Returns:
-            The gap at the model's own value, if it has one and it was run; and the gap, what the
-            fit says of it, and of how many pairs, if any ended.
+            The gap at the model's own value, if it has one and it was run; the gap, if any pair
+            ended; what the fit says of it; of how many pairs it is.
         """
         picked = self._picked(fit)
-        chosen = [self._kept[k] for k in picked]
-        at, own = self._at(chosen, fit.value), self._at(chosen, self._own)
-        groups = [(1, at), (0, at if self._both else own)]
-        if self._vary.kind == "option":
-            groups += [(1, own), (0, own)] if self._both else [(1, own)]
-        right, left, *others = self._run(groups, 0.5)
-        gap = gap_between(self._quantity, left, right)
-        before = np.array([])
-        if others:
-            before = gap_between(self._quantity, others[-1] if self._both else left, others[0])
-        predicted = np.mean(fit.each[picked]) if len(fit.each) else fit.gap
-        count = int(np.isfinite(gap).sum())
-        measured = (float(np.nanmean(gap)), float(predicted), count) if count else None
-        return _mean(before), measured
+        values = [fit.value, self._own] if self._vary.kind == "option" else [fit.value]
+        gap, *before = self._gaps([self._kept[k] for k in picked], values, 0.5)
+        predicted = float(np.mean(fit.each[picked])) if len(fit.each) else fit.gap
+        own = _mean(before[0]) if before else None
+        return own, _mean(gap), predicted, int(np.isfinite(gap).sum())
 
-    def refined(self, fit: FittedValue, measured: float) -> BestRun:
-        """Run both sides between the neighbours of the value, and keep the best.
+    def refined(self, fit: FittedValue, measured: float) -> tuple[list[float], list[float], float]:
+        """Run both sides between the neighbours of the value in the design.
 
         A gap over a contact has jumps, which neither an interpolation nor a search for one
         minimum stands; values side by side do.
+
+        Returns:
+            The values, that of the fit among them; the gap of each; how far apart they are.
         """
-        chosen = [self._kept[k] for k in self._picked(fit)]
-        low, high = self._around(fit)
+        low = self._levels[self._levels < fit.value].max(initial=fit.bounds[0])
+        high = self._levels[self._levels > fit.value].min(initial=fit.bounds[1])
         values = np.linspace(low, high, REFINED).tolist()
-        at = [setting for value in values for setting in self._at(chosen, value)]
-        left_at = at if self._both else self._at(chosen, self._own)
-        right, left = self._run([(1, at), (0, left_at)], 0.75)
-        pairs = right.reshape(REFINED, -1)
-        by_value = gap_between(self._quantity, left.reshape(-1, len(chosen)), pairs)
+        by_value = self._gaps([self._kept[k] for k in self._picked(fit)], values, 0.75)
         stood = np.isfinite(by_value).all(axis=0)  # the same pairs at every value
         means = by_value[:, stood].mean(axis=1) if stood.any() else np.full(REFINED, np.nan)
-        tried, gaps = [*values, fit.value], [*means.tolist(), measured]
-        place = int(np.nanargmin(gaps))
-        apart = (high - low) / (REFINED - 1)
-        return BestRun(tried[place], gaps[place], apart, (tuple(tried), tuple(gaps)))
-
-    def _around(self, fit: FittedValue) -> tuple[float, float]:
-        """The values of the design on both sides; of a range an eighth of it to each side."""
-        (low, high), eighth = fit.bounds, (fit.bounds[1] - fit.bounds[0]) / 8
-        if self._vary.bounds is not None:
-            return max(low, fit.value - eighth), min(high, fit.value + eighth)
-        levels = self._levels.tolist()
-        return (
-            max((level for level in levels if level < fit.value), default=low),
-            min((level for level in levels if level > fit.value), default=high),
-        )
+        apart = float(high - low) / (REFINED - 1)
+        return [*values, fit.value], [*means.tolist(), measured], apart
 
     def _picked(self, fit: FittedValue) -> list[int]:
         """The settings that are run at a value."""

@@ -16,25 +16,18 @@ from typing import Any
 from ..errors import WorkerEndedError
 from ..installed import require_extra
 from ..processes import ALONE
-from .cell import CellRules, SweepCell, timed_out
-from .worker import Row, failed_row, run_batch
+from .cell import timed_out
+from .request import PreparedSweep, SweepCell
+from .worker import Row, row_of, run_batch
 
 Batch = Sequence[SweepCell]
 Results = Generator[list[Row], None, None]
 _GRACE = 30.0  # seconds beyond what a batch may take; its process ends itself before
+_LOKY = "joblib.externals.loky.process_executor"
 _TRACKERS = (
     "multiprocessing.resource_tracker",
     "joblib.externals.loky.backend.resource_tracker",
 )
-
-
-def require_joblib() -> Any:
-    """The package joblib.
-
-    Raises:
-        MissingEngineError: It is not installed; the message names the extra.
-    """
-    return require_extra("joblib", "a sweep", "joblib", "sweep")
 
 
 def _begin_trackers() -> None:
@@ -62,35 +55,27 @@ def _deaf() -> None:
 class _Process:
     """A process that runs batches; after its end, another one."""
 
-    def __init__(self, rules: CellRules) -> None:
-        require_joblib()
-        self._loky = importlib.import_module("joblib.externals.loky.process_executor")
-        self._rules = rules
+    def __init__(self, ready: PreparedSweep) -> None:
+        self._loky = require_extra(_LOKY, "a sweep", "joblib", "sweep")
+        self._ready = ready
         self._pool: Any = None
 
-    def rows(self, batch: Batch) -> list[Row]:
+    def rows(self, batch: Batch, alone: bool = False) -> list[Row]:
         """The rows of a batch; a cell that ends the process twice, the second time alone, fails."""
-        try:
-            return self._run(batch)
-        except WorkerEndedError as error:
-            if len(batch) > 1:
-                return [row for cell in batch for row in self.rows([cell])]
-            first = error
-        try:
-            return self._run(batch)
-        except WorkerEndedError as error:
-            late = [each for each in (first, error) if isinstance(each.__cause__, WaitedTooLong)]
-            return [failed_row(batch[0], timed_out(self._rules.timeout) if late else error)]
-
-    def _run(self, batch: Batch) -> list[Row]:
         if self._pool is None:
             self._pool = self._loky.ProcessPoolExecutor(max_workers=1, env=ALONE)
-        future: Future[list[Row]] = self._pool.submit(run_batch, self._rules, batch, True)
+        future: Future[list[Row]] = self._pool.submit(run_batch, self._ready, batch, True)
+        timeout = self._ready.sweep.timeout
         try:
-            return future.result(self._rules.timeout * len(batch) + _GRACE)
-        except (self._loky.BrokenProcessPool, WaitedTooLong) as error:
-            self.close()
-            raise WorkerEndedError("its process ended before it was done, twice") from error
+            return future.result(timeout * len(batch) + _GRACE)
+        except WaitedTooLong:
+            failure: Exception = timed_out(timeout)
+        except self._loky.BrokenProcessPool:
+            failure = WorkerEndedError("its process ended before it was done, twice")
+        self.close()
+        if alone:
+            return [row_of(self._ready, batch[0], failure)]
+        return [row for cell in batch for row in self.rows([cell], alone=True)]
 
     def close(self) -> None:
         """End the process."""
@@ -100,12 +85,12 @@ class _Process:
                 pool.shutdown(wait=True, kill_workers=True)
 
 
-def apart(rules: CellRules, batches: Iterable[Batch], jobs: int) -> Results:
+def apart(ready: PreparedSweep, batches: Iterable[Batch], jobs: int) -> Results:
     """The rows of each batch, as they are ready, in processes that nothing else depends on.
 
     Where one dies, what it was running is run again, cell by cell if need be; the others go on.
     """
-    processes = [_Process(rules) for _ in range(jobs)]
+    processes = [_Process(ready) for _ in range(jobs)]
     free = SimpleQueue[_Process]()
     for process in processes:
         free.put(process)

@@ -7,7 +7,7 @@ import inspect
 import itertools
 import json
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..interface import Array
-from .factors import Value, Vary, is_number
+from .factors import Value, Vary
 
 _DIGITS = 32  # hexadecimal, of a digest
 _DIMENSIONS = 21201  # that SciPy has Sobol directions for
@@ -57,7 +57,7 @@ class Design:
         if bool(self.sampled) != (self.samples > 0):
             if self.sampled:
                 raise BadInputError(
-                    f"{self.sampled[0].typed} is a range: say --samples N, or a count behind it"
+                    f"{self.sampled[0].label} has a range: say --samples N, or a count behind it"
                 )
             raise BadInputError("--samples is of ranges, NAME=from:to, and none is varied")
         if self.indices and not self.sampled:
@@ -75,12 +75,9 @@ class Design:
         """The factors with a list or a grid."""
         return tuple(vary for vary in self.factors if vary.bounds is None)
 
-    def __len__(self) -> int:
-        return self.size
-
     @property
     def size(self) -> int:
-        """Number of points, where it is too large for `len`, too."""
+        """Number of points; it may be too large for `len`."""
         blocks = len(self.sampled) + 2 if self.indices else 1
         count = blocks * self.samples if self.sampled else 1
         for vary in self.listed:
@@ -90,11 +87,9 @@ class Design:
     def points(self) -> Iterator[DesignPoint]:
         """Every point; the samples change slowest."""
         names = [vary.label for vary in self.factors]
-        order = {vary.label: k for k, vary in enumerate((*self.sampled, *self.listed))}
-        for drawn in self._drawn():
-            for chosen in itertools.product(*(vary.values for vary in self.listed)):
-                every = (*drawn, *chosen)
-                values = tuple(every[order[name]] for name in names)
+        for drawn in map(iter, self._drawn()):
+            choices = [vary.values or (next(drawn),) for vary in self.factors]
+            for values in itertools.product(*choices):
                 yield DesignPoint(digest(dict(zip(names, values, strict=True))), values)
 
     def _drawn(self) -> list[list[Value]]:
@@ -119,8 +114,7 @@ def _sobol(width: int, count: int, seed: int) -> Array:
     engine = qmc.Sobol(width, scramble=True, **{name: np.random.default_rng(seed)})
     with warnings.catch_warnings():  # of a number that is no power of two: said when it is asked
         warnings.simplefilter("ignore")
-        found: Array = engine.random(count)
-    return found
+        return engine.random(count)
 
 
 def require_qmc() -> Any:
@@ -134,13 +128,6 @@ def require_qmc() -> Any:
 
 def digest(content: object) -> str:
     """Of plain values; 1 and 1.0 are the same."""
-    text = json.dumps(_plain(content), sort_keys=True, ensure_ascii=False, allow_nan=False)
+    plain = json.loads(json.dumps(content, allow_nan=False), parse_int=float)
+    text = json.dumps(plain, sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, dict):
-        return {str(key): _plain(each) for key, each in value.items()}
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(each) for each in value]
-    return float(value) if is_number(value) else value  # pyright: ignore[reportArgumentType]

@@ -16,16 +16,15 @@ from typing import Any
 
 from .. import __version__
 from ..errors import BadInputError
-from ..grading.unwinding import unwinding
 from ..installed import require_extra
 from ..processes import checked_jobs
+from ..processes.parallel import unwinding
 from ..runs.drive import Progress, silent
-from .apart import Batch, Results, apart, require_joblib
-from .cell import DONE, CellRules
+from .apart import Batch, Results, apart
 from .folder import check_folder, locked, settle_manifest
 from .prepare import prepared
 from .request import PreparedSweep, Sweep
-from .rows import CELLS, RowWriter, counted, remove_failed
+from .rows import CELLS, DONE, RowWriter, counted, remove_failed
 from .worker import differing, run_batch
 
 _BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
@@ -94,18 +93,17 @@ def run_sweep(
     """
     began = time.monotonic()
     jobs, folder = checked_jobs(jobs), Path(out)
-    require_joblib()
+    require_extra("joblib", "a sweep", "joblib", "sweep")
     ready = sweep if isinstance(sweep, PreparedSweep) else prepared(sweep)
     check_folder(folder)
     with locked(folder), ExitStack() as stack:
         client = None
         if scheduler is not None:
-            client = stack.enter_context(_connected(scheduler, ready.rules))
+            client = stack.enter_context(_connected(scheduler, ready))
         known = dict(counted(folder))
         if extend:
             _check_growth(ready, known, folder)
-        manifest = ready.manifest()
-        settle_manifest(folder, manifest, extend)
+        settle_manifest(folder, ready.manifest(), extend)
         if retry_failed:
             remove_failed(folder)
             known = {cell: kind for cell, kind in known.items() if kind == DONE}
@@ -116,9 +114,7 @@ def run_sweep(
         ran = 0
         batches = _batches(ready, known, jobs if client is None else _workers(client))
         results = (
-            apart(ready.rules, batches, jobs)
-            if client is None
-            else _on_dask(client, ready.rules, batches)
+            apart(ready, batches, jobs) if client is None else _on_dask(client, ready, batches)
         )
         with unwinding():
             try:
@@ -135,7 +131,7 @@ def run_sweep(
     return SweepSummary(
         folder=os.fspath(folder),
         cells=total,
-        points=len(ready.design),
+        points=ready.design.size,
         done=done,
         failed=dict(kinds.most_common()),
         ran=ran,
@@ -171,7 +167,7 @@ def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Itera
     return (batch for turn in turns for batch in turn if batch is not None)
 
 
-def _on_dask(client: Any, rules: CellRules, batches: Iterator[Batch]) -> Results:
+def _on_dask(client: Any, ready: PreparedSweep, batches: Iterator[Batch]) -> Results:
     """The rows of all batches, as they are ready, from the workers of Dask.
 
     A batch that its worker does not survive is run here, apart from everything else.
@@ -184,7 +180,7 @@ def _on_dask(client: Any, rules: CellRules, batches: Iterator[Batch]) -> Results
 
     def hand_out(count: int) -> None:
         for batch in itertools.islice(batches, count):
-            future = client.submit(run_batch, rules, batch, False, pure=False)
+            future = client.submit(run_batch, ready, batch, False, pure=False)
             out[future.key] = batch
             finished.add(future)
 
@@ -196,13 +192,13 @@ def _on_dask(client: Any, rules: CellRules, batches: Iterator[Batch]) -> Results
         except Exception as error:
             if client.status != "running":
                 raise BadInputError("the scheduler went away; what was done is kept") from error
-            (rows,) = apart(rules, [batch], 1)
+            (rows,) = apart(ready, [batch], 1)
         hand_out(1)
         yield rows
 
 
 @contextmanager
-def _connected(address: str, rules: CellRules) -> Iterator[Any]:
+def _connected(address: str, ready: PreparedSweep) -> Iterator[Any]:
     """A client of a Dask scheduler whose workers have what the sweep needs.
 
     Raises:
@@ -221,7 +217,7 @@ def _connected(address: str, rules: CellRules) -> Iterator[Any]:
     try:
         with suppress(TimeoutError):
             client.wait_for_workers(1, timeout=_PATIENCE)
-        found = client.run(differing, rules, __version__, on_error="return")
+        found = client.run(differing, ready, __version__, on_error="return")
         if not found:
             raise BadInputError(f"the scheduler at {address} has no workers")
         for worker, wrong in found.items():

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import BadInputError, shown, unknown_name
+from ..interface import JointType
 
 Kind = Literal["model", "option", "state", "parameter"]
 Value = bool | float | str
@@ -79,9 +80,23 @@ class Vary:
     @property
     def unit(self) -> str:
         """What its column is in; "" of what is no number or has none."""
-        if self.times or self.kind == "parameter":
+        return self.unit_on({JointType.HINGE, JointType.SLIDE})
+
+    def unit_on(self, joints: Collection[int]) -> str:
+        """The same on joints of some `JointType`s alone."""
+        if self.times or self.kind == "parameter" or self.name not in UNITS:
             return ""
-        return " or ".join(dict.fromkeys(UNITS.get(self.name, ())))
+        hinge, slide = UNITS[self.name]
+        if hinge == slide or JointType.SLIDE not in joints:
+            return hinge
+        return f"{hinge} or {slide}" if JointType.HINGE in joints else slide
+
+    @property
+    def type(self) -> str:
+        """Of its column."""
+        if self.numeric:
+            return "double"
+        return "bool" if isinstance(self.values[0], bool) else "string"
 
     @property
     def meaning(self) -> str:
@@ -98,20 +113,6 @@ class Vary:
         """The values that a check has to look at."""
         return self.values if self.bounds is None else self.bounds
 
-    @property
-    def typed(self) -> str:
-        """The option that says it."""
-        if self.bounds is not None:
-            return f"{self.label}={':'.join(self._word(end) for end in self.bounds)}"
-        return f"{self.label}={','.join(self._word(value) for value in self.values)}"
-
-    def _word(self, value: Value) -> str:
-        if isinstance(value, bool):
-            return "on" if value else "off"
-        if isinstance(value, str):
-            return value
-        return f"{value:.15g}{'x' if self.times else ''}"
-
 
 def is_number(value: object) -> bool:
     """Whether it is a number, and no switch."""
@@ -127,16 +128,14 @@ def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
     Raises:
         BadInputError: A word is none, or two of them vary the same.
     """
-    found: dict[str, Vary] = {}
-    for word in words:
-        vary = _parsed(word)
-        if vary.label in found:
+    factors = tuple(map(_parsed, words))
+    labels = [vary.label for vary in factors]
+    for vary in factors:
+        if labels.count(vary.label) > 1:
             raise BadInputError(f"{vary.label} is varied twice")
-        found[vary.label] = vary
-    for vary in found.values():
-        if vary.place and vary.name in found:
+        if vary.place and vary.name in labels:
             raise BadInputError(f"{vary.name} and {vary.label} are both varied: name one of them")
-    return tuple(found.values())
+    return factors
 
 
 def with_kinds(
@@ -165,26 +164,27 @@ def _parsed(word: str) -> Vary:
             f"{shown(word)}"
         )
     name, place = match[1], match[2] or ""
-    if not text.strip(" ,"):
-        raise BadInputError(f"--vary {label}= names no {MODEL if name == MODEL else 'value'}")
     if name == MODEL or ":" not in text:
         words = [each.strip() for each in text.split(",")]
         values, times = _values(label, words, name == MODEL)
         return Vary(name, place, values=values, times=times)
-    parts = text.split(":")
-    (low, high), times = _values(label, parts[:2])
-    if not (is_number(low) and is_number(high)):
-        raise BadInputError(f"{label}={text} wants numbers on both sides of the colon")
-    assert isinstance(low, float)
-    assert isinstance(high, float)
-    if not low < high:
-        raise BadInputError(f"{label}={text} wants the smaller number first")
-    if len(parts) == 2:
+    *ends, count = text.split(":") if text.count(":") > 1 else (*text.split(":"), "")
+    bounds, times = _values(label, ends)
+    if not (
+        len(bounds) == 2
+        and all(map(is_number, bounds))
+        and float(bounds[0]) < float(bounds[1])
+        and (not count or (count.isdigit() and 2 <= int(count) <= _MOST))
+    ):
+        raise BadInputError(
+            f"{label}={text} wants from:to or from:to:count, two numbers, the smaller number "
+            f"first, with a count from 2 to {_MOST:,}"
+        )
+    low, high = map(float, bounds)
+    if not count:
         return Vary(name, place, bounds=(low, high), times=times)
-    if len(parts) > 3 or not parts[2].isdigit() or not 2 <= int(parts[2]) <= _MOST:
-        raise BadInputError(f"{label}={text} wants from:to:count, with a count from 2 to {_MOST:,}")
-    grid = tuple(float(f"{x:.{_DIGITS}g}") for x in np.linspace(low, high, int(parts[2])))
-    return Vary(name, place, values=grid, times=times)
+    grid = np.linspace(low, high, int(count))
+    return Vary(name, place, values=tuple(float(f"{x:.{_DIGITS}g}") for x in grid), times=times)
 
 
 def _kind(vary: Vary, options: Collection[str], parameters: Collection[str]) -> Kind:
@@ -214,22 +214,18 @@ def _kind(vary: Vary, options: Collection[str], parameters: Collection[str]) -> 
 
 def _values(label: str, words: list[str], names: bool = False) -> tuple[tuple[Value, ...], bool]:
     """The values of words, and whether they are times the model's own."""
-    values: list[Value] = []
-    scaled = []
-    for word in words:
-        if not word:
-            raise BadInputError(f"{label} has an empty value")
-        value, times = (word, False) if names else _value(word)
-        values.append(value)
-        scaled.append(times)
-    if len({type(value) for value in values}) > 1 or len(set(scaled)) > 1:
+    if "" in words:
+        raise BadInputError(f"--vary {label} has an empty value")
+    pairs = [(word, False) if names else _value(word) for word in words]
+    values = tuple(value for value, _ in pairs)
+    if len({(type(value), times) for value, times in pairs}) > 1:
         raise BadInputError(
             f"{label} mixes values of different kinds: {', '.join(words)}; numbers, numbers with "
             "an x behind (times the model's own), on and off, or names"
         )
     if len(set(values)) < len(values):
         raise BadInputError(f"{label} has a value twice: {', '.join(words)}")
-    return tuple(values), scaled[0]
+    return values, pairs[0][1]
 
 
 def _value(word: str) -> tuple[Value, bool]:

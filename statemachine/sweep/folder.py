@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,20 +15,17 @@ from ..measures.text import listed
 from ..runs.whole import replace_text
 from .design import Design
 from .factors import Vary
-from .rows import CELLS
+from .request import MANIFEST_VERSION
 
 MANIFEST = "sweep.json"
-SCHEMA = 1
-_LOCK = ".lock"  # with the number of the process that holds it
+_LOCK = ".lock"
 # What a dataset is of, whatever its design: another of these is another sweep.
-_SAME = ("request", "files", "function", "versions")
+_SAME = ("request", "files", "versions")
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Hold the folder; the lock ends with the process, however that ends.
-
-    What a driver that was killed has left is removed.
 
     Raises:
         BadInputError: Another process holds it.
@@ -36,22 +34,9 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         if not _taken(handle):
             raise BadInputError(f"another sweep runs in {folder}: one at a time")
-        _remove_left(handle)
         yield
     finally:
         os.close(handle)
-
-
-def _remove_left(handle: int) -> None:
-    """Remove the semaphores of a driver that was killed with all of its processes."""
-    if os.name == "nt":
-        return
-    driver = os.pread(handle, 20, 0).decode(errors="replace")
-    if driver.isdecimal() and not Path("/proc", driver).exists():
-        for path in Path("/dev/shm").glob(f"sem.loky-{driver}-*"):
-            path.unlink(missing_ok=True)
-    os.ftruncate(handle, 0)
-    os.pwrite(handle, str(os.getpid()).encode(), 0)
 
 
 def _taken(handle: int) -> bool:
@@ -76,24 +61,15 @@ def check_folder(folder: Path) -> None:
     """Make the folder, or refuse it where it is something else.
 
     Raises:
-        BadInputError: It is a file, or holds what is no sweep, or cannot be made.
+        BadInputError: It holds what is no sweep.
+        OSError: It cannot be made.
     """
-    if folder.exists() and not folder.is_dir():
-        raise BadInputError(f"{folder} is a file: --out wants a folder")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInputError(f"{folder} cannot be made: {error.strerror}") from None
+    folder.mkdir(parents=True, exist_ok=True)
     others = [each.name for each in folder.iterdir() if not each.name.startswith(".")]
-    if CELLS in others and MANIFEST not in others:
-        raise BadInputError(
-            f"{folder} has cells and no {MANIFEST}, so that nobody knows what they are of: put it "
-            "back, or name another folder"
-        )
     if others and MANIFEST not in others:
-        raise BadInputError(f"{folder} holds something else, as {others[0]}: name a new folder")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise BadInputError(f"{folder} is read-only for you")
+        raise BadInputError(
+            f"{folder} holds {others[0]} and no {MANIFEST}: put it back, or name another folder"
+        )
 
 
 def read_manifest(folder: str | Path) -> dict[str, Any]:
@@ -104,53 +80,36 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
     """
     path = Path(folder) / MANIFEST
     try:
-        text = path.read_text(encoding="utf-8")
+        manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if manifest["schema"] == MANIFEST_VERSION:
+            design_of(manifest)
     except (FileNotFoundError, NotADirectoryError):
         raise BadInputError(f"{folder} is no sweep: it has no {MANIFEST}") from None
-    except UnicodeError:
-        text = ""
-    found: dict[str, Any] = {}
-    try:
-        found = json.loads(text)
-        if found["schema"] != SCHEMA:
-            raise BadInputError(
-                f"{path} has schema {shown(found['schema'])}; this version reads {SCHEMA}"
-            )
-        design = design_of(found)
-        whole = (
-            all(isinstance(found[name], dict) for name in _SAME if name != "function")
-            and isinstance(found["function"], str)
-            and isinstance(found["design"]["seeds"], int)
-            and all(isinstance(name, str) for name in found["design"]["backends"])
-            and all(vary.values or vary.bounds for vary in design.factors)
-        )
-    except BadInputError:
-        raise
-    except (ValueError, KeyError, TypeError, AttributeError):
-        whole = False
-    if not whole:
+    except (ValueError, KeyError, TypeError):
         raise BadInputError(
             f"{path} is damaged, and without it nobody knows what the cells are of: put back a "
             "copy, or name another folder"
+        ) from None
+    if (version := manifest["schema"]) != MANIFEST_VERSION:
+        raise BadInputError(
+            f"{path} has schema {shown(version)}; this version reads {MANIFEST_VERSION}"
         )
-    return found
+    return manifest
 
 
 def design_of(manifest: Mapping[str, Any]) -> Design:
     """The design that a manifest tells, with the points of its dataset."""
-    told = manifest["design"]
+    design = manifest["design"]
     factors = [
-        Vary(
-            each["name"],
-            each["place"],
-            each["kind"],
-            tuple(each["values"]),
-            None if each["bounds"] is None else tuple(each["bounds"]),
-            each["times"],
-        )
-        for each in told["factors"]
+        Vary(**{name: _tuple(each[name]) for name in Vary.__dataclass_fields__})
+        for each in manifest["factors"]
     ]
-    return Design(tuple(factors), told["samples"], told["indices"], told["design_seed"])
+    return Design(tuple(factors), design["samples"], design["indices"], design["design_seed"])
+
+
+def _tuple(value: Any) -> Any:
+    """A list as a tuple; anything else as it is."""
+    return tuple(value) if isinstance(value, list) else value
 
 
 def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> None:
@@ -168,49 +127,43 @@ def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> 
     wanted = json.loads(json.dumps(manifest))
     if path.exists():
         there = read_manifest(folder)
-        found = [
-            text for name in _SAME for text in _differences(name, there[name], wanted[name], extend)
-        ]
-        if found:
+        others = [text for name in _SAME for text in _differences(there, wanted, name, extend)]
+        if others:
             raise BadInputError(
-                f"{folder} is of another sweep: {listed(found)}. Name another folder with --out"
+                f"{folder} is of another sweep: {listed(others)}. Name another folder with --out"
             )
-        if there["design"] == wanted["design"]:
-            return
-        if not extend:
-            told = list(_differences("design", there["design"], wanted["design"], False))
+        others = _differences(there, wanted, "design")
+        if others and not extend:
             raise BadInputError(
-                f"{folder} is of another design: {listed(told)}. Name another folder with --out, "
-                "or let this one grow with --extend"
+                f"{folder} is of another design: {listed(others)}. Name another folder with "
+                "--out, or let this one grow with --extend"
             )
-        columns = [[each["label"] for each in of["design"]["factors"]] for of in (there, wanted)]
+        columns = [[each["label"] for each in manifest["factors"]] for manifest in (there, wanted)]
         if sorted(columns[0]) != sorted(columns[1]):
             raise BadInputError(
                 f"{folder} varies {listed(columns[0]) or 'nothing'}, and a sweep grows in values, "
                 "seeds and backends alone: name another folder with --out"
             )
+        if not others:
+            return
     replace_text(path, json.dumps(wanted, indent=1) + "\n")
 
 
-def _differences(name: str, there: Any, wanted: Any, grows: bool) -> Iterator[str]:
-    """What differs, as "seconds 2 there, 4 here"."""
-    if not (isinstance(there, dict) and isinstance(wanted, dict)):
-        if there != wanted:
-            yield f"{name} {_word(there)} there, {_word(wanted)} here"
-        return
-    for key in dict.fromkeys([*there, *wanted]):
-        if grows and (key not in there or key not in wanted):
-            continue
-        if key == "factors":  # as said by `vary`
-            continue
-        if there.get(key) != wanted.get(key):
-            yield f"{key} {_word(there.get(key))} there, {_word(wanted.get(key))} here"
+def _differences(
+    there: Mapping[str, Any], wanted: Mapping[str, Any], part: str, grows: bool = False
+) -> list[str]:
+    """What differs in a part of two manifests, as "seconds 2 there, 4 here"."""
+    old, new = there[part], wanted[part]
+    names = [name for name in {**old, **new} if not grows or (name in old and name in new)]
+    return [
+        f"{name} {_word(old.get(name))} there, {_word(new.get(name))} here"
+        for name in names
+        if old.get(name) != new.get(name)
+    ]
 
 
 def _word(value: Any) -> str:
-    if value is None or value in ([], ""):
-        return "none"
-    if isinstance(value, list):
-        return " ".join(map(str, value))
-    text = str(value)
-    return text[:12] if len(text) == 64 and " " not in text else text
+    """A list by its words, a digest by its first digits."""
+    words = value if isinstance(value, list) else [] if value is None else [value]
+    text = " ".join(map(str, words))
+    return (text[:12] if re.fullmatch(r"[0-9a-f]{32,}", text) else text) or "none"

@@ -8,16 +8,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from ..compare.perturbed import Uncertainty
 from ..measures.text import command
-from ..runs.controllers import is_function
-from .cell import CellRules, SweepCell
+from ..runs.controllers import function_scenario, is_function
+from ..runs.scenarios import Scenario, scenario
 from .design import Design, digest
-from .folder import SCHEMA
-from .rows import described
+from .factors import Value, Vary
+from .rows import columns_of
 
-SPREAD = ("1deg", "1mm")
+MANIFEST_VERSION = 2
 # What a dataset is of, beside the experiment: cells of other values are of another sweep.
 REQUEST = ("model", "seconds", "every", "keyframe", "defaults", "spread", "moments")
+# What it may grow by.
+DESIGN = ("vary", "seeds", "samples", "indices", "design_seed")
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Sweep:
         every: Steps for which what the function returns holds.
         keyframe: Where a function starts.
         defaults: What `load` is given.
-        spread: How far a seed puts the start away, as "1deg", "1mm".
+        spread: How far a seed puts the start away, as "1deg,1mm"; "0" for not at all.
         moments: How many moments of each run are kept.
         timeout: What a cell may take on the clock [s].
     """
@@ -57,52 +60,92 @@ class Sweep:
     every: int = 1
     keyframe: str | None = None
     defaults: Literal["model", "engine"] = "model"
-    spread: Sequence[str] = SPREAD
+    spread: str = "1deg,1mm"
     moments: int = 20
     timeout: float = 600.0
 
+    def scenario(self, parameters: Mapping[str, Any]) -> Scenario:
+        """What is done, and for how long, with some values of the function's parameters.
+
+        Raises:
+            BadInputError: The user's file fails.
+        """
+        if is_function(self.what):
+            doing = function_scenario(self.what, self.every, self.keyframe, parameters)
+        else:
+            doing = scenario(self.what)
+        return doing if self.seconds is None else dataclasses.replace(doing, seconds=self.seconds)
+
     def typed(self, out: str) -> str:
         """The command that runs it."""
-        words = ["statemachine", "sweep", self.what]
-        for word in self.vary:
-            words += ["--vary", word]
-        for name in () if tuple(self.backends) == ("all",) else self.backends:
-            words += ["--backend", name]
-        apart = ("what", "vary", "backends", "indices", "spread")
-        given = [
-            (f"--{each.name.replace('_', '-')}", getattr(self, each.name), each.default)
-            for each in dataclasses.fields(self)
-            if each.name not in apart
-        ]
-        given.append(("--spread", ",".join(self.spread), ",".join(SPREAD)))
-        indices = " --indices" if self.indices else ""
-        return command(words, *given, ("--out", out, None)) + indices
+        given: list[tuple[str, object, object]] = []
+        for option in dataclasses.fields(self)[1:]:
+            flag = f"--{option.name.replace('_', '-').replace('backends', 'backend')}"
+            value = getattr(self, option.name)
+            values = value if option.name in ("vary", "backends") else [value]
+            given += [(flag, each, option.default) for each in values if value != option.default]
+        return command(["statemachine", "sweep", self.what], *given, ("--out", out, None))
+
+
+@dataclass(frozen=True)
+class SweepCell:
+    """What is run once.
+
+    Attributes:
+        id: A digest of point, seed and backend.
+        point: The digest of the values.
+        values: One for each factor of the sweep; None is the model's own.
+        seed: What is drawn from; 0 draws no start.
+        backend: The engine.
+        nudge: What a change of start and commands by rounding is drawn from; 0 for none.
+    """
+
+    id: str
+    point: str
+    values: tuple[Value | None, ...]
+    seed: int
+    backend: str
+    nudge: int = 0
 
 
 @dataclass(frozen=True)
 class PreparedSweep:
-    """A sweep that was checked, with all that its cells need.
+    """A sweep that was checked, with all that its cells need; it goes to every worker.
 
     Attributes:
-        sweep: What was asked for.
-        rules: What every worker is told.
+        sweep: What was asked for, with whole paths.
         design: Its points.
         backends: Names, the first of them the one that others are compared with.
         versions: Of this library, of engines and of packages.
+        files: The digest of each model's file, by the name that a cell gives; of several the
+            model is varied.
+        places: What `load` is given for each of these names.
+        function: The digest of the user's file; "" for an experiment of ours.
+        parameters: What the user's function takes by keyword.
+        spread: How far from its start a seed puts a run.
         cost: Roughly what a cell takes on each backend [s].
         said: What a reader should know before it runs, in lines.
     """
 
     sweep: Sweep
-    rules: CellRules
     design: Design
     backends: tuple[str, ...]
     versions: Mapping[str, str]
+    files: Mapping[str, str]
+    places: Mapping[str, str]
+    function: str = ""
+    parameters: tuple[str, ...] = ()
+    spread: Uncertainty = field(default_factory=Uncertainty)
     cost: Mapping[str, float] = field(default_factory=dict)
     said: tuple[str, ...] = ()
 
+    def settings(self, cell: SweepCell, kind: str) -> list[tuple[Vary, Any]]:
+        """The factors of a kind and their values in a cell."""
+        pairs = zip(self.design.factors, cell.values, strict=True)
+        return [(vary, value) for vary, value in pairs if vary.kind == kind]
+
     def __len__(self) -> int:
-        return len(self.design) * self.sweep.seeds * len(self.backends)
+        return self.design.size * self.sweep.seeds * len(self.backends)
 
     def cells(self, backend: str) -> Iterator[SweepCell]:
         """Every cell on a backend, seed by seed, point by point."""
@@ -112,40 +155,32 @@ class PreparedSweep:
                 yield SweepCell(cell, point.id, point.values, seed, backend)
 
     def provenance(self) -> dict[str, Any]:
-        """What was asked for, for the metadata of each file: the design as it was typed."""
-        names = ("schema", "command", "request", "files", "function", "versions", "design")
-        told = {name: value for name, value in self.manifest().items() if name in names}
-        told["design"].pop("factors")  # their values may be many
-        return told
+        """What was asked for, as plain values, for the metadata of each file."""
+        asked = self.sweep
+        what = Path(asked.what).name if self.function else asked.what
+        request = {name: getattr(asked, name) for name in REQUEST}
+        design = {name: getattr(asked, name) for name in DESIGN}
+        return {
+            "schema": MANIFEST_VERSION,
+            "command": asked.typed("DIR"),
+            "request": {"what": what, "function": self.function, **request},
+            "files": dict(self.files),
+            "versions": dict(self.versions),
+            "design": {**design, "backends": list(self.backends)},
+        }
 
     def manifest(self) -> dict[str, Any]:
-        """All of it as plain values, for sweep.json."""
-        asked = self.sweep
+        """The same for sweep.json, with the values of what is varied: they may be many."""
         factors = [
             {**dataclasses.asdict(vary), "label": vary.label} for vary in self.design.factors
         ]
-        function = is_function(asked.what)
         return {
-            "schema": SCHEMA,
-            "command": asked.typed("DIR"),
-            "request": {
-                "what": Path(asked.what).name if function else asked.what,
-                **{name: getattr(asked, name) for name in REQUEST},
-                "spread": list(asked.spread),
-            },
-            "files": dict(self.rules.files),
-            "function": self.rules.function,
-            "versions": dict(self.versions),
-            "design": {
-                "vary": list(asked.vary),
-                "seeds": asked.seeds,
-                "backends": list(self.backends),
-                "samples": asked.samples,
-                "indices": asked.indices,
-                "design_seed": asked.design_seed,
-                "factors": factors,
-            },
-            "points": len(self.design),
+            **self.provenance(),
+            "factors": factors,
+            "points": self.design.size,
             "cells": len(self),
-            "columns": described(self.design.factors),
+            "columns": {
+                name: {"unit": unit, "meaning": meaning}
+                for name, _, unit, meaning in columns_of(self.design.factors)
+            },
         }

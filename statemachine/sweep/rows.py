@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import itertools
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,9 +13,9 @@ from typing import Any
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..runs.whole import replace_bytes
-from .cell import DONE
 from .factors import Vary
 
+DONE, FAILED = "done", "failed"  # the status of a cell
 CELLS = "cells"  # the folder of the dataset, in that of the sweep
 KEY = b"statemachine.sweep"  # of the provenance, in the metadata of each file
 _DIGEST = b"statemachine.sha256"  # beside it, of all other bytes of the file
@@ -52,7 +51,6 @@ COLUMNS = (
     ("engine_version", "string", "", "version of the engine"),
     ("library_version", "string", "", "version of this library"),
 )
-MEASURED = ("wall_seconds",)
 _SOON, _LATE, _SHARE = 5.0, 60.0, 0.02  # seconds between two files, and of the time so far
 _MOST = 20_000  # rows of a file
 
@@ -72,32 +70,25 @@ def schema_of(factors: Sequence[Vary], provenance: Mapping[str, Any]) -> Any:
     """The schema of every file: the columns of the factors behind `seed`."""
     arrow, _ = require_parquet()
     kinds = {
+        "bool": arrow.bool_(),
         "string": arrow.string(),
         "int64": arrow.int64(),
         "double": arrow.float64(),
         "list<double>": arrow.list_(arrow.float64()),
         "list<list<double>>": arrow.list_(arrow.list_(arrow.float64())),
     }
-    facts = described(factors)
-    types = {name: kinds[kind] for name, kind, _, _ in COLUMNS}
-    types |= {vary.column: _kind(arrow, vary) for vary in factors}
-    fields = [arrow.field(name, types[name], metadata=facts[name]) for name in facts]
+    fields = [
+        arrow.field(name, kinds[kind], metadata={"unit": unit, "meaning": meaning})
+        for name, kind, unit, meaning in columns_of(factors)
+    ]
     text = json.dumps(provenance, sort_keys=True)
     return arrow.schema(fields, metadata={KEY: text.encode()})
 
 
-def described(factors: Sequence[Vary]) -> dict[str, dict[str, str]]:
-    """Unit and meaning of each column, in their order."""
-    facts = {name: {"unit": unit, "meaning": says} for name, _, unit, says in COLUMNS}
-    varied = {vary.column: {"unit": vary.unit, "meaning": vary.meaning} for vary in factors}
-    first = dict.fromkeys(name for name, *_ in COLUMNS[:3])
-    return {name: facts[name] for name in first} | varied | facts
-
-
-def _kind(arrow: Any, vary: Vary) -> Any:
-    if vary.numeric:
-        return arrow.float64()
-    return arrow.bool_() if isinstance(vary.values[0], bool) else arrow.string()
+def columns_of(factors: Sequence[Vary]) -> list[tuple[str, str, str, str]]:
+    """Every column, as in `COLUMNS`."""
+    varied = [(vary.column, vary.type, vary.unit, vary.meaning) for vary in factors]
+    return [*COLUMNS[:3], *varied, *COLUMNS[3:]]
 
 
 class RowWriter:
@@ -106,42 +97,32 @@ class RowWriter:
     def __init__(
         self, folder: Path, factors: Sequence[Vary], provenance: Mapping[str, Any]
     ) -> None:
-        self._folder, self._factors = folder / CELLS, tuple(factors)
+        self._folder = folder / CELLS
         self._schema = schema_of(factors, provenance)
-        self._waiting: dict[str, list[dict[str, Any]]] = {}
+        self._waiting: dict[str, list[Mapping[str, Any]]] = {}
         self._began = self._flushed = time.monotonic()
 
     def add(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Take rows; from time to time, or when they are many, they are written."""
         for row in rows:
-            values = zip(self._factors, row["values"], strict=True)
-            varied = {vary.column: value for vary, value in values}
-            kept = {name: value for name, value in row.items() if name != "values"}
-            self._waiting.setdefault(kept.pop("backend"), []).append({**kept, **varied})
+            self._waiting.setdefault(row["backend"], []).append(row)
         now = time.monotonic()
         # Seldom in a long sweep, so that its files stay few: what a kill loses is so much work.
         pause = min(_LATE, max(_SOON, _SHARE * (now - self._began)))
-        full = any(len(found) >= _MOST for found in self._waiting.values())
-        if full or now - self._flushed > pause:
+        most = max(map(len, self._waiting.values()), default=0)
+        if most >= _MOST or now - self._flushed > pause:
             self.flush()
 
     def flush(self) -> None:
         """Write what waits."""
         arrow, _ = require_parquet()
-        for backend in sorted(self._waiting):
-            rows = sorted(self._waiting[backend], key=lambda row: row["cell"])
+        for backend, rows in list(self._waiting.items()):
             folder = self._folder / f"backend={backend}"
             folder.mkdir(parents=True, exist_ok=True)
-            table = arrow.Table.from_pylist(rows, schema=self._schema)
-            _write(_unused(folder, rows[0]["cell"]), table)
+            table = arrow.Table.from_pylist(rows, schema=self._schema).sort_by("cell")
+            _write(folder / f"part-{time.time_ns()}.parquet", table)
             del self._waiting[backend]
         self._flushed = time.monotonic()
-
-
-def _unused(folder: Path, cell: str) -> Path:
-    """The name of a new file: that of its first cell, which another one had if that failed."""
-    names = (folder / f"part-{cell}{f'-{k}' if k else ''}.parquet" for k in itertools.count())
-    return next(path for path in names if not path.exists())
 
 
 def _parts(folder: Path) -> list[Path]:
@@ -156,7 +137,7 @@ def counted(folder: Path) -> Iterator[tuple[str, str]]:
     """
     for part in _parts(folder):
         table = _read(part, ["cell", "status", "error_class"])
-        columns = (table[name].to_pylist() for name in table.column_names)
+        columns = (table[name].to_pylist() for name in ("cell", "status", "error_class"))
         for cell, status, error_class in zip(*columns, strict=True):
             yield cell, error_class or status
 
@@ -169,14 +150,11 @@ def remove_failed(folder: Path) -> None:
     arrow, _ = require_parquet()
     for part in _parts(folder):
         table = _read(part)
-        done = arrow.compute.equal(table["status"], DONE)
-        kept = table.filter(done)
-        if kept.num_rows == table.num_rows:
-            continue
-        if kept.num_rows:
-            _write(part, kept)
-        else:
+        done = table.filter(arrow.compute.equal(table["status"], DONE))
+        if not done.num_rows:
             part.unlink()
+        elif done.num_rows < table.num_rows:
+            _write(part, done)
 
 
 def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
@@ -193,8 +171,10 @@ def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
             f"{part} cannot be read: it is not as it was written. Remove it, and its cells are run "
             "again"
         )
-    source = arrow.BufferReader(content)
-    return parquet.read_table(source, columns=columns, page_checksum_verification=True)
+    # On this thread alone: one of Arrow's that still holds `content` when Python ends takes the
+    # process down with it ("terminate called without an active exception").
+    file = parquet.ParquetFile(arrow.BufferReader(content), page_checksum_verification=True)
+    return file.read(columns, use_threads=False)
 
 
 def _write(part: Path, table: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compare.perturbed import Uncertainty, direction, turn
+from ..compare.perturbed import Uncertainty, displaced
 from ..errors import BadInputError, StateMachineError, check_name
 from ..interface import Array, JointType, Model
 from ..interface.checks import index_of
@@ -25,38 +25,31 @@ def options_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> dict[str
         BadInputError: The model has no such value of its own.
         UnknownNameError: The model has no such joint, body, geom or actuator.
     """
-    found: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     for vary, value in settings:
         if not (vary.place or vary.times):
-            found[vary.name] = _plain(vary.name, value)
+            count = vary.name == "substeps" and isinstance(value, float) and value.is_integer()
+            options[vary.name] = int(value) if count else value
             continue
-        own, owner = _own(model, vary)
-        if not vary.place:
-            found[vary.name] = own * value
+        own, place = _own(model, vary)
+        if place is None:
+            options[vary.name] = own * value
             continue
-        place = _place(model, vary, owner, len(own))
-        changed = found.setdefault(vary.name, own.copy())
+        changed = options.setdefault(vary.name, own.copy())
         changed[place] = own[place] * value if vary.times else value
-    return found
+    return options
 
 
-def _plain(name: str, value: Value) -> Value:
-    """A value as `replace` takes it: a count is a whole number."""
-    if name == "substeps" and isinstance(value, float) and value.is_integer():
-        return int(value)
-    return value
-
-
-def _own(model: Model, vary: Vary) -> tuple[Any, str]:
-    """The model's own value of an option, and of what it is: "dof", "body", …, or ""."""
+def _own(model: Model, vary: Vary) -> tuple[Any, int | None]:
+    """The model's own value of an option, and which of its numbers is meant; None for all."""
     for owner in ("", "dof", "body", "geom", "actuator"):
         own = getattr(model, f"{owner}_{vary.name}" if owner else vary.name, None)
-        if isinstance(own, (int, float)) and not isinstance(own, bool):
-            if not vary.place:
-                return float(own), owner
-        elif isinstance(own, np.ndarray):
+        if isinstance(own, np.ndarray):
             # Of several numbers of each, as the three frictions of a geom, the first is meant.
-            return np.array(own[:, 0] if own.ndim == 2 else own, dtype=np.float64), owner
+            values = np.array(own[:, 0] if own.ndim == 2 else own, dtype=np.float64)
+            return values, _place(model, vary, owner, len(values)) if vary.place else None
+        if isinstance(own, (int, float)) and not (isinstance(own, bool) or vary.place):
+            return float(own), None
     raise BadInputError(
         f"{vary.label} cannot be varied like this: a model has no {vary.name} of its own"
         + (" for each of its parts" if vary.place else "")
@@ -64,13 +57,13 @@ def _own(model: Model, vary: Vary) -> tuple[Any, str]:
 
 
 def _place(model: Model, vary: Vary, owner: str, length: int) -> int:
+    """Which number of an array is meant: by joint, body, …, axis or its own number."""
     if vary.place.isdigit():
-        place = int(vary.place)
-        if place >= length:
+        if int(vary.place) >= length:
             raise BadInputError(f"{vary.label} is beyond the {length} that {model.path.name} has")
-        return place
-    if owner == "dof":
-        return scalar_joint(model, vary.place)[1]
+        return int(vary.place)
+    if owner in ("qpos", "dof"):
+        return scalar_joint(model, vary.place)[owner == "dof"]
     if owner:
         return index_of(owner, vary.place, getattr(model, f"{owner}_names"))
     check_name("axis", vary.place, _AXES)
@@ -84,12 +77,10 @@ def own_value(vary: Vary, model: Model) -> float | None:
     if vary.times:
         return 1.0
     try:
-        own, owner = _own(model, vary)
-        values = np.atleast_1d(own)
-        if vary.place:
-            values = values[[_place(model, vary, owner, len(values))]]
+        own, place = _own(model, vary)
     except StateMachineError:
         return None
+    values = np.atleast_1d(own if place is None else own[place])
     return float(values[0]) if len(values) and not np.ptp(values) else None
 
 
@@ -100,19 +91,16 @@ def start_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> tuple[dict
         BadInputError: A joint is neither a hinge nor a slide, or a number is beyond the array.
         UnknownNameError: The model has no such joint.
     """
-    found: tuple[dict[int, float], ...] = ({}, {})
+    qpos: dict[int, float] = {}
+    qvel: dict[int, float] = {}
     for vary, value in settings:
-        which = 0 if vary.name == "qpos" else 1
-        if vary.place.isdigit():
-            place, length = int(vary.place), (model.nq, model.nv)[which]
-            if place >= length:
-                raise BadInputError(f"{vary.label} is beyond the {length} numbers of {vary.name}")
-        else:
-            place = scalar_joint(model, vary.place)[which]
         if isinstance(value, (bool, str)):
             raise BadInputError(f"{vary.label} wants numbers; got {value}")
-        found[which][place] = value
-    return found
+        if vary.name == "qpos":
+            qpos[_place(model, vary, "qpos", model.nq)] = value
+        else:
+            qvel[_place(model, vary, "dof", model.nv)] = value
+    return qpos, qvel
 
 
 def beyond_ranges(model: Model, vary: Vary) -> list[str]:
@@ -121,17 +109,17 @@ def beyond_ranges(model: Model, vary: Vary) -> list[str]:
         return []
     (place,) = start_at(model, [(vary, vary.extremes[0])])[0]
     joints = np.flatnonzero((model.jnt_qposadr == place) & np.array(model.jnt_limited, dtype=bool))
-    values = [float(value) for value in vary.extremes]
+    said = []
     for joint in joints.tolist():
-        low, high = (float(end) for end in model.jnt_range[joint])
-        unit = "m" if model.jnt_type[joint] == JointType.SLIDE else "rad"
-        if min(values) < low or max(values) > high:
-            outside = [value for value in values if not low <= value <= high]
-            return [
+        low, high = model.jnt_range[joint].tolist()
+        outside = [value for value in vary.extremes if not low <= float(value) <= high]
+        if outside:
+            unit = vary.unit_on({int(model.jnt_type[joint])})
+            said.append(
                 f"{vary.label}={outside[0]:g} starts outside the range of the joint, {low:.4g} to "
                 f"{high:.4g} {unit}: its limit pushes from the first step on"
-            ]
-    return []
+            )
+    return said
 
 
 def drawn_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> Array:
@@ -141,23 +129,15 @@ def drawn_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> Ar
     a rotation by its angle, a slide and the position of a free body by its length. A joint stays
     within its range.
     """
-    qpos = qpos.copy()
     if seed == 0:
-        return qpos
+        return qpos.copy()
     draw = np.random.default_rng([seed, _STREAM])
-    for joint, (kind, place) in enumerate(
-        zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True)
-    ):
-        if kind in (JointType.HINGE, JointType.SLIDE):
-            most = spread.angle if kind == JointType.HINGE else spread.length
-            moved = qpos[place] + most * draw.uniform(-1, 1)
-            if model.jnt_limited[joint]:
-                low, high = model.jnt_range[joint]  # where it starts may be beyond them
-                moved = np.clip(moved, min(low, qpos[place]), max(high, qpos[place]))
-            qpos[place] = moved
-            continue
-        if kind == JointType.FREE:
-            qpos[place : place + 3] += spread.length * draw.uniform(0, 1) * direction(draw)
-        quat = qpos[place + JointType(kind).nq - 4 :][:4]
-        turn(quat, spread.angle * draw.uniform(0, 1) * direction(draw))
-    return qpos
+    moved = displaced(
+        model, qpos, spread, draw, lambda: draw.uniform(-1, 1), lambda: draw.uniform(0, 1)
+    )
+    scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
+    limited = scalar & np.array(model.jnt_limited, dtype=bool)
+    places, (low, high) = model.jnt_qposadr[limited], model.jnt_range[limited].T
+    begun = qpos[places]  # which may be beyond the range
+    moved[places] = np.clip(moved[places], np.minimum(low, begun), np.maximum(high, begun))
+    return moved

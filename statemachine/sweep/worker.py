@@ -9,8 +9,7 @@ import sys
 import threading
 import time
 import warnings
-from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any, TypeVar
@@ -21,12 +20,15 @@ from ..errors import BadInputError, StateMachineError
 from ..interface import Model
 from ..measures.text import listed
 from ..models import resolve
+from ..processes import end_with_parent
 from ..runs.controllers import function_file
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario
 from ..silence import silence
-from .cell import DONE, FAILED, CellRules, SweepCell, run_cell, timed_out
+from .cell import run_cell, timed_out
 from .design import digest
+from .request import PreparedSweep, Sweep, SweepCell
+from .rows import DONE, FAILED
 from .settings import options_at
 
 T = TypeVar("T")
@@ -34,15 +36,15 @@ Row = dict[str, Any]
 
 _TO_LOAD = 60.0  # seconds that an engine and a model may take at least
 _GRACE = 10.0  # seconds beyond a time-out, after which a process that still hangs ends itself
-_WATCH = 1.0  # seconds between two looks at whether the driver is still there
+_KEPT = 8  # of the latest Models
 _ONE_AT_A_TIME = threading.Lock()  # a Dask worker may have several threads, and an engine must not
 
 
-def run_batch(rules: CellRules, cells: Sequence[SweepCell], own: bool) -> list[Row]:
+def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], own: bool) -> list[Row]:
     """Run cells; every one gives a row, whatever happens in it.
 
     Args:
-        rules: Of the sweep.
+        ready: The sweep.
         cells: To run, in this order.
         own: Whether this process is there for nothing else: it may then be kept silent, and ended.
     """
@@ -50,48 +52,46 @@ def run_batch(rules: CellRules, cells: Sequence[SweepCell], own: bool) -> list[R
         _settle()
     with _ONE_AT_A_TIME, warnings.catch_warnings(), silence():
         warnings.simplefilter("ignore")  # the driver has loaded the same models, and passed them on
-        return [_row(rules, cell, own) for cell in cells]
+        return [_row(ready, cell, own) for cell in cells]
 
 
-def failed_row(cell: SweepCell, error: Exception) -> Row:
-    """The row of a cell that gave none."""
-    return {
-        **_named(cell),
-        "status": FAILED,
+def row_of(ready: PreparedSweep, cell: SweepCell, error: BaseException | None = None) -> Row:
+    """What every row of a cell has, and of one that failed what happened."""
+    columns = [vary.column for vary in ready.design.factors]
+    failed = {} if error is None else {
         "error_class": type(error).__name__,
         "error": " ".join(str(error).split()) or type(error).__name__,
-    }
-
-
-def _named(cell: SweepCell) -> Row:
-    """What every row of a cell has."""
+    }  # fmt: skip
     return {
         "cell": cell.id,
         "point": cell.point,
         "seed": cell.seed,
         "backend": cell.backend,
-        "values": cell.values,
+        "status": FAILED if failed else DONE,
         "library_version": __version__,
+        **dict(zip(columns, cell.values, strict=True)),
+        **failed,
     }
 
 
-def _row(rules: CellRules, cell: SweepCell, own: bool) -> Row:
+def _row(ready: PreparedSweep, cell: SweepCell, own: bool) -> Row:
     began = time.perf_counter()
     row: Row = {}
+    failure: BaseException | None = None
+    limit = ready.sweep.timeout
     try:
-        if rules.function and digest_of(rules.what) != rules.function:
-            name = function_file(rules.what).name
+        if ready.function and digest_of(ready.sweep.what) != ready.function:
+            name = function_file(ready.sweep.what).name
             raise BadInputError(f"{name} is not the file of the sweep: it changed")
-        with _limited(max(rules.timeout, _TO_LOAD), own):
-            model, options, doing = _model(rules, cell, rules.scenario_of(cell), row)
-        with _limited(rules.timeout, own):
-            run_cell(rules, cell, model, options, doing, row)
-        told: Row = {**_named(cell), "status": DONE}
+        with _limited(max(limit, _TO_LOAD), own):
+            model, options, doing = _model(ready, cell, row)
+        with _limited(limit, own):
+            run_cell(ready, cell, model, options, doing, row)
     except _OutOfTimeError:
-        told = failed_row(cell, timed_out(rules.timeout))
+        failure = timed_out(limit)
     except Exception as error:  # of any kind: it belongs into the row
-        told = failed_row(cell, error)
-    return {**row, **told, "wall_seconds": time.perf_counter() - began}
+        failure = error
+    return {**row, **row_of(ready, cell, failure), "wall_seconds": time.perf_counter() - began}
 
 
 def digest_of(function: str) -> str:
@@ -100,60 +100,60 @@ def digest_of(function: str) -> str:
 
 
 def _model(
-    rules: CellRules, cell: SweepCell, doing: Scenario, row: Row
+    ready: PreparedSweep, cell: SweepCell, row: Row
 ) -> tuple[Model, dict[str, Any], Scenario]:
     """The Model of a cell, the options that it was made with, and what is done on it."""
-    name = rules.model_of(cell)
-    varied = [(v, value) for v, value in rules.settings(cell, "option") if value is not None]
+    sweep = ready.sweep
+    seeded = {"seed": cell.seed} if "seed" in ready.parameters else {}
+    chosen = {vary.name: value for vary, value in ready.settings(cell, "parameter")}
+    doing = sweep.scenario({**seeded, **chosen})
+    name = next((value for _, value in ready.settings(cell, "model")), next(iter(ready.files)))
+    varied = [(v, value) for v, value in ready.settings(cell, "option") if value is not None]
     # A switch may be what lets an engine take the file at all: `load` is told.
     first = {**doing.options, **{v.name: value for v, value in varied if isinstance(value, bool)}}
     rest = [(v, value) for v, value in varied if not isinstance(value, bool)]
-    key = (name, rules.menagerie, rules.files[name], cell.backend, rules.defaults, repr(first))
-    base = _loaded.get(key, lambda: _load(rules, name, cell.backend, first))
+    key = repr((name, ready.files[name], cell.backend, first, sweep))
+
+    def loaded() -> tuple[Model, Scenario]:
+        if not _is_here(ready, name):
+            raise BadInputError(
+                f"{name} is not the file of the sweep: it changed, or is another here"
+            )
+        base = load_of(sweep, ready.places[name], cell.backend, first)
+        return base, doing.on(base)
+
+    base, on_robot = _kept(_LOADED, key, loaded)
     row["engine_version"] = base.engine_version
-    if not doing.own:  # the user's own is the same on every robot
-        doing = _on_robot.get((*key, rules.what), lambda: doing.on(base))
-    options = options_at(base, rest)
-    if not options:
+    doing = doing if doing.own else on_robot  # the user's own is the same on every robot
+    if not (options := options_at(base, rest)):
         return base, first, doing
     typed = repr([(v.label, v.times, value) for v, value in rest])
-    model = _replaced.get((*key, typed), lambda: base.replace(**options))
+    model = _kept(_REPLACED, key + typed, lambda: base.replace(**options))
     return model, {**first, **options}, doing
 
 
-def _load(rules: CellRules, name: str, backend: str, options: dict[str, Any]) -> Model:
-    place = rules.places[name]
-    if model_digest(resolve(place, rules.menagerie)) != rules.files[name]:
-        raise BadInputError(f"{name} is not the file of the sweep: it changed, or is another here")
-    return load(
-        place, backend=backend, defaults=rules.defaults, menagerie=rules.menagerie, **options
-    )
+def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, Any]) -> Model:
+    """A model of a sweep as all of its cells load it."""
+    defaults, menagerie = sweep.defaults, sweep.menagerie
+    return load(place, backend=backend, defaults=defaults, menagerie=menagerie, **options)
 
 
-class _Kept:
-    """The results of calls by key, the latest of them; an error is a result too."""
-
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._of: OrderedDict[Any, Any] = OrderedDict()
-
-    def get(self, key: Any, make: Callable[[], T]) -> T:
-        """What was made for a key, or is made now."""
-        if key not in self._of:
-            try:
-                self._of[key] = make()
-            except Exception as error:
-                self._of[key] = error.with_traceback(None)
-            while len(self._of) > self._most:
-                self._of.popitem(last=False)
-        self._of.move_to_end(key)
-        found = self._of[key]
-        if isinstance(found, Exception):
-            raise found.with_traceback(None)
-        return found
+_LOADED: dict[str, Any] = {}
+_REPLACED: dict[str, Any] = {}
 
 
-_loaded, _on_robot, _replaced = _Kept(8), _Kept(8), _Kept(4)
+def _kept(results: dict[str, Any], key: str, make: Callable[[], T]) -> T:
+    """What was made for a key, or is made now; an error is a result too."""
+    if key not in results:
+        if len(results) == _KEPT:
+            del results[next(iter(results))]
+        try:
+            results[key] = make()
+        except Exception as error:
+            results[key] = error
+    if isinstance(results[key], Exception):
+        raise results[key].with_traceback(None)
+    return results[key]
 
 
 class _OutOfTimeError(BaseException):
@@ -198,36 +198,28 @@ def _settle() -> None:
     for stream in (1, 2):
         os.dup2(nowhere, stream)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it was not kept from it already
-    driver = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == driver:
-            time.sleep(_WATCH)
-        os._exit(1)
-
-    if os.name != "nt":
-        threading.Thread(target=watch, daemon=True).start()
+    end_with_parent()
 
 
-def differing(rules: CellRules, version: str) -> str:
+def differing(ready: PreparedSweep, version: str) -> str:
     """What this machine has otherwise than the driver of a sweep; "" if nothing.
 
     Args:
-        rules: Of the sweep.
+        ready: The sweep.
         version: Of the driver's library.
     """
     wrong = [] if version == __version__ else ["statemachine"]
-    wrong += [name for name in rules.files if not _is_here(rules, name)]
-    if rules.function and not (
-        function_file(rules.what).is_file() and digest_of(rules.what) == rules.function
+    wrong += [name for name in ready.files if not _is_here(ready, name)]
+    if ready.function and not (
+        function_file(ready.sweep.what).is_file() and digest_of(ready.sweep.what) == ready.function
     ):
-        wrong.append(rules.what)
+        wrong.append(ready.sweep.what)
     return listed(wrong)
 
 
-def _is_here(rules: CellRules, name: str) -> bool:
+def _is_here(ready: PreparedSweep, name: str) -> bool:
     """Whether the file of a model is that of the sweep."""
     try:
-        return model_digest(resolve(rules.places[name], rules.menagerie)) == rules.files[name]
+        return model_digest(resolve(ready.places[name], ready.sweep.menagerie)) == ready.files[name]
     except (StateMachineError, OSError):
         return False

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Array, Ints, JointType, Model
-from ..measures import Gap, distances, joint_gap
+from ..interface import Array, JointType, Model
+from ..measures import Gap
 
 _TURN = math.pi / 180  # radians in a degree
 
@@ -40,12 +39,14 @@ class EnginePose:
         name: Of the engine.
         xpos: (nbody, 3) [m]; xquat: (nbody, 4) wxyz.
         tip: (3,) the fingertip [m]; None if the model has no site.
+        qpos: (nq,) in MuJoCo's layout.
     """
 
     name: str
     xpos: Array
     xquat: Array
     tip: Array | None
+    qpos: Array
 
 
 @dataclass(frozen=True)
@@ -157,24 +158,3 @@ def controls_of(model: Model) -> tuple[Control, ...]:
         label = name or f"actuator {index}"
         found.append(Control(label, low / scale, high / scale, unit, scale))
     return tuple(found)
-
-
-def separation(
-    names: Sequence[str],
-    types: Sequence[int] | Ints,
-    addresses: Sequence[int] | Ints,
-    qpos: Sequence[Array],
-    poses: Sequence[EnginePose],
-) -> Separation:
-    """How far two moments of one model are apart.
-
-    Args:
-        names: Of the joints.
-        types: Their `JointType`s.
-        addresses: Where each is in qpos.
-        qpos: (nq,) of both.
-        poses: Of both.
-    """
-    one, two = (pose.tip for pose in poses[:2])
-    tip = None if one is None or two is None else float(distances(one, two))
-    return Separation(tip, joint_gap(names, types, addresses, qpos[0], qpos[1]))

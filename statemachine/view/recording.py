@@ -12,7 +12,6 @@ from ..interface import usual_site
 from ..runs import Header, Trace
 from .frames import (
     Command,
-    Control,
     EnginePose,
     Pause,
     Play,
@@ -20,21 +19,18 @@ from .frames import (
     Seek,
     Snapshot,
     Step,
-    separation,
 )
+from .session import Session
 
 _NEEDED = ("xpos", "xquat")
 _EQUAL = 1e-6  # seconds between moments that count as the same
 
 
-class TraceSession:
+class TraceSession(Session):
     """One or two traces of one model, row by row.
 
     Attributes: those of a `LiveSession`; it has no sliders, and the only place is its start.
     """
-
-    controls: tuple[Control, ...] = ()
-    places: tuple[str, ...] = ()
 
     def __init__(self, traces: Sequence[Trace]) -> None:
         """Put them to their start; paused.
@@ -54,15 +50,14 @@ class TraceSession:
             if (other.header.bodies, other.header.nq) != (first.header.bodies, first.header.nq):
                 raise TraceError(f"{other!r} is of another model than {first!r}")
         self._traces = tuple(traces)
-        self.timestep = first.header.timestep
-        ends = [float(trace.time[-1] - trace.time[0]) for trace in traces]
-        self.length: float | None = min(ends)
-        self._rows = int(np.searchsorted(first.time - first.time[0], min(ends) + _EQUAL))
-        self.names = tuple(_name(trace.header) for trace in traces)
-        sites = first.header.sites if all("site_xpos" in trace for trace in traces) else ()
-        self._site = usual_site(sites)
-        self.tip = "" if self._site is None else sites[self._site]
-        self._row, self._running, self._resets = 0, False, 1
+        header = first.header
+        sites = header.sites if all("site_xpos" in trace for trace in traces) else ()
+        names = tuple(_name(trace.header) for trace in traces)
+        joints = header.joints, header.jnt_type, header.jnt_qposadr
+        super().__init__(names, header.timestep, joints, sites, usual_site(sites))
+        self.length = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
+        self._rows = int(np.searchsorted(first.time - first.time[0], self.length + _EQUAL))
+        self._resets = 1
 
     @property
     def header(self) -> Header:
@@ -74,11 +69,6 @@ class TraceSession:
         """What made each of them."""
         return tuple(trace.header.label.removesuffix(", recorded") for trace in self._traces)
 
-    @property
-    def running(self) -> bool:
-        """Whether it plays."""
-        return self._running
-
     def apply(self, command: Command) -> None:
         """Do what was asked for.
 
@@ -87,61 +77,51 @@ class TraceSession:
         """
         match command:
             case Play():
-                if self._row == self._rows - 1:
+                if self._steps == self._rows - 1:
                     self._jump(0)
-                self._running = self._rows > 1
+                self.running = self._rows > 1
             case Pause():
-                self._running = False
+                self.running = False
             case Step(count):
-                self._running = False
+                self.running = False
                 self.advance(count)
-                self._jump(self._row)
+                self._jump(self._steps)
             case ResetTo():
                 self._jump(0)
             case Seek(time):
                 if not math.isfinite(time):
                     raise BadInputError(f"there is no row at {time} s")
-                self._row = min(max(0, round(time / self.timestep)), self._rows - 1)
+                self._steps = min(max(0, round(time / self.timestep)), self._rows - 1)
             case _:
                 raise BadInputError("a recording has no sliders: nothing runs here")
 
     def _jump(self, row: int) -> None:
         """Go to a row that the slider did not ask for."""
-        self._row = row
+        self._steps = row
         self._resets += 1
 
     def advance(self, count: int = 1) -> None:
         """Go on by so many rows; it stops at the last."""
-        self._row = min(self._row + max(count, 0), self._rows - 1)
-        if self._row == self._rows - 1 and self._running:
-            self._running = False
-            self._jump(self._row)
+        self._steps = min(self._steps + max(count, 0), self._rows - 1)
+        if self._steps == self._rows - 1 and self.running:
+            self.running = False
+            self._jump(self._steps)
 
     def frame(self) -> Snapshot:
         """This row of the first trace, and what the other has nearest to its time."""
         first = self._traces[0]
-        since = first.time[self._row] - first.time[0]
+        since = first.time[self._steps] - first.time[0]
         rows = [int(np.abs(trace.time - trace.time[0] - since).argmin()) for trace in self._traces]
         poses = []
         for trace, name, row in zip(self._traces, self.names, rows, strict=True):
             tip = None if self._site is None else trace["site_xpos"][row, self._site]
-            poses.append(EnginePose(name, trace["xpos"][row], trace["xquat"][row], tip))
-        gap = None
-        if len(rows) > 1:
-            other = self._traces[1]
-            # Moments that are not the same say nothing about the engines.
-            if abs(other.time[rows[1]] - other.time[0] - since) < _EQUAL:
-                header, both = self.header, (first.qpos[rows[0]], other.qpos[rows[1]])
-                gap = separation(header.joints, header.jnt_type, header.jnt_qposadr, both, poses)
-        return Snapshot(
-            time=float(first.time[self._row]),
-            steps=self._row,
-            running=self._running,
-            ctrl=first.ctrl[self._row],
-            resets=self._resets,
-            poses=tuple(poses),
-            gap=gap,
-            trouble="",
+            where = trace["xpos"][row], trace["xquat"][row], tip, trace.qpos[row]
+            poses.append(EnginePose(name, *where))
+        # Moments that are not the same say nothing about the engines.
+        last = self._traces[-1]
+        same = abs(last.time[rows[-1]] - last.time[0] - since) < _EQUAL
+        return self._snapshot(
+            float(first.time[self._steps]), first.ctrl[self._steps], tuple(poses), bool(same)
         )
 
 

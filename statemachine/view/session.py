@@ -8,9 +8,11 @@ from types import TracebackType
 import numpy as np
 
 from ..errors import BadInputError, StateMachineError
-from ..interface import Data, Model, forward, make_data, reset, step, usual_site
+from ..interface import Array, Data, Ints, Model, forward, make_data, reset, step, usual_site
+from ..measures import distances, joint_gap
 from .frames import (
     Command,
+    Control,
     EnginePose,
     Pause,
     Play,
@@ -20,17 +22,13 @@ from .frames import (
     Snapshot,
     Step,
     controls_of,
-    separation,
 )
 
 _STEPS_MOST = 100_000  # of one press of a button
 
 
-class LiveSession:
-    """One or two engines under the same commands, at the same steps.
-
-    Whoever makes it is the only one to touch its Data: what other threads want comes as
-    commands through a queue of theirs.
+class Session:
+    """What is shown, paused at first: where every frame of a viewer comes from.
 
     Attributes:
         names: Of the engines.
@@ -39,9 +37,56 @@ class LiveSession:
         timestep: Simulated time of a step [s].
         tip: The site that stands for the fingertip, or "".
         length: Simulated time from first to last [s]; None: a simulation has no end.
+        running: Whether time is to go on by itself.
     """
 
+    controls: tuple[Control, ...] = ()
+    places: tuple[str, ...] = ()
     length: float | None = None
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        timestep: float,
+        joints: tuple[Sequence[str], Sequence[int] | Ints, Sequence[int] | Ints],
+        sites: Sequence[str],
+        site: int | None,
+    ) -> None:
+        """Begin.
+
+        Args:
+            names: Of the engines.
+            timestep: Simulated time of a step [s].
+            joints: Their names, `JointType`s and places in qpos.
+            sites: Names of the sites.
+            site: Which of them stands for the fingertip; None for none.
+        """
+        self.names, self.timestep, self._joints, self._site = names, timestep, joints, site
+        self.tip = "" if site is None else sites[site]
+        self.running, self._trouble, self._steps, self._resets = False, "", 0, 0
+
+    def _snapshot(
+        self, time: float, ctrl: Array, poses: tuple[EnginePose, ...], same: bool = True
+    ) -> Snapshot:
+        """A frame; how far two engines are apart is known if their moments are the same."""
+        gap = None
+        if same and len(poses) > 1:
+            one, two = poses[:2]
+            tip = None if one.tip is None or two.tip is None else distances(one.tip, two.tip)
+            gap = Separation(
+                None if tip is None else float(tip), joint_gap(*self._joints, one.qpos, two.qpos)
+            )
+        return Snapshot(
+            time, self._steps, self.running, ctrl, self._resets, poses, gap, self._trouble
+        )
+
+
+class LiveSession(Session):
+    """One or two engines under the same commands, at the same steps.
+
+    Whoever makes it is the only one to touch its Data: what other threads want comes as
+    commands through a queue of theirs.
+    """
 
     def __init__(
         self, models: Sequence[Model], keyframe: int | str | None = None, site: str | None = None
@@ -66,17 +111,20 @@ class LiveSession:
                     f"the timesteps differ: {first.timestep:g} s on {first.backend}, "
                     f"{other.timestep:g} s on {other.backend}"
                 )
-        self.timestep = first.timestep
-        self.names = tuple(model.backend for model in models)
+        chosen = usual_site(first.site_names) if site is None else first.site_id(site)
+        super().__init__(
+            tuple(model.backend for model in models),
+            first.timestep,
+            (first.joint_names, first.jnt_type, first.jnt_qposadr),
+            first.site_names,
+            chosen,
+        )
         self.controls = controls_of(first)
         self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
-        self._site = usual_site(first.site_names) if site is None else first.site_id(site)
-        self.tip = "" if self._site is None else first.site_names[self._site]
         start = None if keyframe is None else first.key_id(keyframe)
         self._arms: list[tuple[Model, Data]] = []
-        # The last moment that was good: its time, the poses, how far apart they are.
-        self._good: tuple[float, tuple[EnginePose, ...], Separation | None] = 0.0, (), None
-        self._running, self._trouble, self._steps, self._resets = False, "", 0, 0
+        # The last moment that was good: its time and the poses.
+        self._good: tuple[float, tuple[EnginePose, ...]] = 0.0, ()
         try:
             for model in models:
                 self._arms.append((model, make_data(model)))
@@ -84,11 +132,6 @@ class LiveSession:
         except BaseException:
             self.close()
             raise
-
-    @property
-    def running(self) -> bool:
-        """Whether time is to go on by itself."""
-        return self._running
 
     def apply(self, command: Command) -> None:
         """Do what was asked for.
@@ -103,13 +146,13 @@ class LiveSession:
                 for _, data in self._arms:
                     data.ctrl[index] = value
             case Play():
-                self._running = not self._trouble
+                self.running = not self._trouble
             case Pause():
-                self._running = False
+                self.running = False
             case Step(count):
                 if not 1 <= count <= _STEPS_MOST:
                     raise BadInputError(f"steps must be from 1 to {_STEPS_MOST}; got {count}")
-                self._running = False
+                self.running = False
                 self.advance(count)
             case ResetTo(keyframe):
                 self._reset(keyframe)
@@ -135,17 +178,8 @@ class LiveSession:
         """
         if not self._trouble:
             self._look()
-        time, poses, gap = self._good
-        return Snapshot(
-            time=time,
-            steps=self._steps,
-            running=self._running,
-            ctrl=np.array(self._arms[0][1].ctrl),
-            resets=self._resets,
-            poses=poses,
-            gap=gap,
-            trouble=self._trouble,
-        )
+        time, poses = self._good
+        return self._snapshot(time, np.array(self._arms[0][1].ctrl), poses)
 
     def _look(self) -> None:
         poses = []
@@ -156,13 +190,9 @@ class LiveSession:
                 self._stop(model, error)
                 return
             tip = None if self._site is None else np.array(data.site_xpos[self._site])
-            poses.append(EnginePose(model.backend, np.array(data.xpos), np.array(data.xquat), tip))
-        (model, first), *others = self._arms
-        gap = None
-        if others:
-            both = first.qpos, others[0][1].qpos
-            gap = separation(model.joint_names, model.jnt_type, model.jnt_qposadr, both, poses)
-        self._good = first.time, tuple(poses), gap
+            where = np.array(data.xpos), np.array(data.xquat), tip, np.array(data.qpos)
+            poses.append(EnginePose(model.backend, *where))
+        self._good = self._arms[0][1].time, tuple(poses)
 
     def _reset(self, keyframe: int | None) -> None:
         if keyframe is not None and not 0 <= keyframe < len(self.places):
@@ -173,7 +203,7 @@ class LiveSession:
         self._resets += 1
 
     def _stop(self, model: Model, error: StateMachineError) -> None:
-        self._running = False
+        self.running = False
         self._trouble = self._trouble or f"{model.backend}: {error}"
 
     def close(self) -> None:

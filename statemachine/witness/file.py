@@ -97,11 +97,13 @@ def _segments(
 def _read_urdf(pin: Any, path: Path) -> WitnessModel:
     model = pin.buildModelFromUrdf(str(path))
     joints: list[tuple[str, Segment]] = []
+    changed = 0
     for number, name in list(enumerate(model.names))[1:]:
         joint = model.joints[number]
         kind = joint.shortname()
         if kind.endswith("FreeFlyer"):
             kind = "free"
+            changed += not model.jointPlacements[number].isIdentity()
             model.jointPlacements[number] = pin.SE3.Identity()  # as of an MJCF
         elif (joint.nq, joint.nv) == (2, 1):
             kind = "unbounded"
@@ -112,7 +114,8 @@ def _read_urdf(pin: Any, path: Path) -> WitnessModel:
         joints.append((name, Segment(kind, joint.idx_q, joint.idx_v)))
     links = [k for k, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
     bodies = {model.frames[k].name: k for k in links}
-    return WitnessModel(model, tuple(joints), bodies, {}, OWN_READING)
+    said = (f"places of floating joints left out, for qpos has them: {changed}",) * bool(changed)
+    return WitnessModel(model, tuple(joints), bodies, {}, OWN_READING, said)
 
 
 def _reason(error: Exception) -> str:

@@ -110,6 +110,10 @@ class PlainMjcf:
         roots = ground.findall("body")
         self._done["root bodies"] = len(roots) - 1 if len(roots) > 2 else 0
         for root_body in roots:
+            if root_body.find("joint") is None:
+                place = own_place(root_body.attrib, source.compiler)
+                self._done["root places"] += not _nowhere_else(place)
+                self._done["root sites"] += len(root_body.findall("site"))
             self._right_sites(root_body)
 
     def _right_sites(self, root_body: Element) -> None:
@@ -306,6 +310,8 @@ _CHANGES = {
     "zaxis": "zaxis written as axes: {}",
     "fromto": "fromto of a site written as pos and axes: {}",
     "still sites": "sites of bodies without a joint written as bodies: {}",
+    "root places": "places of root bodies without a joint kept by a body around them: {}",
+    "root sites": "sites of the world or a root body without a joint kept by a body around: {}",
     "root bodies": "root bodies put below one body that stands still: {}",
 }
 

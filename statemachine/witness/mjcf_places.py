@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import models
 from ..errors import ModelError
 from ..rotations import HERE, Array, Placement, matrix_from_quat, rotation
 
@@ -24,18 +25,8 @@ class Compiler(NamedTuple):
 
 
 def numbers(text: str, count: int) -> Array:
-    """The numbers of an attribute.
-
-    Raises:
-        ModelError: They are not `count`, or no finite numbers.
-    """
-    try:
-        found = np.array([float(word) for word in text.split()])
-    except ValueError:
-        found = np.empty(0)
-    if found.shape != (count,) or not np.isfinite(found).all():
-        raise ModelError(f"{text!r} in the file should be {count} numbers")
-    return found
+    """The numbers of an attribute."""
+    return np.array(models.numbers(text, count, "an attribute of the file"))
 
 
 def own_place(given: Mapping[str, str], compiler: Compiler) -> Placement:

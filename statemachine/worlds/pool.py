@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from .. import backends
-from ..errors import BusyDataError, EngineError, StateMachineError, UnsupportedError
+from ..errors import BusyDataError, StateMachineError, UnsupportedError
 from ..interface import Array, Ints, Model, State
 from ..interface.turns import alone
 from ..interface.worlds import Worlds, check_memory
@@ -41,8 +41,8 @@ class PoolWorlds(Worlds):
     call: what nobody reads is not computed.
 
     A process that ends by itself takes its worlds with it: the call raises EngineError, which
-    names them, and they are left out until `reset` or `set_state`, which start another. After
-    Ctrl-C each world has done all of the call or nothing of it, as its `time` tells.
+    names them, and these Worlds are closed. After Ctrl-C each world has done all of the call or
+    nothing of it, as its `time` tells; where one does not end it in time, they are closed.
     """
 
     def __init__(
@@ -89,14 +89,16 @@ class PoolWorlds(Worlds):
         self._rows: Any = arrays.pop("rows")
         self._count, self._warned = 0, set[tuple[Any, str]]()
         self._processes: list[WorldsProcess] = []
-        self._layouts: dict[int, Any] = {}  # of the States, by process
+        self._layouts: list[Any] = []  # of the States, by process
         self._end = weakref.finalize(self, end_all, self._processes, os.getpid())
         super().__init__(model, n, workers, derived, arrays)
         self._kept = {name: vars(self)[name] for name in derived}
         try:
             for number in range(workers):
-                self._processes.append(self._process_of(number))
-            self._fill(self._processes)
+                worlds = range(number, n, workers)
+                process = WorldsProcess(number, worlds, self._block, self._answers)
+                self._processes.append(process)
+            self._fill()
         except BaseException:
             self._end()
             raise
@@ -109,33 +111,23 @@ class PoolWorlds(Worlds):
             self._replaced[world] = self.model.replace(**options)
         return self._replaced[world]
 
-    def _process_of(self, number: int) -> WorldsProcess:
-        worlds = range(number, self.n, self._job["workers"])
-        return WorldsProcess(number, worlds, self._block, self._answers)
-
-    def _fill(self, processes: list[WorldsProcess]) -> None:
-        """Let processes that have just been started make their Data."""
-        answers = self._exchange(processes, "start", self._answers, self._job)
-        self._check(processes, answers)
-        told = [answer["value"] for answer in answers]
+    def _fill(self) -> None:
+        """Let the processes make their Data."""
+        told = self._begun("start", self._answers, self._job)
         left = sum(process["left"] for process in told)
         check_memory(self.n, max(process["each"] for process in told), self.n - left)
-        answers = self._exchange(processes, "fill")
-        self._check(processes, answers)
-        for process, answer in zip(processes, answers, strict=True):
-            self._layouts[process.worlds[0]] = answer["value"]
-            process.started()
+        self._layouts = self._begun("fill")
 
-    def _check(self, processes: list[WorldsProcess], answers: Answers) -> None:
-        """Raise what keeps processes from starting."""
-        for process, answer in zip(processes, answers, strict=True):
-            if process.lost:
-                raise EngineError(f"a process for worlds does not start: {process.how_it_ended()}")
+    def _begun(self, verb: str, argument: int = 0, payload: Any = None) -> list[Any]:
+        """What all processes say as they start, or raise what keeps one from it."""
+        answers = self._exchange(self._processes, verb, argument, payload)
+        for answer in answers:
             error = answer.get("error")
             if isinstance(error, StateMachineError):
                 raise error
             if error is not None:
                 raise _unreadable(self.model, error)
+        return [answer["value"] for answer in answers]
 
     def _close(self) -> None:
         self._end()
@@ -151,7 +143,7 @@ class PoolWorlds(Worlds):
         payload: Any = None,
         of_ids: bool = False,
     ) -> Answers:
-        """Tell processes something, and wait for their answers: empty of one that is lost."""
+        """Tell processes something, and wait for their answers."""
         size = 0
         if payload is not None:
             blob = pickle.dumps(payload)
@@ -162,41 +154,32 @@ class PoolWorlds(Worlds):
         try:
             for process in processes:
                 process.send(number, verb, argument, size, of_ids)
-            return [process.receive(number) or {} for process in processes]
+            return [process.receive(number) for process in processes]
+        except EOFError:
+            error = lost_worlds(processes)
+            self._shut()
+            raise error from None
         except BaseException:  # Ctrl-C, mostly
             if verb not in ("start", "fill"):  # who starts is closed
                 self._halt(processes)
             raise
 
     def _halt(self, processes: list[WorldsProcess]) -> None:
-        """Let processes end what they are at; kill those that do not."""
-        deadline = time.monotonic() + _PATIENCE
-        ended = False
+        """Let processes end what they are at; close the Worlds where one does not."""
+        deadline, ended = time.monotonic() + _PATIENCE, False
+        self._count += 1
         try:
-            while not ended:
-                with suppress(KeyboardInterrupt):  # one is on its way already
-                    self._count += 1
-                    for process in processes:
-                        process.send(self._count, "stop")
-                    for process in processes:
-                        process.stop(self._count, deadline)
-                    ended = True
-        except BaseException:
-            for process in processes:
-                process.give_up("what was asked of it was interrupted twice")
-            raise
-        finally:
-            self._find_lost(processes)
-
-    def _find_lost(self, processes: list[WorldsProcess]) -> EngineError | None:
-        """List the worlds that are gone with their processes, and what to raise for them."""
-        lost = [process for process in processes if process.lost]
-        if not lost:
-            return None
-        error = lost_worlds(lost)
-        for process in lost:
-            self._errors.update(dict.fromkeys(process.worlds, error))
-        return error
+            with suppress(EOFError, TimeoutError):
+                for process in processes:
+                    process.send(self._count, "stop")
+                for process in processes:
+                    process.receive(self._count, deadline)
+                ended = True
+        finally:  # interrupted once more, too
+            if not ended:
+                for process in processes:
+                    process.kill()
+                self._shut()
 
     def _ask(
         self, ids: Ints, verb: str, argument: int = 0, payload: Any = None
@@ -211,13 +194,11 @@ class PoolWorlds(Worlds):
         errors: dict[int, Exception] = {}
         raised: Exception | None = None
         value: Any = None
-        for answer in answers:
-            if answer:
-                errors |= answer.get("errors", {})
-                raised, value = raised or answer.get("error"), answer.get("value")
-                for kind, text in answer.get("warnings", ()):
-                    self._warn(kind, text)
-        raised = self._find_lost(processes) or raised
+        for answer in filter(None, answers):
+            errors |= answer.get("errors", {})
+            raised, value = raised or answer.get("error"), answer.get("value")
+            for kind, text in answer.get("warnings", ()):
+                self._warn(kind, text)
         if raised:
             self._errors.update(errors)
             raise raised
@@ -228,21 +209,6 @@ class PoolWorlds(Worlds):
         if (kind, text) not in self._warned:
             self._warned.add((kind, text))
             warnings.warn(text, kind, stacklevel=8)
-
-    def _renew(self, ids: Ints) -> None:
-        """Start the processes anew that these worlds were in, if they are lost."""
-        if not any(process.lost for process in self._processes):
-            return
-        for number in np.unique(ids % len(self._processes)).tolist():
-            if self._processes[number].lost:
-                self._processes[number].leave()
-                self._processes[number].wait()
-                self._processes[number] = process = self._process_of(number)
-                try:
-                    self._fill([process])
-                except BaseException:
-                    process.give_up("it was not started")
-                    raise
 
     def _forget(self) -> None:
         """What is derived is another from now on."""
@@ -279,17 +245,14 @@ class PoolWorlds(Worlds):
 
     def _reset(self, ids: Ints, key: int | None) -> None:
         self._forget()
-        self._renew(ids)
         self._ask(ids, "reset", -1 if key is None else key)
 
     def _get_state(self, world: int) -> State:
         return self._ask(self._numbers[world : world + 1], "get_state", world)[1]
 
     def _set_state(self, world: int, state: State) -> None:
-        ids = self._numbers[world : world + 1]
         self._forget()
-        self._renew(ids)
-        self._ask(ids, "set_state", world, state)
+        self._ask(self._numbers[world : world + 1], "set_state", world, state)
 
     def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
         own = self._layouts[world % len(self._processes)]

@@ -130,7 +130,6 @@ def reset(
 
 
 def _reset(worlds: Worlds, ids: Ints, key: int | None) -> None:
-    worlds._check_writable()
     worlds._reset(ids, key)
     if worlds._errors:
         for world in ids.tolist():
@@ -175,7 +174,6 @@ def set_state(worlds: Worlds, world: int, state: State) -> None:
 
 
 def _set_state(worlds: Worlds, world: int, state: State) -> None:
-    worlds._check_writable()
     worlds._set_state(world, state)
     worlds._errors.pop(world, None)
 
@@ -238,7 +236,6 @@ def _run(worlds: Worlds, call: Any, ids: Ints, *args: Any) -> None:
 
 
 def _kept(worlds: Worlds, call: Any, ids: Ints, args: tuple[Any, ...]) -> Mapping[int, Exception]:
-    worlds._check_writable()
     worlds._check_time(ids)
     errors = call(ids, *args)
     if errors:

@@ -46,3 +46,17 @@ def _into(
         return function
 
     return add
+
+
+def wrong_ones(solves: str, solutions: dict[str, tuple[str, Function]]) -> None:
+    """Wrong solutions of a line each, by name: what must be said of it, and the function."""
+    for name, (message, function) in solutions.items():
+        function.__name__ = name
+        wrong(solves, message)(function)
+
+
+def right_ones(solves: str, solutions: dict[str, Function]) -> None:
+    """Right solutions of a line each, by name."""
+    for name, function in solutions.items():
+        function.__name__ = name
+        right(solves)(function)

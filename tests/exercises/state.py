@@ -4,7 +4,7 @@ from __future__ import annotations
 import statemachine as sm
 from statemachine.interface import JointType
 
-from . import right, wrong
+from . import right, wrong, wrong_ones
 
 
 def _slots(model, nq=None, nv=None, starts=None):
@@ -25,106 +25,12 @@ def _time(model, keyframe=0):
     return data.time
 
 
-@wrong(
-    "state", "time after the reset to keyframe 0 should be 6 s, you return 0: that is a new Data"
-)
-def keyframe_forgotten(model):
-    return _slots(model), sm.make_data(model).time
-
-
-@wrong("state", "you return 59.522: that is keyframe 1")
-def the_other_keyframe(model):
-    return _slots(model), _time(model, 1)
-
-
-@wrong("state", "should be 2.5 s, you return 6: that is the course's own scene")
-def time_typed_in(model):
-    return _slots(model), 6.0
-
-
 @wrong("state", "read it right after the reset")
 def time_after_a_step(model):
     data = sm.make_data(model)
     sm.reset(model, data, keyframe=0)
     sm.step(model, data)
     return _slots(model), data.time
-
-
-@wrong("state", "six in qvel, not seven")
-def nv_taken_as_nq(model):
-    return _slots(model, nv=lambda kind: kind.nq), _time(model)
-
-
-@wrong("state", "seven in qpos, not six")
-def nq_taken_as_nv(model):
-    return _slots(model, nq=lambda kind: kind.nv), _time(model)
-
-
-@wrong("state", "a free joint owns more than one number")
-def one_number_a_joint(model):
-    return _slots(model, lambda _: 1, lambda _: 1), _time(model)
-
-
-@wrong("state", "it begins at the joint's number, 1")
-def slices_by_joint_number(model):
-    return _slots(model, starts=lambda joint, _place, _dof: (joint, joint)), _time(model)
-
-
-@wrong("state", "that is where it begins in qpos; see model.jnt_dofadr")
-def qvel_begins_where_qpos_does(model):
-    return _slots(model, starts=lambda _joint, place, _dof: (place, place)), _time(model)
-
-
-@wrong("state", "a slice ends one after the last number")
-def last_number_included(model):
-    return _slots(model, lambda kind: kind.nq - 1, lambda kind: kind.nv - 1), _time(model)
-
-
-@wrong("state", "it returns a str: 'nothing', where shoulder_pan: (slice")
-def not_even_a_pair(model):
-    names = model.joint_names
-    return {names[0]: "nothing"} | dict(list(_slots(model).items())[1:]), _time(model)
-
-
-@wrong("state", "1 of 7 joints are missing: box")
-def hinges_only(model):
-    slots = _slots(model)
-    slots.pop("box")
-    return slots, _time(model)
-
-
-@wrong("state", "no joint is called 'table'")
-def a_joint_too_many(model):
-    return _slots(model) | {"table": (slice(0, 1), slice(0, 1))}, _time(model)
-
-
-@wrong("state", "slots: a dict")
-def a_list_of_slots(model):
-    return list(_slots(model).values()), _time(model)
-
-
-@wrong("state", "a pair of slices is asked for; got a tuple")
-def pairs_of_numbers(model):
-    slots = {
-        name: ((one.start, one.stop), (two.start, two.stop))
-        for name, (one, two) in _slots(model).items()
-    }
-    return slots, _time(model)
-
-
-@wrong("state", "time: a number of seconds is asked for")
-def time_as_text(model):
-    return _slots(model), f"{_time(model)} s"
-
-
-@wrong("state", "should be 2.5 s, you return 2")
-def whole_seconds(model):
-    return _slots(model), int(_time(model))
-
-
-@wrong("state", "it begins at the right place and has 3 numbers, not 7")
-def only_the_place(model):
-    return _slots(model, nq=lambda kind: min(kind.nq, 3)), _time(model)
 
 
 @wrong("state", "not written yet")
@@ -155,3 +61,93 @@ def raw_mujoco(model):
     data = mujoco.MjData(raw)
     mujoco.mj_resetDataKeyframe(raw, data, 0)
     return slots, data.time
+
+
+wrong_ones(
+    "state",
+    {
+        "not_even_a_pair": (
+            "it returns a str: 'nothing', where shoulder_pan: (slice",
+            lambda model: (_slots(model) | {model.joint_names[0]: "nothing"}, _time(model)),
+        ),
+        "hinges_only": (
+            "1 of 7 joints are missing: box",
+            lambda model: ({k: v for k, v in _slots(model).items() if k != "box"}, _time(model)),
+        ),
+        "pairs_of_numbers": (
+            "a pair of slices is asked for; got a tuple",
+            lambda model: (
+                {
+                    name: tuple((part.start, part.stop) for part in pair)
+                    for name, pair in _slots(model).items()
+                },
+                _time(model),
+            ),
+        ),
+        "keyframe_forgotten": (
+            "time after the reset to keyframe 0 should be 6 s, you return 0: that is a new Data",
+            lambda model: (_slots(model), sm.make_data(model).time),
+        ),
+        "the_other_keyframe": (
+            "you return 59.522: that is keyframe 1",
+            lambda model: (_slots(model), _time(model, 1)),
+        ),
+        "time_typed_in": (
+            "should be 2.5 s, you return 6: that is the course's own scene",
+            lambda model: (_slots(model), 6.0),
+        ),
+        "nv_taken_as_nq": (
+            "six in qvel, not seven",
+            lambda model: (_slots(model, nv=lambda kind: kind.nq), _time(model)),
+        ),
+        "nq_taken_as_nv": (
+            "seven in qpos, not six",
+            lambda model: (_slots(model, nq=lambda kind: kind.nv), _time(model)),
+        ),
+        "one_number_a_joint": (
+            "a free joint owns more than one number",
+            lambda model: (_slots(model, lambda _: 1, lambda _: 1), _time(model)),
+        ),
+        "slices_by_joint_number": (
+            "it begins at the joint's number, 1",
+            lambda model: (
+                _slots(model, starts=lambda joint, _place, _dof: (joint, joint)),
+                _time(model),
+            ),
+        ),
+        "qvel_begins_where_qpos_does": (
+            "that is where it begins in qpos; see model.jnt_dofadr",
+            lambda model: (
+                _slots(model, starts=lambda _joint, place, _dof: (place, place)),
+                _time(model),
+            ),
+        ),
+        "last_number_included": (
+            "a slice ends one after the last number",
+            lambda model: (
+                _slots(model, lambda kind: kind.nq - 1, lambda kind: kind.nv - 1),
+                _time(model),
+            ),
+        ),
+        "a_joint_too_many": (
+            "no joint is called 'table'",
+            lambda model: (_slots(model) | {"table": (slice(0, 1), slice(0, 1))}, _time(model)),
+        ),
+        "a_list_of_slots": (
+            "slots: a dict",
+            lambda model: (list(_slots(model).values()), _time(model)),
+        ),
+        "time_as_text": (
+            "time: a number of seconds is asked for",
+            lambda model: (_slots(model), f"{_time(model)} s"),
+        ),
+        "whole_seconds": (
+            "should be 2.5 s, you return 2",
+            lambda model: (_slots(model), int(_time(model))),
+        ),
+        "only_the_place": (
+            "it begins at the right place and has 3 numbers, not 7",
+            lambda model: (_slots(model, nq=lambda kind: min(kind.nq, 3)), _time(model)),
+        ),
+    },
+)

@@ -1,12 +1,12 @@
-"""Two descriptions of a robot, or what two engines make of one, before anything moves.
+"""Two readings of a robot, or what two engines make of one, before anything moves.
 
-`read` makes a description of a file, `compare` says where two of them differ:
+`read` makes a reading of a file, `compare` says where two of them differ, as one list:
 
 - `..description` has the records, the reader of URDF, rigid groups and which joint is which; an
   engine's own is read by its room
-- `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
-  `_joints`, `_solids`, `_shapes`, `_settings`
-- `_one_list`, `_told`: joins that with the list of compiled models that `..why` explains a gap with
+- `ledger`: the list. Every figure has a key, element and quantity
+- `compiled`: what the files differ in as compiled models, by key; `..why` explains a gap with that
+- `diff`: walks two readings and enters their figures; by subject in `places`, `parts`, `figures`
 - `engines`: what engines do of themselves
 """
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,13 +27,13 @@ from ...description.match import renamed
 from ...description.records import Robot
 from ...description.tree import GroupTree
 from ...engines import room, rooms_with
-from ...errors import UnsupportedError, unknown_name
+from ...errors import StateMachineError, UnsupportedError, unknown_name
 from ...installed import DEFAULT
 from ...models import SUFFIXES, resolve
-from ._one_list import one_list
-from .diff import Found, diff, reach_of
+from .compiled import Compiled, compiled, enter_rest
+from .diff import Posed, diff, reach_of
 from .engines import own_ways
-from .ledger import AgreedFigures, Difference, ordered
+from .ledger import AgreedFigures, Difference, Ledger
 
 __all__ = [
     "AgreedFigures",
@@ -66,6 +66,25 @@ class DescribedFile:
     links: int
     joints: int
     shapes: int
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """All that two readings differ and agree in.
+
+    Attributes:
+        differences: The weightiest subjects first, and in each the weightiest difference.
+        agreements: How well the rest agrees.
+        posed: Whether the same positions give the same poses.
+        mass: Of each robot in all [kg], what stands still in the world apart.
+        notes: What a reader should know, in sentences.
+    """
+
+    differences: tuple[Difference, ...]
+    agreements: tuple[AgreedFigures, ...]
+    posed: Posed
+    mass: tuple[float, float]
     notes: tuple[str, ...]
 
 
@@ -170,19 +189,27 @@ def compare(
     """
     robots = [read(m, e, menagerie) for m, e in zip((one, two), engines, strict=True)]
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
-    found = diff(trees[0], trees[1], frames, digits, seed, own_ways(*engines))
-    skipped = list[str]()
-    compiled = all(engine in (None, DEFAULT) for engine in engines)
-    if compiled and any(robot.format != "URDF" for robot in robots):
-        rows, skipped = one_list(
-            found.differences,
-            [resolve(m, menagerie) for m in (one, two)],
-            rename or {},
-            complete=all(robot.format != "URDF" for robot in robots),
-            digits=digits,
-            reach=reach_of(*trees),
-        )
-        found = replace(found, differences=ordered(rows))
+    sides, skipped = Compiled({}, None, complete=False), list[str]()
+    formats = [robot.format for robot in robots]
+    if all(engine in (None, DEFAULT) for engine in engines) and formats != ["URDF"] * 2:
+        files = [resolve(m, menagerie) for m in (one, two)]
+        try:
+            sides = compiled(files, rename or {}, trees[0], complete="URDF" not in formats)
+        except StateMachineError as error:
+            why = str(error).splitlines()[0]
+            skipped.append(f"what only a compiled model tells was not compared: {why}")
+    book = Ledger(digits, sides.differences, sides.complete)
+    posed, notes = diff(book, trees[0], trees[1], frames, seed)
+    skipped += enter_rest(book, sides, robots, reach_of(*trees))
+    for question, left, right in own_ways(*engines):
+        book.differ("engine", "", question, (left, right), share=0.5)
+    found = Found(
+        differences=book.ordered(),
+        agreements=tuple(book.agreements()),
+        posed=posed,
+        mass=(_mass(robots[0]), _mass(robots[1])),
+        notes=tuple(dict.fromkeys(notes)),
+    )
     versions = {
         "statemachine": __version__,
         "numpy": np.__version__,
@@ -192,12 +219,15 @@ def compare(
         if robot.format != "URDF":  # which no engine has read
             engine, _, version = robot.reader.partition(" ")
             versions[engine] = version
-    sides = _side(trees[0]), _side(trees[1])
-    return Compared(sides[0], sides[1], found, digits, versions, tuple(skipped))
+    files = _side(trees[0].robot), _side(robots[1])
+    return Compared(files[0], files[1], found, digits, versions, tuple(skipped))
 
 
-def _side(tree: GroupTree) -> DescribedFile:
-    robot = tree.robot
+def _mass(robot: Robot) -> float:
+    return sum(link.inertial.mass for link in robot.links[robot.rooted :] if link.inertial)
+
+
+def _side(robot: Robot) -> DescribedFile:
     return DescribedFile(
         file=robot.name,
         format=robot.format,

@@ -1,26 +1,26 @@
-"""Every difference between two descriptions, each with its size and what it does."""
+"""Every difference between two readings of a robot, each with its size and what it does."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...description.match import Matching, frame_names, match
 from ...description.tree import Group, GroupTree
-from ...measures.text import few, rounded
+from ...measures.text import rounded
 from ...rotations import HERE
-from . import _joints, _places, _settings, _shapes, _solids
-from .ledger import AgreedFigures, Difference, Ledger, ordered
+from . import figures, parts, places
+from .ledger import Ledger
 
 POSES = 100  # at which the same positions are put into both
 
 
 @dataclass(frozen=True)
 class Posed:
-    """The same joint positions in both descriptions.
+    """The same joint positions in both readings.
 
     Attributes:
         poses: How many, the zero pose among them; seed: of the others.
@@ -37,76 +37,44 @@ class Posed:
     joints: int
 
 
-@dataclass(frozen=True)
-class Found:
-    """All that two descriptions differ and agree in.
-
-    Attributes:
-        differences: The weightiest subjects first, and in each the weightiest difference.
-        agreements: How well the rest agrees.
-        posed: Whether the same positions give the same poses.
-        mass: Of each robot in all [kg], what stands still in the world apart.
-        notes: What a reader should know, in sentences.
-    """
-
-    differences: tuple[Difference, ...]
-    agreements: tuple[AgreedFigures, ...]
-    posed: Posed
-    mass: tuple[float, float]
-    notes: tuple[str, ...]
-
-
 def diff(
+    book: Ledger,
     one: GroupTree,
     two: GroupTree,
     frames: Mapping[str, str] | None = None,
-    digits: int = 6,
     seed: int = 0,
-    ways: Iterable[tuple[str, str, str]] = (),
-) -> Found:
-    """Compare two descriptions.
+) -> tuple[Posed, list[str]]:
+    """Compare two readings.
 
     Args:
-        one: A description, as a tree.
+        book: Where what differs and what agrees is entered.
+        one: A reading, as a tree.
         two: The other.
         frames: Names of frames of `one` that are others in `two`.
-        digits: Figures that agree to so many count as equal.
         seed: Of the poses.
-        ways: What engines do of themselves: a question, and the two answers.
+
+    Returns:
+        Whether the same positions give the same poses; and what a reader should know.
 
     Raises:
         UnknownNameError: A frame that was given is not there.
     """
     named = frame_names(one, two, frames)
-    book, found = Ledger(digits), match(one, two)
+    found = match(one, two)
     reach = reach_of(one, two)
-    notes: list[str] = []
-    _structure(book, one, two, found, notes)
+    notes = [*found.notes(), *_structure(book, one, two, found), *_suggestions(found)]
     for pair in found.pairs:
         above = found.of(pair.one.parent) if pair.one.parent >= 0 and not pair.moved else None
         if pair.by != "root" and above is not None:
-            _places.compare(book, pair, above, one, reach)
-        _solids.compare(book, pair, one, two, reach, notes)
-        _shapes.compare(book, pair, one, two, reach)
+            places.of_joints(book, pair, above, one, reach)
+        notes += parts.of_masses(book, pair, one, two, reach)
+        parts.of_shapes(book, pair, one, two, reach)
         if pair.by != "root":
-            _joints.compare(book, pair, one, two)
-    _joints.compare_loose_drives(book, one, two)
-    _tools(book, found, one, two, named, reach, notes)
-    _settings.compare(book, one, two, notes)
-    for question, a, b in ways:
-        book.differ("engine", "", question, a, b, share=0.5)
-    return Found(
-        differences=ordered(book.differences),
-        agreements=book.agreements(),
-        posed=_posed(found, one, two, seed),
-        mass=(_mass(one), _mass(two)),
-        notes=tuple(dict.fromkeys(notes)),
-    )
-
-
-def _mass(tree: GroupTree) -> float:
-    first = 1 if tree.robot.rooted else 0
-    return sum(link.inertial.mass for link in tree.robot.links[first:] if link.inertial)
+            figures.of_joints(book, pair, one, two)
+    figures.of_loose_drives(book, one, two)
+    notes += places.of_frames(book, found, one, two, named, reach)
+    notes += figures.of_settings(book, one, two)
+    return _posed(found, one, two, seed), notes
 
 
 def reach_of(one: GroupTree, two: GroupTree) -> float:
@@ -122,119 +90,60 @@ def _reach(tree: GroupTree) -> float:
     return max(float(np.linalg.norm(point)) for point in points) or 1.0
 
 
-def _structure(
-    book: Ledger, one: GroupTree, two: GroupTree, found: Matching, notes: list[str]
-) -> None:
-    """Parts that only one has, other parents, and other names."""
-    for k, (only, tree) in enumerate(((found.only_one, one), (found.only_two, two))):
+def _structure(book: Ledger, one: GroupTree, two: GroupTree, found: Matching) -> Iterator[str]:
+    """Parts that only one has, other parents, and other names; what to note of them."""
+    for side, (only, tree) in enumerate(((found.only_one, one), (found.only_two, two))):
         for group in only:
-            if group.parent < 0 and not group.shapes:
+            if group.joint is None and not group.shapes:
                 continue  # the world
-            joint = group.joint
-            kind = f"{joint.kind} joint" if joint else "fixed"
+            name = _label(group)
+            kind = f"{group.joint.kind} joint" if group.joint else "fixed"
             mass = f"carries {rounded(tree.carried(group.number).mass, 'kg')}"
-            name = joint.name if joint else group.name
-            sides = (name, "nothing") if k == 0 else ("nothing", name)
-            book.differ("structure", group.name, kind, sides[0], sides[1], effect=mass)
-    _suggest(found, notes)
+            sides = ("nothing", name) if side else (name, "nothing")
+            keys = [("joint", name, "extra joint")]
+            book.differ("structure", group.name, kind, sides, effect=mass, keys=keys)
     for pair in found.pairs:
         a, b = pair.one, pair.two
         if pair.moved:
-            on = [
-                tree.groups[g.parent].name if g.parent >= 0 else "nothing"
-                for tree, g in ((one, a), (two, b))
-            ]
-            book.differ("structure", _label(a), "hangs on", on[0], on[1])
-        if pair.by == "place" and a.joint and b.joint and a.joint.name != b.joint.name:
-            notes.append(
-                f"joint {a.joint.name!r} of the left is taken for {b.joint.name!r} of the right: "
-                "one kind, one place, one axis (--map LEFT=RIGHT says otherwise)"
-            )
-        kinds = [g.joint.kind if g.joint else "fixed" for g in (a, b)]
+            above = one.groups[a.parent].name, two.groups[b.parent].name
+            keys = [("body", a.name, "parent")]
+            book.differ("structure", _label(a), "hangs on", above, keys=keys)
+        kinds = [group.joint.kind if group.joint else "fixed" for group in (a, b)]
         if pair.by == "root" and "free" in kinds and kinds[0] != kinds[1]:
             words = ["floats" if kind == "free" else "stands" for kind in kinds]
-            told = one.robot.rooted and two.robot.rooted
-            book.differ("structure", a.name, "base", words[0], words[1], matters=told)
+            rooted = one.robot.rooted and two.robot.rooted
+            keys = [("joint", _label(group), "extra joint") for group in (a, b) if group.joint]
+            book.differ("structure", a.name, "base", words, matters=rooted, keys=keys)
         if pair.align is not HERE and pair.by != "root":
             far, turn = pair.align.distance(HERE), pair.align.angle(HERE)
-            notes.append(
+            yield (
                 f"the frame of link {a.name!r} is put elsewhere on the same solid, "
                 f"{rounded(far, 'm')} and {rounded(turn, 'rad')} off: it moves "
                 "alike, and its pose reads otherwise"
             )
-    names = [
-        (p.one.name, p.two.name) for p in found.pairs if p.one.name != p.two.name and p.by != "root"
-    ]
+    pairs = [(pair.one.name, pair.two.name) for pair in found.pairs if pair.by != "root"]
+    names = [f"{a} is {b}" for a, b in pairs if a != b]
     if names:
-        notes.append("links go by other names: " + ", ".join(f"{a} is {b}" for a, b in names))
+        yield f"links go by other names: {', '.join(names)}"
 
 
-def _suggest(found: Matching, notes: list[str]) -> None:
+def _suggestions(found: Matching) -> Iterator[str]:
     """Joints that may be one: of one kind, each the only one left on the same part."""
     for a in found.only_one:
         above = found.of(a.parent)
         ours = [g for g in found.only_one if g.parent == a.parent]
         theirs = [b for b in found.only_two if above and b.parent == above.two.number]
         if len(ours) == len(theirs) == 1 and a.joint and theirs[0].joint:
-            one, two = a.joint, theirs[0].joint
-            if one.kind == two.kind:
-                notes.append(
-                    f"joints {one.name!r} of the left and {two.name!r} of the right hang on the "
-                    f"same part, by other axes: --map {one.name}={two.name} takes them for one"
+            left, right = a.joint, theirs[0].joint
+            if left.kind == right.kind:
+                yield (
+                    f"joints {left.name!r} of the left and {right.name!r} of the right hang on the "
+                    f"same part, by other axes: --map {left.name}={right.name} takes them for one"
                 )
-
-
-def _is_world(tree: GroupTree, name: str) -> bool:
-    return tree.robot.rooted and name == tree.robot.links[0].name
 
 
 def _label(group: Group) -> str:
     return group.joint.name if group.joint else group.name
-
-
-def _tools(
-    book: Ledger,
-    found: Matching,
-    one: GroupTree,
-    two: GroupTree,
-    named: Mapping[str, str],
-    reach: float,
-    notes: list[str],
-) -> None:
-    """Frames that are fixed to a link, in the frame of the second one's rigid part."""
-    tops = {pair.one.name: pair.two.name for pair in found.pairs}
-    for name, other in named.items():
-        (at, place), (there, their) = one.frames[name], two.frames[other]
-        if tops.get(name) == other or _is_world(one, name) or _is_world(two, other):
-            continue  # compared as the frame of its joint
-        pair = found.of(at)
-        label = name if name == other else f"{name}, {other}"
-        if pair is None or pair.two.number != there:
-            on = [tree.groups[number].name for tree, number in ((one, at), (two, there))]
-            if pair is not None or there in {p.two.number for p in found.pairs}:
-                book.differ("tool frame", label, "is fixed to", on[0], on[1])
-            continue
-        ours = pair.align @ place
-        far, turn = ours.distance(their), ours.angle(their)
-        values = (tuple(map(float, ours.pos)), tuple(map(float, their.pos)))
-        if far > 2 * book.tolerance * reach:
-            book.differ("tool frame", label, "origin", *values, "m", far, far / reach)
-        else:
-            book.agree("tool frame", label, far, far / reach, "m")
-        if turn > 4 * book.tolerance * math.pi:
-            book.differ("tool frame", label, "axes", None, None, "rad", turn, turn / math.pi)
-        else:
-            book.agree("tool frame", label, turn, turn / math.pi, "rad")
-    for tree, those, which in (
-        (one, set(named), "left"),
-        (two, set(named.values()), "right"),
-    ):
-        matched = {g.name for p in found.pairs for g in (p.one, p.two)} | {"world"}
-        alone = [name for name in tree.frames if name not in those and name not in matched]
-        if alone:
-            notes.append(
-                f"only the {which} has the frames {few(alone, 8)} (--frame LEFT=RIGHT pairs two)"
-            )
 
 
 def _posed(found: Matching, one: GroupTree, two: GroupTree, seed: int) -> Posed:
@@ -264,6 +173,3 @@ def _posed(found: Matching, one: GroupTree, two: GroupTree, seed: int) -> Posed:
                 worst, link = far, pair.one.name
             angle = max(angle, a.angle(b))
     return Posed(POSES, seed, worst, angle, link, len(ranges))
-
-
-__all__ = ["POSES", "Found", "Posed", "diff", "reach_of"]

@@ -1,14 +1,23 @@
-"""What was found: differences with their sizes, and how well the rest agrees."""
+"""One list of what two readings of a robot differ in, and how well the rest agrees.
+
+Every figure has a key: the kind of its element, the element's name, and what of it, as compiled
+models name them. By its key a figure that a reading tells of is the same as one in the list of two
+compiled models, which `..why` explains a gap with.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypedDict, Unpack
 
 import numpy as np
 
+from ...engines.records import ModelDifference
+
 Value = float | str | tuple[float, ...] | None
+Key = tuple[str, str, str]
 
 # In the order in which a reader wants them where they matter alike.
 SUBJECTS = {
@@ -47,11 +56,11 @@ class Difference:
         size: How far they are apart, in `unit`; None where that is no number.
         share: How much it matters, from 0 to 1; of what, each comparing function says.
         effect: What it does, as far as that was computed.
-        matters: Whether it makes the two descriptions differ; else it is said for the record.
+        matters: Whether it makes the two readings differ; else it is said for the record.
         causes: The differences of the compiled models that it is a figure of, as `why.explain`
-            names them; none where only a description tells of it.
+            names them; none where only a reading tells of it.
         refused: Why the right cannot be brought to the left in it; "" where it can, or where only
-            a description tells of it.
+            a reading tells of it.
     """
 
     subject: str
@@ -87,6 +96,15 @@ class AgreedFigures:
     digits: int
 
 
+class Telling(TypedDict, total=False):
+    """What is said of a difference, beside its figures: as for `Ledger.differ`."""
+
+    share: float
+    effect: str
+    matters: bool
+    keys: Sequence[Key]
+
+
 def digits_of(relative: float) -> int:
     """To how many decimal digits two numbers agree that are apart by this share."""
     if relative <= 0:
@@ -99,102 +117,156 @@ class Ledger:
 
     Args:
         digits: Figures that agree to so many are rounded, not different.
+        compiled: What the compiled models differ in, by key.
+        complete: Whether these are all that can differ. A figure with a key that is not among them
+            then only sums up others, and is left out.
     """
 
-    def __init__(self, digits: int) -> None:
+    def __init__(
+        self, digits: int, compiled: Mapping[Key, Sequence[ModelDifference]], complete: bool
+    ) -> None:
         self.tolerance = 0.5 * 10.0 ** (1 - digits)
         self.differences: list[Difference] = []
-        self._equal: dict[str, list[tuple[float, float, str, str]]] = {}
+        self.entered = set[Key]()
+        self._compiled, self._complete = compiled, complete
+        self._equal: dict[tuple[str, str], list[tuple[float, float, str]]] = {}
 
     def differ(
         self,
         subject: str,
         where: str,
         figure: str,
-        one: Value,
-        two: Value,
+        values: Sequence[Value],
         unit: str = "",
         size: float | None = None,
+        *,
         share: float = 1.0,
         effect: str = "",
         matters: bool = True,
+        keys: Sequence[Key] = (),
     ) -> None:
-        """Enter a difference."""
-        share = 1.0 if math.isnan(share) else min(max(share, 0.0), 1.0)
-        one, two = ("unlimited" if each in (math.inf, -math.inf) else each for each in (one, two))
+        """Enter a difference; in its effect "{share}" is its share."""
+        share = float(matters) * (1.0 if math.isnan(share) else min(max(share, 0.0), 1.0))
+        one, two = ["unlimited" if value in (math.inf, -math.inf) else value for value in values]
+        size = None if size is None or not math.isfinite(size) else size
+        known = [difference for key in keys for difference in self._compiled.get(key, ())]
+        if self._complete and keys and not known and keys[0][0] != "site":  # a link is a frame too
+            return
+        self.entered.update(keys)
+        causes = dict.fromkeys(difference.title for difference in known)
+        refused = next((difference.refused for difference in known if difference.refused), "")
+        effect = effect.format(share=share)
         self.differences.append(
-            Difference(subject, where, figure, one, two, unit, size, share, effect, matters)
+            Difference(
+                *(subject, where, figure, one, two, unit, size, share, effect, matters),
+                causes=tuple(causes),
+                refused=refused,
+            )
         )
 
-    def agree(self, subject: str, where: str, size: float, relative: float, unit: str) -> None:
-        """Enter an agreement."""
-        self._equal.setdefault(subject, []).append((relative, size, unit, where))
-
-    def same(
+    def measure(
         self,
         subject: str,
         where: str,
-        one: float | Sequence[float],
-        two: float | Sequence[float],
+        figure: str,
+        size: float,
         unit: str,
-        scale: float = 0.0,
+        scale: float,
+        values: Sequence[Value] = (None, None),
+        *,
         slack: float = 1.0,
-    ) -> float | None:
-        """Whether two figures agree: None if so, which is entered; else how far apart they are.
+        **more: Unpack[Telling],
+    ) -> None:
+        """Enter how far two things are apart, as a difference or as an agreement.
 
         Args:
             subject: A key of `SUBJECTS`.
-            where: Whose they are.
-            one: A number, or several.
-            two: As many.
-            unit: Theirs.
-            scale: What a difference is set against, if it is more than they are.
+            where: Whose it is.
+            figure: What of it.
+            size: How far.
+            unit: Of size and values.
+            scale: What it is set against.
+            values: The two; None, if they say nothing to a reader.
             slack: How many roundings may have come together.
+            more: As for `differ`.
         """
-        a, b = np.atleast_1d(np.asarray(one, float)), np.atleast_1d(np.asarray(two, float))
-        with np.errstate(invalid="ignore"):
-            apart = np.where(a == b, 0.0, a - b)
-        size = float(np.linalg.norm(apart))
-        most = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)), scale)
-        relative = 0.0 if not size else math.inf if math.isinf(size) or not most else size / most
+        relative = size / scale if scale and math.isfinite(size) else math.inf if size else 0.0
         if relative > self.tolerance * slack:
-            return size
-        self.agree(subject, where, size, relative, unit)
-        return None
+            self.differ(subject, where, figure, values, unit, size, **more)
+        else:
+            self._equal.setdefault((subject, unit), []).append((relative, size, where))
 
-    def agreements(self) -> tuple[AgreedFigures, ...]:
+    def enter(
+        self,
+        subject: str,
+        where: str,
+        figure: str,
+        values: Sequence[Value],
+        unit: str = "",
+        *,
+        scale: float = 0.0,
+        slack: float = 1.0,
+        against: float = 0.0,
+        **more: Unpack[Telling],
+    ) -> None:
+        """Enter a figure of both, None where one does not say.
+
+        Args:
+            subject: A key of `SUBJECTS`.
+            where: Whose it is.
+            figure: What of it.
+            values: Of both, each a number, several, or words.
+            unit: Theirs.
+            scale: What a difference is set against to be rounding, if it is more than they are.
+            slack: How many roundings may have come together.
+            against: What its share is of; 0: of the larger one.
+            more: As for `differ`.
+        """
+        said = [value for value in values if value is not None]
+        if len(said) < 2:
+            if any(said):  # what is not said is no zero, but nothing lacks where the other has none
+                size = abs(said[0]) if isinstance(said[0], float | int) else None
+                more.setdefault("share", size / against if size and against else 1.0)
+                self.differ(subject, where, figure, values, unit, size, **more)
+            return
+        arrays = [np.atleast_1d(np.asarray(value)) for value in said]
+        if arrays[0].dtype.kind == "U" or arrays[0].shape != arrays[1].shape:
+            same = said[0] == said[1]
+            self.measure(subject, where, figure, 0.0 if same else math.inf, "", 0.0, values, **more)
+            return
+        with np.errstate(invalid="ignore"):
+            apart = np.where(arrays[0] == arrays[1], 0.0, arrays[0] - arrays[1])
+        size = float(np.abs(apart).max() if apart.size == 2 else np.linalg.norm(apart))
+        most = max(float(np.linalg.norm(array)) for array in arrays)
+        usual = max(float(np.ptp(array)) for array in arrays) if apart.size == 2 else most
+        more.setdefault("share", size / (against or usual) if 0 < most < math.inf else 1.0)
+        scale = max(most, scale)
+        self.measure(subject, where, figure, size, unit, scale, values, slack=slack, **more)
+
+    def agreements(self) -> Iterator[AgreedFigures]:
         """How well the rest agrees, by subject and unit."""
-        found = []
-        for subject in SUBJECTS:
-            by_unit: dict[str, list[tuple[float, float, str, str]]] = {}
-            for each in self._equal.get(subject, []):
-                by_unit.setdefault(each[2], []).append(each)
-            for unit, entries in by_unit.items():
-                relative = max(each[0] for each in entries)
-                worst = max(entries, key=lambda each: each[1])
-                found.append(
-                    AgreedFigures(
-                        subject, len(entries), worst[1], unit, worst[3], digits_of(relative)
-                    )
-                )
-        return tuple(found)
+        places = {subject: k for k, subject in enumerate(SUBJECTS)}
+        for (subject, unit), entries in sorted(
+            self._equal.items(), key=lambda item: places[item[0][0]]
+        ):
+            relative = max(entry[0] for entry in entries)
+            _, size, where = max(entries, key=lambda entry: entry[1])
+            yield AgreedFigures(subject, len(entries), size, unit, where, digits_of(relative))
 
-
-def ordered(differences: Sequence[Difference]) -> tuple[Difference, ...]:
-    """The differences, by subject; the subject with the weightiest one first."""
-    weight: dict[str, float] = {}
-    for each in differences:
-        matter = each.share + each.matters
-        weight[each.subject] = max(weight.get(each.subject, -1.0), matter)
-    places = {subject: k for k, subject in enumerate(SUBJECTS)}
-    return tuple(
-        sorted(
-            differences,
-            key=lambda d: (
-                -round(weight[d.subject], 3),
-                places[d.subject],
-                not d.matters,
-                -round(d.share, 6),
-            ),
+    def ordered(self) -> tuple[Difference, ...]:
+        """The differences, by subject; the subject with the weightiest one first."""
+        weight: dict[str, float] = {}
+        for row in self.differences:
+            weight[row.subject] = max(weight.get(row.subject, -1.0), row.share + row.matters)
+        places = {subject: k for k, subject in enumerate(SUBJECTS)}
+        return tuple(
+            sorted(
+                self.differences,
+                key=lambda row: (
+                    -round(weight[row.subject], 3),
+                    places[row.subject],
+                    not row.matters,
+                    -round(row.share, 6),
+                ),
+            )
         )
-    )

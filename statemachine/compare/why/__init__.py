@@ -1,23 +1,25 @@
-"""Why two simulations differ: of two files `explain`, of two engines `attribute`."""
+"""Why two sides differ: one explanation for files, engines and settings.
+
+- `explain`: the question, and its answer as a record
+- `causes`: what differs; `settings`: what an engine as it comes sets, and what can be left out
+- `trials`: the runs, each made once; `gap`: what they are measured by
+- `shapley`: shares of a gap among causes; `locate`: where the rest comes from
+- `places`: the line of the file that says what a cause is of
+"""
 
 from __future__ import annotations
 
-from .attribute import attribute
-from .explain import CauseShare, Explanation, explain
-from .factors import FACTORS, Factor
-from .results import UNEXPLAINED, Attribution, FactorTrial, FirstTouch
+from .explain import UNEXPLAINED, CauseShare, Explanation, explain
+from .locate import Located
 from .shapley import ADDS_UP
+from .touches import FirstTouch
 
 __all__ = [
     "ADDS_UP",
-    "FACTORS",
     "UNEXPLAINED",
-    "Attribution",
     "CauseShare",
     "Explanation",
-    "Factor",
-    "FactorTrial",
     "FirstTouch",
-    "attribute",
+    "Located",
     "explain",
 ]

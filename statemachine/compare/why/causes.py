@@ -1,4 +1,4 @@
-"""What two Models of any files differ in, as causes that can be brought to the same one by one."""
+"""What two sides differ in, as causes that can be brought to the same one by one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from ...installed import DEFAULT
 from ...interface import Model
 from ..matching import Matched
 
-_MOST = 24  # causes, before those of one element, then those of one kind, are taken together
+_MOST = 24  # causes, before all of one quantity are taken together
+_NAMED = 3  # elements of one cause, before they are counted
+_PLURALS = {"body": "bodies", "equality": "equalities", "flex": "flexes"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,13 +29,18 @@ class Cause:
     differences: tuple[ModelDifference, ...]
 
     @property
+    def kind(self) -> str:
+        """Of the elements: "body", "joint", "option", "run", "engine", …"""
+        return self.differences[0].kind
+
+    @property
     def refused(self) -> str:
         """Why it cannot be brought to the same; "" if it can."""
         return next((each.refused for each in self.differences if each.refused), "")
 
     def edits(self, side: int) -> tuple[Edit, ...]:
         """What is done to the first (0) or the second (1) compiled model."""
-        sides = [each.edits_one if side == 0 else each.edits for each in self.differences]
+        sides = [each.edits if side else each.edits_one for each in self.differences]
         return tuple(edit for edits in sides for edit in edits)
 
 
@@ -56,17 +63,17 @@ def differences_of(
         sensors: Whether sensors count, which act on nothing but a controller that reads them.
     """
     own = room(DEFAULT)
-    found = list(own.differences(one.compiled, two.compiled, matched, world=world))
+    rows = list(own.differences(one.compiled, two.compiled, matched, world=world))
     if sensors:
-        found += sensors_of(matched)
+        rows += sensors_of(matched)
     if finer:
-        found = [part for each in found for part in own.entries(two.compiled, each)]
+        rows = [part for row in rows for part in own.entries(two.compiled, row)]
     for side, only in enumerate(matched.only):
         for name in only.get("joint", ()):
             values = (("joint", "there", None) if side == 0 else ("joint", None, "there"),)
             why = "a joint cannot be added or taken away"
-            found.append(ModelDifference("extra joint", "joint", name, values, refused=why))
-    return tuple(found)
+            rows.append(ModelDifference("extra joint", "joint", name, values, refused=why))
+    return tuple(rows)
 
 
 def sensors_of(matched: Matched) -> list[ModelDifference]:
@@ -86,33 +93,48 @@ def built(model: Model, edits: tuple[Edit, ...]) -> Model:
 
 
 def causes(differences: Iterable[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:
-    """Differences as causes: each by itself, unless there are too many.
+    """Differences as causes: what was changed alike in several elements is one.
+
+    A changed default of a file's class is such a change. Where there are more than 24 causes, all
+    of one quantity are one.
 
     Args:
         differences: In their order.
         finer: Each by itself, however many there are.
     """
-    found = list(differences)
-    able = [each for each in found if not each.refused]
-    # By themselves, those of one element, those of one kind.
-    ways: list[Callable[[ModelDifference], str]] = [
-        lambda each: each.title,
-        lambda each: f"{each.kind} {each.where}" if each.where else each.title,
-        lambda each: f"{each.subject}, of each {each.kind}" if each.where else each.title,
-    ]
-    grouped = _grouped(able, ways[0])
-    for way in ways[1:]:
-        if finer or len(grouped) <= _MOST:
-            break
-        grouped = _grouped(able, way)
-    refused = _grouped([each for each in found if each.refused], ways[0])
+    rows = list(differences)
+    able = [row for row in rows if not row.refused]
+    refused = _grouped([row for row in rows if row.refused], lambda row: row.title)
+    if finer:
+        return (*_grouped(able, lambda row: row.title), *refused)
+    grouped = _grouped(able, _change)
+    if len(grouped) > _MOST:
+        grouped = _grouped(able, lambda row: (row.kind, row.subject))
     return (*grouped, *refused)
 
 
+def _change(row: ModelDifference) -> object:
+    """What is equal for two differences that are the same change of different elements."""
+    if row.subject == "extra actuator":  # a file without motors is one difference
+        return row.subject, repr(row.values)
+    whole = not row.where or row.subject.startswith("extra ")
+    return row.title if whole else (row.kind, row.subject, repr(row.values))
+
+
 def _grouped(
-    differences: Iterable[ModelDifference], key: Callable[[ModelDifference], str]
+    differences: Iterable[ModelDifference], key: Callable[[ModelDifference], object]
 ) -> tuple[Cause, ...]:
-    groups: dict[str, list[ModelDifference]] = {}
-    for each in differences:
-        groups.setdefault(key(each), []).append(each)
-    return tuple(Cause(name, tuple(those)) for name, those in groups.items())
+    groups: dict[object, list[ModelDifference]] = {}
+    for row in differences:
+        groups.setdefault(key(row), []).append(row)
+    return tuple(Cause(_name(rows), tuple(rows)) for rows in groups.values())
+
+
+def _name(rows: list[ModelDifference]) -> str:
+    """What a cause is, and of what: of up to three elements by name."""
+    first, places = rows[0], list(dict.fromkeys(row.where for row in rows))
+    if len(places) == 1:
+        return first.title
+    if len(places) <= _NAMED:
+        return f"{first.subject} of {', '.join(places)}"
+    return f"{first.subject} of {len(places)} {_PLURALS.get(first.kind, f'{first.kind}s')}"

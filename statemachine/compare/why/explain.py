@@ -3,31 +3,35 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...errors import BadInputError, EndedEarlyError, unknown_name
-from ...interface import Model
+from ...interface import JointType, Model
 from ...measures import Deviation
-from ...runs.drive import Progress, part_of, silent
+from ...runs import Trace
+from ...runs.drive import Progress, silent
 from ...runs.provenance import Provenance, provenance
+from ...runs.robot import moved_by_actuators
 from ...runs.scenarios import Scenario
 from ..labels import files_apart
-from ..matching import match_models
+from ..matching import match_alike, match_models, missing_parts
 from ..perturbed import EXACT, Uncertainty
-from .between_engines import (
-    gap_of_files,
-    is_as_it_comes,
-    on_both_engines,
-    parts_of,
-    run_alike,
-)
-from .causes import Cause, causes, differences_of
-from .results import ROUNDING, UNEXPLAINED, Attribution, bounds_of, telling
+from .causes import Cause, causes
+from .locate import Located, locate
+from .places import Place, places_of
 from .shapley import Method, Shares, shapley
+from .touches import FirstTouch, touched_at_start
 from .trials import Measure, Trials
 
-__all__ = ["CauseShare", "Explanation", "explain"]
+# What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
+# 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
+ROUNDING = {"rad": 1e-8, "m": 1e-9}
+UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
+_STILL = 1e-3  # [rad or m] over a whole run
+NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
 
 
 @dataclass(frozen=True)
@@ -36,14 +40,16 @@ class CauseShare:
 
     Attributes:
         name: What it is, and of what.
-        kind: Of the elements: "body", "joint", "option", "run", …
+        kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
+            start, "engine" of a setting of an engine as it comes.
         values: Each figure that differs: its name, the left's value, the right's.
         unit: Of the first figure.
-        share: Its part of the gap (Shapley value); may be below zero; None where it cannot be
-            brought to the same, or no set of causes with it could be run.
+        share: Its part of the gap (Shapley value); below zero where it hides others; None where it
+            cannot be brought to the same, or no set of causes with it could be run.
         error: Standard error of the share; 0 where it is no estimate.
         alone: The part that it takes away as the only one; last: after all others.
         note: Why there is no share, or what else is to be said.
+        place: Where the right's file says it; None where that was not found.
     """
 
     name: str
@@ -55,6 +61,7 @@ class CauseShare:
     alone: float | None
     last: float | None
     note: str = ""
+    place: Place | None = None
 
 
 @dataclass(frozen=True)
@@ -68,10 +75,11 @@ class Explanation:
         measure: Which figure of it: the worst at any moment, that of the end, or the rms.
         first: The gap in each quantity, as they come.
         gap: The one that is explained, in `unit`.
-        shares: The causes in the files, options and commands, the largest share first.
+        shares: The causes in files, options, commands and settings of an engine, the largest share
+            first. The shares add up to `explained`.
         method: How the shares were computed; orders: how many orders were drawn for it.
         brought: The gap with all of them brought to the same; None if that could not be run.
-        engines: What becomes of the gap that two engines have left then; None on one engine.
+        found_in: What the rest is found in by leaving features out on both sides.
         explained: The part of the gap that goes where settings are brought to the same.
         located: The part that goes only where something is left out on both sides: it says
             where the rest comes from, not why.
@@ -79,10 +87,15 @@ class Explanation:
         negligible: Gaps below this are taken for rounding, in `unit`.
         floor: The chaos floor, in `unit`: how far the left side is from itself, started and
             commanded anew with rounding, and with what is not known of the start.
+        redundant: Causes of which either one alone closes the gap, and the last of them nothing.
         impossible: Sets of causes that could not be run.
         unmatched: What only one side has: joints, actuators, by side.
+        missing: What one side has nothing of, and the other has: see `missing_parts`.
         notes: What a reader should know, in sentences.
-        moments: How many moments the runs are compared at.
+        still: Joints with a difference that the left hardly moves: it cannot show.
+        touch: The first contact; None without one.
+        moments: How many moments the runs are compared at; between: whether rows had to be
+            interpolated there.
         runs: How many runs it took; took: by the clock [s].
     """
 
@@ -100,29 +113,40 @@ class Explanation:
     method: Method
     orders: int
     brought: float | None
-    engines: Attribution | None
+    found_in: tuple[Located, ...]
     explained: float
     located: float
     unexplained: float
     negligible: float
     floor: float
+    redundant: tuple[str, ...]
     impossible: tuple[tuple[str, ...], ...]
     unmatched: tuple[Mapping[str, tuple[str, ...]], Mapping[str, tuple[str, ...]]]
+    missing: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
+    still: tuple[str, ...]
+    touch: FirstTouch | None
     moments: int
+    between: bool
     runs: int
     took: float
     provenance: tuple[Provenance, Provenance]
 
     @property
     def is_rounding(self) -> bool:
-        """Whether there is no gap to explain: it is rounding, or inside the chaos floor."""
-        return self.gap <= max(self.negligible, self.floor)
+        """Whether there is no gap to explain: it is rounding, or chaos is most of it."""
+        return self.gap <= max(self.negligible, self.floor / NOISY)
 
     @property
     def is_explained(self) -> bool:
-        """Whether no more than a twentieth of the gap stays unexplained."""
-        return self.is_rounding or self.unexplained <= UNEXPLAINED
+        """Whether no more than a twentieth of the gap stays unexplained.
+
+        Where something differs that cannot be brought to the same, what is only located may come
+        from that, and counts as unexplained.
+        """
+        differs = any(row.note for row in self.shares)
+        stays = 1.0 - self.explained if differs else self.unexplained
+        return self.is_rounding or abs(stays) <= UNEXPLAINED
 
 
 def explain(
@@ -130,6 +154,7 @@ def explain(
     two: Model,
     scenario: Scenario,
     *,
+    recordings: Sequence[Trace] = (),
     seconds: float | None = None,
     seed: int = 0,
     names: Mapping[str, str] | None = None,
@@ -144,17 +169,24 @@ def explain(
 ) -> Explanation:
     """Bring what two sides differ in to the same, one by one, and run both again.
 
+    What stays is looked for by leaving out, on both sides, what no setting holds.
+
     Args:
         one: The left side, as loaded; the other is brought to it.
-        two: The right side, of any file and engine.
+        two: The right side, of any file and engine. Where one side comes with the settings of its
+            engine and the other does not, each of them is a cause.
         scenario: What is run.
+        recordings: Runs with the start and the commands of the left and of the right instead of the
+            scenario's; of one alone both are given those.
         seconds: Simulated time; None for the scenario's own.
         seed: Of what the scenario draws, and of the orders that are drawn.
         names: Joints, bodies, sites and actuators of `one` that go by other names in `two`.
-        quantity: What the gap is measured in; None for the first that differs.
+        quantity: What the gap is measured in; None for what is in the hand from the start, or else
+            the joints, where that differs, and for what differs most where it does not.
         measure: Which figure of it.
         finer: Every difference by its single entries, however many there are.
-        budget: How many sets of causes may be run, as far as orders are drawn.
+        budget: How many sets of causes may be run: all of them where there are no more, else as
+            far as orders are drawn.
         labels: What the sides are called.
         uncertain: What is not known of the start, for the chaos floor; None for no floor.
         jobs: How many processes make the runs; None for one a processor where that pays, and
@@ -167,29 +199,22 @@ def explain(
         BadInputError: Nothing can be measured, or `jobs` is less than 1.
         UnknownNameError: There is no such quantity, or name.
     """
-    began, scenario, called = time.perf_counter(), scenario.on(one), labels or _labels(one, two)
-    options = dict(scenario.options)
-    models = [model.replace(**options) if options else model for model in (one, two)]
-    matched = match_models(models[0], models[1], names)
-    known = _Known(progress, budget)
-    trials = Trials(
-        models[0],
-        models[1],
-        matched,
-        scenario,
-        scenario.seconds if seconds is None else seconds,
-        seed,
-        known.one_more,
-        jobs,
-    )
+    began, called = time.perf_counter(), labels or _labels(one, two)
+    scenario = scenario if recordings else scenario.on(one)
+    told = one.compiled is not None and two.compiled is not None
+    matched = match_models(one, two, names) if told else match_alike(one, two)
+    counter = _Counter(progress, budget)
+    length = scenario.seconds if seconds is None else seconds
+    trials = Trials((one, two), matched, scenario, recordings, length, seed, counter.one_more, jobs)
     units = trials.ruler.units
     if quantity is not None and quantity not in units:
         raise unknown_name("quantity", quantity, units)
-    first = trials.gaps(())
+    listed = causes(trials.differences(finer), finer)
+    trials.know(listed)
+    able = [cause.name for cause in listed if not cause.refused]
+    first = trials.gaps(frozenset())
     if not first:
-        raise EndedEarlyError(
-            f"as they come, a side does not reach the end: {trials.ended}", ended=trials.ended
-        )
+        raise _ended(trials, able)
     if scenario.own and not trials.repeats():
         raise BadInputError(
             f"two runs of {called[0]} from the same start differ: "
@@ -197,48 +222,40 @@ def explain(
             "what it draws a seed, and let it keep nothing from one run to the next"
         )
     perturbed = {} if uncertain is None else trials.floor(uncertain)
-    floors = {name: _figure(each, measure) for name, each in perturbed.items()}
-    bounds = bounds_of(units, floors)
+    floors = {name: getattr(gap, measure) for name, gap in perturbed.items()}
     if quantity is None:
-        gaps = {name: _figure(each, measure) for name, each in first.items()}
-        tolerances = {name: trials.ruler.tolerance(name) for name in units}
-        quantity = telling(gaps, bounds, next(iter(units)), tolerances)
-    gap = _figure(first[quantity], measure)
-    nothing = gap <= bounds[quantity]
-    world = not any(is_as_it_comes(model) for model in models)
-    differences = (
-        *differences_of(
-            models[0], models[1], matched, world, finer, sensors=scenario.own and not nothing
-        ),
-        *trials.of_the_run(),
-    )
-    listed = causes(differences, finer)
-    trials.know(listed)
-    able = [cause.name for cause in listed if not cause.refused]
+        quantity = _quantity(trials, first, floors, measure, one)
+    gap, floor = getattr(first[quantity], measure), floors.get(quantity, 0.0)
+    bound = max(ROUNDING[units[quantity]], floor)
+    nothing = gap <= max(ROUNDING[units[quantity]], floor / NOISY)
+    if nothing:
+        listed = tuple(cause for cause in listed if cause.kind != "sensor")
 
     def value(brought: frozenset[str]) -> float | None:
         gaps = trials.gaps(brought)
-        return _figure(gaps[quantity], measure) if gaps else None
+        return getattr(gaps[quantity], measure) if gaps else None
 
-    known.expected = 3 * len(able) + 2
-    found = shapley(
-        [] if nothing else able, value, gap or 1.0, budget=budget, seed=seed, ahead=trials.ahead
+    counter.expected = 3 * len(able) + 20
+    divided = shapley(
+        [] if nothing else able,
+        value,
+        gap or 1.0,
+        budget=budget,
+        seed=seed,
+        ahead=trials.ahead,
+        needs=trials.needs,
     )
     brought = gap if nothing else value(frozenset(able))
-    engines, apart = None, 0.0
-    if not nothing and not run_alike(*models):
-        engines = on_both_engines(models, scenario, trials, quantity, known.rest())
-        if any(cause.refused for cause in listed):
-            between = gap_of_files(models, trials, frozenset(able))
-            apart = _figure(between[quantity], measure) if between else gap
-    parts = parts_of(gap, brought, engines, apart) if not nothing else (0.0, 0.0, 0.0)
-    shares = [_share(cause, found) for cause in listed]
-    shares.sort(key=lambda each: -abs(each.share or 0.0))
+    rest: tuple[Located, ...] = ()
+    if not nothing and brought is not None:
+        rest = locate(trials, frozenset(able), quantity, measure, gap, brought, bound)
+    shares = _shares(listed, divided, rest, two, nothing)
+    explained, located, unexplained = _parts(gap, brought, rest, nothing)
     progress(1.0)
     return Explanation(
         experiment=scenario.name,
         says=scenario.says,
-        seconds=trials.seconds,
+        seconds=length,
         one=called[0],
         two=called[1],
         quantity=quantity,
@@ -246,27 +263,32 @@ def explain(
         measure=measure,
         first=first,
         gap=gap,
-        shares=tuple(shares),
-        method=found.method,
-        orders=found.orders,
+        shares=shares,
+        method=divided.method,
+        orders=divided.orders,
         brought=brought,
-        engines=engines,
-        explained=parts[0],
-        located=parts[1],
-        unexplained=parts[2],
+        found_in=tuple(part for part in rest if not part.is_setting),
+        explained=explained,
+        located=located,
+        unexplained=unexplained,
         negligible=ROUNDING[units[quantity]],
-        floor=floors.get(quantity, 0.0),
-        impossible=found.impossible,
+        floor=floor,
+        redundant=_redundant(shares, explained),
+        impossible=divided.impossible,
         unmatched=matched.only,
+        missing=missing_parts(one, two),
         notes=(*matched.notes, *trials.notes()),
+        still=_still(listed, one, trials.traces[0]),
+        touch=None if nothing else trials.touch(quantity),
         moments=len(trials.ruler.time),
-        runs=trials.count + (engines.runs if engines else 0),
+        between=trials.ruler.between,
+        runs=trials.count,
         took=time.perf_counter() - began,
-        provenance=(provenance(models[0]), provenance(models[1])),
+        provenance=(provenance(one), provenance(two)),
     )
 
 
-class _Known:
+class _Counter:
     """How many runs there were, of about how many."""
 
     def __init__(self, progress: Progress, budget: int) -> None:
@@ -277,33 +299,128 @@ class _Known:
         self.count += 1
         if self.count >= self.expected:  # orders are drawn
             self.expected = self.count + self._budget // 4
-        self._progress(0.9 * self.count / self.expected)
-
-    def rest(self) -> Callable[[float], None]:
-        """The progress of what is run at the end."""
-        return part_of(self._progress, 0.9, 0.09)
+        self._progress(0.99 * self.count / self.expected)
 
 
-def _share(cause: Cause, found: Shares) -> CauseShare:
-    values = tuple(value for each in cause.differences for value in each.values)
-    first, note = cause.differences[0], cause.refused
-    if not note and cause.name in found.share and found.share[cause.name] is None:
-        note = "no set of causes with it could be run"
-    return CauseShare(
-        name=cause.name,
-        kind=first.kind,
-        values=values,
-        unit=first.unit,
-        share=found.share.get(cause.name),
-        error=found.error.get(cause.name, 0.0),
-        alone=found.alone.get(cause.name),
-        last=found.last.get(cause.name),
-        note=note,
+def _ended(trials: Trials, able: list[str]) -> EndedEarlyError:
+    """That a side does not reach the end, and by which causes alone it would."""
+    reason = trials.ended
+    cures = [name for name in able if trials.gaps(frozenset({name}))]
+    text = f"as they come, a side does not reach the end: {reason}"
+    if cures:
+        text += f"; both reach it if one of these is brought to the same: {', '.join(cures)}"
+    return EndedEarlyError(text, ended=reason)
+
+
+def _quantity(
+    trials: Trials,
+    first: Mapping[str, Deviation],
+    floors: Mapping[str, float],
+    measure: Measure,
+    model: Model,
+) -> str:
+    """The quantity that a gap is explained in.
+
+    It is the one that the experiment is about where that is beyond its tolerance, or where none is.
+    Else it is the one that is farthest beyond, among those that are more than rounding and chaos
+    make of a run.
+    """
+    ruler = trials.ruler
+    robot = frozenset(model.body_names[body] for body in moved_by_actuators(model))
+    preferred = ruler.held(touched_at_start(trials.traces[0], robot))
+    beyond = {
+        name: getattr(gap, measure) / ruler.tolerance(name)
+        for name, gap in first.items()
+        if getattr(gap, measure) > max(ROUNDING[ruler.units[name]], floors.get(name, 0.0))
+    }
+    most = max(beyond, key=beyond.__getitem__, default=preferred)
+    if preferred in beyond and (beyond[preferred] > 1 or beyond[most] <= 1):
+        return preferred
+    return most
+
+
+def _shares(
+    listed: tuple[Cause, ...],
+    divided: Shares,
+    rest: tuple[Located, ...],
+    right: Model,
+    nothing: bool,
+) -> tuple[CauseShare, ...]:
+    """The causes, the largest share first; of what was found by a setting of one side, too."""
+    places = {} if nothing else places_of(right.path, listed)
+    rows = []
+    for cause in listed:
+        note = cause.refused
+        if not note and divided.share.get(cause.name, 0.0) is None:
+            note = "no set of causes with it could be run"
+        rows.append(
+            CauseShare(
+                name=cause.name,
+                kind=cause.kind,
+                values=tuple(value for row in cause.differences for value in row.values),
+                unit=cause.differences[0].unit,
+                share=divided.share.get(cause.name),
+                error=divided.error.get(cause.name, 0.0),
+                alone=divided.alone.get(cause.name),
+                last=divided.last.get(cause.name),
+                note=note,
+                place=places.get(cause.name),
+            )
+        )
+    rows += [
+        CauseShare(
+            name=part.name,
+            kind="option",
+            values=((part.name, *part.values),) if part.values else (),
+            unit="",
+            share=part.share,
+            error=0.0,
+            alone=None,
+            last=part.share,
+        )
+        for part in rest
+        if part.is_setting
+    ]
+    return tuple(sorted(rows, key=lambda row: -abs(row.share or 0.0)))
+
+
+def _parts(
+    gap: float, brought: float | None, rest: tuple[Located, ...], nothing: bool
+) -> tuple[float, float, float]:
+    """What is explained, located and unexplained, as parts of the gap."""
+    if nothing:
+        return 0.0, 0.0, 0.0
+    if brought is None:
+        return 0.0, 0.0, 1.0
+    explained = (gap - brought) / gap + sum(part.share for part in rest if part.is_setting)
+    located = sum(part.share for part in rest if not part.is_setting)
+    return explained, located, (rest[-1].gap if rest else brought) / gap
+
+
+def _still(listed: tuple[Cause, ...], model: Model, trace: Trace) -> tuple[str, ...]:
+    """Joints of some causes, hinges and slides, that hardly move in a run."""
+    names = {row.where for cause in listed if cause.kind == "joint" for row in cause.differences}
+    scalar = (JointType.HINGE, JointType.SLIDE)
+    return tuple(
+        name
+        for name, kind, place in zip(
+            model.joint_names, model.jnt_type, model.jnt_qposadr, strict=True
+        )
+        if name in names and kind in scalar and np.ptp(trace.qpos[:, place]) < _STILL
     )
 
 
-def _figure(gap: Deviation, measure: Measure) -> float:
-    return {"worst": gap.worst, "end": gap.end, "rms": gap.rms}[measure]
+def _redundant(shares: tuple[CauseShare, ...], explained: float) -> tuple[str, ...]:
+    """Causes each of which explains nearly all alone, and next to nothing after the others."""
+    names = [
+        row.name
+        for row in shares
+        if row.alone is not None
+        and row.last is not None
+        and row.alone > 1.0 - UNEXPLAINED
+        and abs(row.last) < UNEXPLAINED
+    ]
+    return tuple(names) if len(names) > 1 and explained > UNEXPLAINED else ()
 
 
 def _labels(one: Model, two: Model) -> tuple[str, str]:
@@ -311,6 +428,7 @@ def _labels(one: Model, two: Model) -> tuple[str, str]:
     files = files_apart(one.path.parts, two.path.parts)
     labels = [
         f"{file} on {model.backend} {model.engine_version}"
+        + (", engine defaults" if getattr(model, "defaults", "model") == "engine" else "")
         for file, model in zip(files, (one, two), strict=True)
     ]
     return labels[0], labels[1]

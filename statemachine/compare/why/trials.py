@@ -10,31 +10,59 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ...backends import load
-from ...engines.records import Edit, ModelDifference
+from ...engines import room
+from ...engines.records import ModelDifference
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
-from ...interface import Array, Model
+from ...interface import Model
 from ...measures import Deviation
 from ...processes import checked_jobs
+from ...processes.forks import forks_for, in_forks
 from ...runs import Trace
+from ...runs.recorder import commands_of
 from ...runs.scenarios import Controller, Scenario
-from ..alike import beginning_with, retold
-from ..forks import forks_for, in_forks
-from ..matching import Matched, start_of
+from ..alike import beginning_with, commands_alike, retold, translated
+from ..matching import Matched, SideStart, start_of
 from ..perturbed import RUNS, Rerun, Uncertainty, perturbed_run
-from .causes import Cause, built
+from .causes import Cause, built, differences_of
 from .gap import Curves, Ruler
+from .of_the_run import COMMANDS, ORDER, START, of_the_run, order_of_ctrl, order_of_joints
+from .settings import NEEDS, TITLES, Feature, OwnSettings, leave_out
+from .touches import FirstTouch, first_touch
 
 Measure = Literal["worst", "end", "rms"]
-_Run = tuple[int, frozenset[str]]  # a side, and the causes that change it
-START, ORDER = "start", "order of ctrl"
-_SAME = 1e-12
+# What the right is given of the left by `Model.replace`, by the name of its cause: the timestep,
+# which a compiled model has no substeps of, and all that is known where there is none.
+BY_OPTION = {
+    "timestep": {"timestep": "timestep", "substeps": "substeps"},
+    "gravity": {"gravity": "gravity"},
+    "armature": {"armature": "dof_armature"},
+    "damping": {"damping": "dof_damping"},
+    "dry friction": {"frictionloss": "dof_frictionloss"},
+}
 _LOST = "its process ended before it was done, twice"
+_NONE = frozenset[str]()
+
+
+class _Run(NamedTuple):
+    """What makes one run.
+
+    Attributes:
+        side: 0 or 1.
+        brought: Names of the causes that are brought to the same, as far as they change it.
+        without: Names of the features that are left out.
+        integrator: Another one than the file's; "" for that.
+    """
+
+    side: int
+    brought: frozenset[str]
+    without: frozenset[str] = _NONE
+    integrator: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +84,21 @@ class Trials:
     """Two sides, and what becomes of the gap between them.
 
     Args:
-        one: The Model that the other is brought to; with the options of the scenario.
-        two: The other.
+        models: Both as loaded; the second is brought to the first.
         matched: What of one is what of the other.
-        scenario: What is run, as it is on `one`.
+        scenario: What is run, as it is on the first.
+        recordings: Of the left, and of the right or none: whose start and commands are taken.
         seconds: Simulated time.
         seed: Of what the scenario draws.
         ran: Called after each run.
         jobs: How many runs are made at once; None for one a processor where that pays,
             and for one where a function of the user's commands.
+
+    Attributes:
+        traces: Both runs as they come, with what the engines derive.
+        ruler: What all runs are measured by.
+        count: How many runs were made.
+        ended: Why the last run that did not stand did not.
 
     Raises:
         BadInputError: `jobs` is less than 1.
@@ -72,16 +106,19 @@ class Trials:
 
     def __init__(
         self,
-        one: Model,
-        two: Model,
+        models: tuple[Model, Model],
         matched: Matched,
         scenario: Scenario,
+        recordings: Sequence[Trace],
         seconds: float,
         seed: int,
         ran: Callable[[], None],
         jobs: int | None = None,
     ) -> None:
         checked_jobs(jobs)  # refuses what is no number of them
+        options = dict(scenario.options)
+        self._own = _own_settings(models, options)
+        one, two = (model.replace(**options) if options else model for model in models)
         self._models, self._matched, self._jobs = (one, two), matched, jobs
         self.seconds, self.seed, self._ran = seconds, seed, ran
         self._scenario = scenario
@@ -91,192 +128,232 @@ class Trials:
         self._keyframes = key, key if known else None
         right = start_of(two, self._keyframes[1])
         self._starts = left, right if known else matched.start(left, right)
+        self._recordings = tuple(recordings)
+        if recordings:
+            first = recordings[0]
+            self._recordings = first, (*recordings, translated(first, matched, right))[1]
+            left, right = (SideStart(t.qpos[0], t.qvel[0], t.ctrl[0]) for t in self._recordings)
+            self._starts = left, right
         self.count, self.ended = 2, ""
         self._runs: dict[_Run, _Outcome] = {}  # those that were asked for
         self._ahead: dict[_Run, _Outcome] = {}  # those that will be
         self._by_name: dict[str, Cause] = {}
-        began = time.perf_counter()
-        traces = [self._trace(k, self._models[k], frozenset()) for k in (0, 1)]
+        self._replaced = _NONE  # causes that are brought over by `Model.replace`
+        traces, began = [], time.perf_counter()
+        for side in (0, 1):
+            traces.append(self._rerun(_Run(side, _NONE), self._models[side]).record())
+            ran()
+        # What is derived is read from a second run: so four were made.
+        self._took = (time.perf_counter() - began) / 4
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
         self.ruler = Ruler(one, traces[0], traces[1], matched)
-        for k, trace in enumerate(traces):
-            curves = self._curves(k, self._models[k], trace)
-            self._runs[k, frozenset()] = _Outcome(curves)
+        for side, trace in enumerate(traces):
+            run = _Run(side, _NONE)
+            reason = trace.header.ended or "it left every bound"
+            self._runs[run] = _Outcome(self._curves(side, self._models[side], trace), reason)
             self.ended = self.ended or trace.header.ended
-            ran()
-        self._took = (time.perf_counter() - began) / 2
 
-    def of_the_run(self) -> tuple[ModelDifference, ...]:
-        """What of the run itself differs: where it starts, and what is commanded."""
-        found, (one, two) = [], self._starts
-        wanted = self._matched.qpos(one.qpos, two.qpos)
-        speeds = self._matched.qvel(one.qvel, two.qvel)
-        off = max(_apart(wanted, two.qpos), _apart(speeds, two.qvel))
-        if off > _SAME:
-            values = (("farthest coordinate", 0.0, off),)
-            found.append(ModelDifference(START, "run", "", values))
-        found += self._keyframe()
-        if self._scenario.own and self._matched.reordered:
-            values = (("order", *self._orders()),)
-            found.append(ModelDifference(ORDER, "run", "", values))
-        return tuple(found)
+    def differences(self, finer: bool) -> tuple[ModelDifference, ...]:
+        """All that can be a cause: of the files, of an engine's own settings, of the run.
 
-    def _keyframe(self) -> Iterator[ModelDifference]:
-        """What else the keyframe sets: the time, ctrl, act, the mocap bodies."""
-        name, (one, two) = self._keyframes[0], (model.compiled for model in self._models)
-        if name is None or self._keyframes[1] is None:
-            return
-        keys = [[frame.name for frame in model.keyframes].index(name) for model in self._models]
-        times = [float(raw.key_time[key]) for raw, key in zip((one, two), keys, strict=True)]
-        if times[0] != times[1]:
-            values = (("time", times[0], times[1]),)
-            edits: tuple[Edit, ...] = (("key_time", (keys[1],), times[0]),)
-            yield ModelDifference("time of the start", "run", "", values, "s", edits)
-        owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
-        commands, states = [], []
-        for a, b in self._matched.actuators:
-            commands.append((a, b))
-            here, there = int(owner[0][a]), int(owner[1][b])
-            number = int(one.actuator_actnum[here])
-            if number == two.actuator_actnum[there]:
-                start = int(one.actuator_actadr[here]), int(two.actuator_actadr[there])
-                states += [(start[0] + k, start[1] + k) for k in range(number)]
-        led = [
-            (int(one.body_mocapid[pair.one]), int(two.body_mocapid[pair.two]))
-            for pair in self._matched.solids
-            if one.body_mocapid[pair.one] >= 0
-        ]
-        for subject, field, pairs in (
-            ("ctrl", "key_ctrl", commands),
-            ("activations", "key_act", sorted(set(states))),
-            (
-                "mocap places",
-                "key_mpos",
-                [(3 * a + k, 3 * b + k) for a, b in led for k in range(3)],
-            ),
-            (
-                "mocap turns",
-                "key_mquat",
-                [(4 * a + k, 4 * b + k) for a, b in led for k in range(4)],
-            ),
-        ):
-            ours, theirs = getattr(one, field)[keys[0]], getattr(two, field)[keys[1]]
-            off = [(a, b) for a, b in pairs if abs(ours[a] - theirs[b]) > _SAME]
-            if off:
-                values = (
-                    (subject, tuple(ours[a] for a, _ in off), tuple(theirs[b] for _, b in off)),
-                )
-                edits = tuple((field, (keys[1], b), float(ours[a])) for a, b in off)
-                yield ModelDifference(f"{subject} of the start", "run", "", values, "", edits)
+        Args:
+            finer: Differences of files by their single entries.
+        """
+        one, two = self._models
+        own = [setting for setting in self._own if setting]
+        rows: list[ModelDifference] = []
+        if one.compiled is not None and two.compiled is not None:
+            files = differences_of(
+                one, two, self._matched, not own, finer, sensors=self._scenario.own
+            )
+            rows += [row for row in files if (row.kind, row.subject) != ("option", "timestep")]
+            rows += of_the_run(self._matched, self._starts, self._keyframes[1])
+        if self._recordings:
+            left, right = self._recordings
+            told = translated(left, self._matched, self._starts[1])
+            rows += (
+                [] if commands_alike(told, right) else [ModelDifference(COMMANDS, "run", "", ())]
+            )
+        for side, settings in enumerate(self._own):
+            rows += settings.differences(side) if settings else []
+        replaced = [] if own else list(self._by_option())
+        self._replaced = frozenset(row.subject for row in replaced)
+        rows += replaced
+        return (*rows, *(order_of_ctrl(self._matched) if self._scenario.own else ()))
+
+    def _by_option(self) -> Iterator[ModelDifference]:
+        """What differs and is brought over by `Model.replace`."""
+        one, two = self._models
+        names = ["timestep"] if one.compiled is not None and two.compiled is not None else BY_OPTION
+        for name in names:
+            values = tuple(
+                (option, getattr(one, fact), getattr(two, fact))
+                for option, fact in BY_OPTION[name].items()
+                if not np.array_equal(getattr(one, fact), getattr(two, fact))
+            )
+            if values and set(BY_OPTION[name]) <= set(two.capabilities.options):
+                unit = "s" if name == "timestep" else ""
+                yield ModelDifference(name, "option", "", values, unit)
+
+    def know(self, causes: Sequence[Cause]) -> None:
+        """The causes that can be brought to the same, by their names."""
+        self._by_name = {cause.name: cause for cause in causes}
 
     def notes(self) -> tuple[str, ...]:
         """What a function of the user's may stumble over."""
-        places = [int(self._models[1].jnt_qposadr[b]) for _, b in self._matched.joints]
-        if not self._scenario.own or places == sorted(places):
-            return ()
-        return (
-            "the right has its joints in another order: a function that reads qpos or qvel by "
-            "number meets others there (model.joint_id, jnt_qposadr and jnt_dofadr tell which)",
+        return order_of_joints(self._matched) if self._scenario.own else ()
+
+    def touch(self, quantity: str) -> FirstTouch | None:
+        """The first contact of either side; None where nothing touches, or it is not told."""
+        one, two = (self._runs[_Run(side, _NONE)].curves for side in (0, 1))
+        if not one or not two:
+            return None
+        return first_touch(self.traces, self.ruler.time, self.ruler.distances(quantity, one, two))
+
+    @property
+    def needs(self) -> dict[str, str]:
+        """Of a cause the one that has to be brought to the same before it."""
+        own = any(self._own)
+        pairs = ((TITLES[a], TITLES[b]) for a, b in NEEDS.items()) if own else ()
+        return {a: b for a, b in pairs if {a, b} <= self._by_name.keys()}
+
+    def gaps(
+        self, brought: frozenset[str], without: frozenset[str] = _NONE, integrator: str = ""
+    ) -> dict[str, Deviation]:
+        """The gap in each quantity; {} if a side did not stand.
+
+        Args:
+            brought: Causes that are brought to the same.
+            without: Features that are left out on both sides.
+            integrator: Another one, on the side that has several.
+        """
+        curves = [self._run(run) for run in self._pair(brought, without, integrator)]
+        return self.ruler.gaps(curves[0], curves[1]) if curves[0] and curves[1] else {}
+
+    def _pair(
+        self, brought: frozenset[str], without: frozenset[str] = _NONE, integrator: str = ""
+    ) -> tuple[_Run, _Run]:
+        chosen = [integrator if k == self.selects else "" for k in (0, 1)]
+        one, two = (
+            _Run(side, self._acting(side, brought), without, chosen[side]) for side in (0, 1)
         )
+        return one, two
 
-    def _orders(self) -> tuple[str, str]:
-        """The actuators that stand elsewhere on the right, in the order of either side."""
-        pairs, names = self._matched.actuators, self._models[0].actuator_names
-        left, right = (
-            [names[a] or f"ctrl[{a}]" for a, _ in sorted(pairs, key=lambda pair: pair[k])]
-            for k in (0, 1)
-        )
-        moved = [(a, b) for a, b in zip(left, right, strict=True) if a != b]
-        return ", ".join(a for a, _ in moved), ", ".join(b for _, b in moved)
+    @property
+    def selects(self) -> int | None:
+        """The only side with integrators to choose from, 0 or 1; None if it is not the only."""
+        able = [side for side in (0, 1) if self._models[side].capabilities.integrators]
+        return able[0] if len(able) == 1 else None
 
-    def know(self, causes: Sequence[Cause]) -> None:
-        """The causes that `curves` can bring to the same, by their names."""
-        self._by_name = {cause.name: cause for cause in causes}
+    @property
+    def integrators(self) -> tuple[str, ...]:
+        """Those that the only side with several has."""
+        side = self.selects
+        return () if side is None else self._models[side].capabilities.integrators
 
-    def gaps(self, brought: Iterable[str]) -> dict[str, Deviation]:
-        """The gap in each quantity with causes brought to the same; {} if a side did not stand."""
-        names = frozenset(brought)
-        one, two = self.curves(0, names), self.curves(1, names)
-        return self.ruler.gaps(one, two) if one and two else {}
+    def can_be_without(self, feature: Feature) -> bool:
+        """Whether a feature can be left out on both sides, and is not what the experiment sets."""
+        own = [
+            own.can_leave_out(feature) if own else feature.option in model.capabilities.options
+            for own, model in zip(self._own, self._models, strict=True)
+        ]
+        return all(own) and feature.option not in self._scenario.options
+
+    def moved(self, quantity: str, without: frozenset[str], integrator: str) -> float:
+        """How far the left's own motion is then from what it is as it comes, all brought over."""
+        run = self._pair(frozenset(self._by_name), without, integrator)[0]
+        before, after = self._run(_Run(0, _NONE)), self._run(run)
+        return self.ruler.gap(quantity, before, after).worst if before and after else 0.0
+
+    def extent(self, quantity: str, without: frozenset[str] = _NONE) -> float:
+        """How far the left moves from where it starts, as it comes or without some features."""
+        curves = self._run(_Run(0, _NONE, without))
+        if not curves:
+            return 0.0
+        start = {name: curve[:1] for name, curve in curves.items()}
+        return float(self.ruler.distances(quantity, curves, start).max())
 
     def ahead(self, wanted: Iterable[frozenset[str]]) -> None:
         """Make the runs now that `gaps` of some sets of causes will want, several at once."""
-        keys = dict.fromkeys(
-            (side, self._acting(side, brought)) for brought in wanted for side in (0, 1)
-        )
-        new = [key for key in keys if key not in self._runs and key not in self._ahead]
+        runs = dict.fromkeys(run for brought in wanted for run in self._pair(brought))
+        new = [run for run in runs if run not in self._runs and run not in self._ahead]
         jobs = self._forks_for(len(new))
-        if jobs == 1:
-            return
-        work = [partial(self._outcome_or_error, *key) for key in new]
-        outcomes = in_forks(work, jobs, self._ran, self._took)
-        for key, outcome in zip(new, outcomes, strict=True):
-            if not isinstance(outcome, Exception):
-                self._ahead[key] = outcome or _Outcome(None, _LOST)
+        if jobs > 1:
+            work = [partial(self._tried, run) for run in new]
+            for run, outcome in zip(new, in_forks(work, jobs, self._ran, self._took), strict=True):
+                if isinstance(outcome, Exception):  # it is raised when its run is asked for
+                    continue
+                self._ahead[run] = outcome or _Outcome(None, _LOST)
 
     def _forks_for(self, number: int) -> int:
-        """How many forks make runs; none by default for a function, which may use any threads."""
-        jobs = 1 if self._jobs is None and self._scenario.own else self._jobs
-        return forks_for(number, self._took, jobs)
+        """How many forks are to share some runs."""
+        alone = self._jobs is None and self._scenario.own  # it may keep something between runs
+        return 1 if alone else forks_for(number, self._took, self._jobs)
 
-    def _outcome_or_error(self, side: int, brought: frozenset[str]) -> _Outcome | Exception:
-        """An error is raised where the run is asked for, which may never be."""
+    def _tried(self, run: _Run) -> _Outcome | Exception:
+        """What became of a run, or what was raised, as something that a fork can give back."""
         try:
-            return self._outcome(side, brought)
+            return self._outcome(run)
         except Exception as error:
             return RuntimeError(str(error))
 
-    def curves(self, side: int, brought: frozenset[str]) -> Curves | None:
-        """A run of one side; None, with a reason in `ended`, if it cannot be or did not stand."""
-        key = side, self._acting(side, brought)
-        if key not in self._runs:
-            if key not in self._ahead:
-                self._ahead[key] = self._outcome(*key)
+    def _run(self, run: _Run) -> Curves | None:
+        """A run; None, with a reason in `ended`, if it cannot be made or did not stand."""
+        if run not in self._runs:
+            if run not in self._ahead:
+                self._ahead[run] = self._outcome(run)
                 self._ran()
-            self._runs[key] = self._ahead.pop(key)
-            self.count += self._runs[key].ran
-        found = self._runs[key]
-        if found.curves is None:
-            self.ended = found.reason or self.ended
-        return found.curves
+            self._runs[run] = self._ahead.pop(run)
+            self.count += self._runs[run].ran
+        outcome = self._runs[run]
+        if outcome.curves is None:
+            self.ended = outcome.reason or self.ended
+        return outcome.curves
 
-    def _outcome(self, side: int, brought: frozenset[str]) -> _Outcome:
+    def _outcome(self, run: _Run) -> _Outcome:
         ran = False
         try:
-            model = self.model(side, brought)
+            model = self._model(run)
             ran = True
-            trace = self._trace(side, model, brought)
+            trace = self._rerun(run, model).record(derive=False)
             reason = trace.header.ended or "it left every bound"
-            return _Outcome(self._curves(side, model, trace), reason)
+            return _Outcome(self._curves(run.side, model, trace), reason)
         except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
             return _Outcome(None, str(error), ran)
 
-    def model(self, side: int, brought: Iterable[str]) -> Model:
-        """A side's Model with causes brought to the same."""
-        return self.brought(self._models[side], brought, side)
-
-    def brought(self, model: Model, brought: Iterable[str], side: int = 1) -> Model:
-        """A Model of a side's file with causes brought to the same."""
-        those = sorted(brought)
-        edits = [edit for name in those for edit in self._by_name[name].edits(side)]
-        return built(model, tuple(edits))
+    def _model(self, run: _Run) -> Model:
+        """The Model of a run."""
+        own, model, left = self._own[run.side], self._models[run.side], self._models[0]
+        edits = tuple(
+            edit for name in sorted(run.brought) for edit in self._by_name[name].edits(run.side)
+        )
+        model = built(model, edits)
+        if run.side and not own:
+            facts = [BY_OPTION[name] for name in sorted(run.brought & self._replaced)]
+            options = {o: getattr(left, fact) for each in facts for o, fact in each.items()}
+            model = model.replace(**options) if options else model
+        if run.integrator:
+            model = model.replace(integrator=run.integrator)
+        names = frozenset(_setting(name) for name in run.brought if self._is_own(name))
+        if own and (names or run.without):
+            return own.build(model, built(own.emulated, edits), names, run.without)
+        return leave_out(model, run.without)
 
     def _acting(self, side: int, brought: frozenset[str]) -> frozenset[str]:
         """The causes that change this side."""
         return frozenset(
             name
             for name in brought
-            if self._by_name[name].edits(side) or (side == 1 and self._is_of_the_run(name))
+            if self._by_name[name].edits(side)
+            or (self._own[side] and self._is_own(name))
+            or (side == 1 and (name in self._replaced or self._by_name[name].kind == "run"))
         )
 
-    def _is_of_the_run(self, name: str) -> bool:
-        return any(each.kind == "run" for each in self._by_name[name].differences)
+    def _is_own(self, name: str) -> bool:
+        return self._by_name[name].kind == "engine"
 
-    def _trace(self, side: int, model: Model, brought: frozenset[str]) -> Trace:
-        return self._rerun(side, model, brought).record(derive=False)
-
-    def _rerun(self, side: int, model: Model, brought: frozenset[str]) -> Rerun:
-        start = self._starts[side]
+    def _rerun(self, run: _Run, model: Model) -> Rerun:
+        start, brought = self._starts[run.side], run.brought
         qpos, qvel = start.qpos, start.qvel
         if START in brought:
             first = self._starts[0]
@@ -284,9 +361,9 @@ class Trials:
             qvel = self._matched.qvel(first.qvel, qvel)
         return Rerun(
             model,
-            lambda model: self._controller(side, model, brought),
+            lambda model: self._controller(run.side, model, brought),
             self.seconds,
-            keyframe=self._keyframes[side],
+            keyframe=self._keyframes[run.side],
             qpos=qpos,
             qvel=qvel,
         )
@@ -297,6 +374,8 @@ class Trials:
         It is that of the left as it comes, whatever is edited.
         """
         own = self._scenario.own
+        if self._recordings and side and COMMANDS not in brought:
+            return commands_of(self._recordings[1])
         told = self._scenario.controller(model if own else self._models[0], self.seed)
         if side == 0:
             return told
@@ -306,33 +385,12 @@ class Trials:
         # Without a keyframe of its own it starts with the commands of the left, too.
         return told if self._keyframes[0] == self._keyframes[1] else beginning_with(start, told)
 
-    def files_apart(self, one: Model, two: Model, brought: frozenset[str]) -> dict[str, Deviation]:
-        """The gap between the file of the left and that of the right on one engine.
-
-        Args:
-            one: The left's file on the engine of the right.
-            two: The right's file on it, with causes brought to the same.
-            brought: The causes.
-
-        Returns:
-            In each quantity; {} if one of them did not stand.
-        """
-        found = []
-        for side, model in enumerate((one, two)):
-            found.append(self._counted(side, model, brought if side else frozenset()))
-        return self.ruler.gaps(found[0], found[1]) if found[0] and found[1] else {}
-
-    def _counted(self, side: int, model: Model, brought: frozenset[str]) -> Curves | None:
-        """A run that is not kept."""
-        trace = self._trace(side, model, brought)
-        self.count += 1
-        self._ran()
-        return self._curves(side, model, trace)
-
     def repeats(self) -> bool:
         """Whether the left moves the same when it is run again, so that a gap can have causes."""
-        again = self._counted(0, self._models[0], frozenset())
-        first = self._runs[0, frozenset()].curves
+        run = _Run(0, _NONE)
+        again, first = self._outcome(run).curves, self._runs[run].curves
+        self.count += 1
+        self._ran()
         assert first is not None  # it has gaps
         return again is not None and all(
             np.array_equal(values, again[name]) for name, values in first.items()
@@ -340,9 +398,10 @@ class Trials:
 
     def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
         """The chaos floor of each quantity: a gap that is no larger says nothing."""
-        first = self._runs[0, frozenset()].curves
+        base = _Run(0, _NONE)
+        first = self._runs[base].curves
         assert first is not None  # it has gaps
-        rerun = self._rerun(0, self._models[0], frozenset())
+        rerun = self._rerun(base, self._models[0])
 
         def run(k: int) -> tuple[Curves | None]:
             trace = perturbed_run(rerun, k, seed=self.seed, uncertain=uncertain, derive=False)
@@ -350,14 +409,14 @@ class Trials:
 
         runs = [partial(run, k) for k in range(RUNS)]
         jobs = self._forks_for(RUNS)
-        found = (
+        curves = (
             in_forks(runs, jobs, lambda: None, self._took)
             if jobs > 1
             else [call() for call in runs]
         )
-        if None in found:
+        if None in curves:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
-        return self.ruler.floor(first, [each[0] for each in found if each])
+        return self.ruler.floor(first, [each[0] for each in curves if each])
 
     def _curves(self, side: int, model: Model, trace: Trace) -> Curves | None:
         return self.ruler.curves(trace, self._posed(model), side)
@@ -368,8 +427,24 @@ class Trials:
             return model
         first = self._models[0]
         base = first if first.backend == DEFAULT else load(model.path)
-        return base.with_compiled(model.compiled)
+        return base if model.compiled is None else base.with_compiled(model.compiled)
 
 
-def _apart(one: Array, two: Array) -> float:
-    return float(np.abs(np.asarray(one) - np.asarray(two)).max(initial=0.0))
+def _own_settings(
+    models: tuple[Model, Model], options: dict[str, Any]
+) -> tuple[OwnSettings | None, OwnSettings | None]:
+    """Of each side that comes with its engine's settings, where the other does not."""
+    dials = [room(model.backend).dials(model, options) for model in models]
+    if all(dials):
+        return None, None
+    actuated = options.get("actuation", True)
+    one, two = (
+        OwnSettings(own, models[1 - side].replace(**options), actuated) if own else None
+        for side, own in enumerate(dials)
+    )
+    return one, two
+
+
+def _setting(name: str) -> str:
+    """The setting of an engine that a cause goes by."""
+    return next(key for key, title in TITLES.items() if title == name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -95,19 +95,19 @@ class MujocoEngine(RawEngine):
 
     def read(self, path: Path, name: str) -> Robot:
         """What its compiler makes of it."""
-        from .reading import loaded
+        from .description import loaded
 
         return loaded(path, name, "engine")
 
     def read_file(self, path: Path, name: str) -> Robot:
         """What an MJCF says itself; one some of whose meshes are missing is read without them."""
-        from .reading import read_file
+        from .description import read_file
 
         return read_file(path, name)
 
     def describe(self, compiled: Any, name: str) -> Robot:
         """The description in an mjModel."""
-        from ._description import description_of
+        from .description import description_of
 
         return description_of(compiled, name, f"mujoco {require('mujoco').__version__}", "MJCF")
 
@@ -136,6 +136,24 @@ class MujocoEngine(RawEngine):
         from .differences import edited
 
         return edited(raw, edits)
+
+    def counts(self, compiled: Any) -> dict[str, int]:
+        """Its actuators, and the planes of the world."""
+        from .given import counts
+
+        return counts(compiled)
+
+    def with_parts(
+        self,
+        taker: Path,
+        giver: Path,
+        parts: Collection[str],
+        names: Mapping[str, Mapping[str, str]],
+    ) -> Any:
+        """By MjSpec."""
+        from .given import with_parts
+
+        return with_parts(taker, giver, parts, names)
 
     def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
         """By mj_energyPos and mj_energyVel."""

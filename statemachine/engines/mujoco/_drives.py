@@ -1,4 +1,4 @@
-"""What the actuators of two compiled models differ in."""
+"""What the actuators and sensors of two compiled models differ in."""
 
 from __future__ import annotations
 
@@ -8,104 +8,69 @@ from typing import Any
 
 import numpy as np
 
-from ..records import Edit, ModelDifference
+from ...installed import require
+from ..records import Counterparts, Edit, ModelDifference
 from . import _fields as fields
-from ._element_pairs import ElementPairs, switched_off
-from ._figures import plain, same
-from ._solid import name_of
+from ._sides import Sides, name_of, plain, same, zeros
 
-_DRIVES = {0: "joint", 1: "joint", 3: "tendon", 4: "site", 5: "body"}  # mjtTrn
+# mjtTrn: what an actuator acts on, and from which site it measures.
+_DRIVES = {
+    0: ("joint",),
+    1: ("joint",),
+    2: ("site", "site"),
+    3: ("tendon",),
+    4: ("site", "site"),
+    5: ("body",),
+}
 # Where the law of an actuator's own state is another, these are one thing with it.
 _OF_A_LAW = ("gains", "dynamics", "range of its activation", "length range")
+_STILL = (
+    *("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
+    *("actuator_armature", "actuator_damping"),
+)
+_OBJECTS = (("sensor_objtype", "sensor_objid"), ("sensor_reftype", "sensor_refid"))
 
 
-class Drives(ElementPairs):
+def drives(sides: Sides) -> Iterator[ModelDifference]:
     """Actuators, by their gains, ranges, laws and what they drive."""
+    one, two = sides.one, sides.two
+    owners = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
+    places = sides.pairs.actuators
+    actuators = sorted({(int(owners[0][a]), int(owners[1][b])) for a, b in places})
+    for a, b in actuators:
+        yield from _laws(sides, a, b)
+        yield from _delay(sides, a, b)
+        targets = [_targets(sides, side, k) for side, k in enumerate((a, b))]
+        if targets[0] != targets[1]:
+            values = (("drives", _words(one, a), _words(two, b)),)
+            why = "it drives another thing, or in another way"
+            yield sides.tell("transmission", "actuator", a, values, refused=why)
+    if one.opt.disableactuator or two.opt.disableactuator:
+        yield from sides.rows("actuator", fields.GROUP, actuators)
+    for a, b in places:
+        name = name_of(one, "actuator", int(owners[0][a]))
+        yield from sides.rows("actuator", fields.CONTROL, [(a, b)], name)
+    yield from sides.extras("actuator", actuators, lambda raw, k: zeros(_STILL, raw, k))
 
-    def found(self) -> Iterator[ModelDifference]:
-        """What they differ in."""
-        one, two = self._one, self._two
-        actuators = tuple(self._owners())
-        for a, b in actuators:
-            yield from self._laws(a, b)
-            yield from self._delay(a, b)
-            name = name_of(one, "actuator", a)
-            ours, theirs = self._drive(one, a, True), self._drive(two, b, False)
-            if ours != theirs:
-                values = (("drives", _words(ours), _words(theirs)),)
-                why = "it drives another thing, or in another way"
-                yield ModelDifference("transmission", "actuator", name, values, refused=why)
-        if one.opt.disableactuator or two.opt.disableactuator:
-            yield from self._rows("actuator", fields.GROUP, actuators)
-        for a, b in self._pairs.actuators:
-            number = int(np.searchsorted(np.cumsum(one.actuator_ctrlnum), a, side="right"))
-            name = name_of(one, "actuator", number)
-            yield from self._rows("actuator", fields.CONTROL, [(a, b)], name)
-        for side, raw in enumerate((one, two)):
-            matched = {pair[side] for pair in actuators}
-            for k in set(range(raw.nactuator)) - matched:
-                yield switched_off(side, raw, "actuator", k, _still_actuator(raw, k))
 
-    def _laws(self, a: int, b: int) -> Iterator[ModelDifference]:
-        """Rows of an actuator; together, where its own state moves by another law."""
-        laws = _law(self._one, a), _law(self._two, b)
-        sized = laws[0][1:] == laws[1][1:]
-        rows = [row for row in fields.ACTUATOR if sized or row.when != "actuator_dyntype"]
-        found = list(self._rows("actuator", rows, [(a, b)]))
-        if laws[0] == laws[1]:
-            yield from found
-            return
-        name = name_of(self._one, "actuator", a)
-        values = (("dyntype", laws[0][0], laws[1][0]),)
-        if not sized:
-            why = "its own state has another size"
-            yield from found
-            yield ModelDifference("law of its state", "actuator", name, values, refused=why)
-            return
+def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+    """Rows of an actuator; together, where its own state moves by another law."""
+    laws = _law(sides.one, a), _law(sides.two, b)
+    sized = laws[0][1:] == laws[1][1:]
+    rows = [row for row in fields.ACTUATOR if sized or row.when != "actuator_dyntype"]
+    found = list(sides.rows("actuator", rows, [(a, b)]))
+    values = (("dyntype", laws[0][0], laws[1][0]),)
+    if not sized:
+        why = "its own state has another size"
+        found.append(sides.tell("law of its state", "actuator", a, values, refused=why))
+    elif laws[0] != laws[1]:
         of_law = [each for each in found if each.subject in _OF_A_LAW]
-        edits: tuple[Edit, ...] = (("actuator_dyntype", (b,), laws[0][0]),)
-        edits += tuple(edit for each in of_law for edit in each.edits)
-        more = tuple(value for each in of_law for value in each.values)
-        yield ModelDifference("law", "actuator", name, values + more, "", edits)
-        yield from (each for each in found if each.subject not in _OF_A_LAW)
-
-    def _owners(self) -> Iterator[tuple[int, int]]:
-        """Pairs of actuators, from pairs of numbers of ctrl."""
-        owner = [
-            np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum)
-            for raw in (self._one, self._two)
-        ]
-        found = {(int(owner[0][a]), int(owner[1][b])) for a, b in self._pairs.actuators}
-        yield from sorted(found)
-
-    def _delay(self, a: int, b: int) -> Iterator[ModelDifference]:
-        """A delay needs a memory of commands: without one it is taken away from the other."""
-        one, two = self._one, self._two
-        for found in self._rows("actuator", fields.DELAY, [(a, b)]):
-            if two.actuator_history[b, 0] or not one.actuator_history[a, 0]:
-                yield found
-                continue
-            back: tuple[Edit, ...] = (("actuator_delay", (a,), float(two.actuator_delay[b])),)
-            yield replace(found, edits=(), edits_one=back)
-        sizes = one.actuator_history[a], two.actuator_history[b]
-        if one.actuator_delay[a] and two.actuator_delay[b] and not same(*sizes):
-            name = name_of(one, "actuator", a)
-            values = (("history", plain(sizes[0]), plain(sizes[1])),)
-            why = "it keeps another number of commands, or reads between them in another way"
-            yield ModelDifference("memory of commands", "actuator", name, values, refused=why)
-
-    def _drive(self, raw: Any, actuator: int, ours: bool) -> tuple[Any, ...]:
-        """What an actuator acts on, in ids of the second model."""
-        kind = int(raw.actuator_trntype[actuator])
-        target = _DRIVES.get(kind)
-        ids = raw.actuator_trnid[actuator].tolist()
-        if ours and target is not None:
-            ids[0] = self._ids[target].get(ids[0], -1)
-            if kind == 4 and ids[1] >= 0:  # with a site that it refers to
-                ids[1] = self._ids["site"].get(ids[1], -1)
-        elif ours and kind == 2:  # slider and crank are two sites
-            ids = [self._ids["site"].get(each, -1) for each in ids]
-        return kind, *ids
+        edits: list[Edit] = [("actuator_dyntype", (b,), laws[0][0])]
+        edits += [edit for each in of_law for edit in each.edits]
+        values += tuple(value for each in of_law for value in each.values)
+        yield sides.tell("law", "actuator", a, values, "", edits)
+        found = [each for each in found if each not in of_law]
+    yield from found
 
 
 def _law(raw: Any, k: int) -> tuple[int, ...]:
@@ -115,17 +80,87 @@ def _law(raw: Any, k: int) -> tuple[int, ...]:
     return int(raw.actuator_dyntype[k]), int(raw.actuator_actnum[k]), number, spec
 
 
-def _still_actuator(raw: Any, k: int) -> tuple[Edit, ...]:
-    return (
-        ("actuator_gaintype", (k,), 0),
-        ("actuator_gainprm", (k,), np.zeros(raw.actuator_gainprm.shape[1])),
-        ("actuator_biastype", (k,), 0),
-        ("actuator_biasprm", (k,), np.zeros(raw.actuator_biasprm.shape[1])),
-        ("actuator_armature", (k,), 0.0),
-        ("actuator_damping", (k,), 0.0),
+def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+    """A delay needs a memory of commands: without one it is taken away from the other."""
+    one, two = sides.one, sides.two
+    sizes = one.actuator_history[a], two.actuator_history[b]
+    back = bool(sizes[0][0] and not sizes[1][0])
+    yield from sides.rows("actuator", fields.DELAY, [(a, b)], back=back)
+    if one.actuator_delay[a] and two.actuator_delay[b] and not same(*sizes):
+        values = (("history", plain(sizes[0]), plain(sizes[1])),)
+        why = "it keeps another number of commands, or reads between them in another way"
+        yield sides.tell("memory of commands", "actuator", a, values, refused=why)
+
+
+def _targets(sides: Sides, side: int, k: int) -> tuple[int, ...]:
+    """What an actuator acts on, in ids of the second model."""
+    raw = (sides.one, sides.two)[side]
+    kind, ids = int(raw.actuator_trntype[k]), raw.actuator_trnid[k].tolist()
+    for place, target in enumerate(_DRIVES.get(kind, ())):
+        ids[place] = sides.there(side, target, ids[place])
+    return kind, *ids
+
+
+def _words(raw: Any, k: int) -> str:
+    """What an actuator drives, and from which site it measures."""
+    kind, ids = int(raw.actuator_trntype[k]), raw.actuator_trnid[k].tolist()
+    word = require("mujoco").mjtTrn(kind).name.removeprefix("mjTRN_")
+    targets = zip(_DRIVES.get(kind, ()), ids, strict=False)
+    names = [name_of(raw, target, i) for target, i in targets if i >= 0]
+    return f"{word.lower()} {', '.join(names)}"
+
+
+def sensors(one: Any, two: Any, pairs: Counterparts) -> list[ModelDifference]:
+    """What the sensors of two compiled models differ in, on which nothing but a controller depends.
+
+    Args:
+        one: An mjModel.
+        two: Another; its sensors of the same name are the counterparts.
+        pairs: What of one is what of the other.
+    """
+    why = "a sensor is built by the compiler"  # so only a cutoff can be brought over
+    return [
+        each if each.subject == "cutoff" else replace(each, edits=(), edits_one=(), refused=why)
+        for each in _sensors(Sides(one, two, pairs))
+    ]
+
+
+def _sensors(sides: Sides) -> Iterator[ModelDifference]:
+    one, two = sides.one, sides.two
+    pairs = list(sides.by_name("sensor"))
+    yield from sides.rows("sensor", fields.SENSOR, pairs)
+    for a, b in pairs:
+        values = []
+        kinds = [int(raw.sensor_type[k]) for raw, k in ((one, a), (two, b))]
+        if kinds[0] != kinds[1]:
+            values.append(("type", *(require("mujoco").mjtSensor(kind).name for kind in kinds)))
+        for types, ids in _OBJECTS:
+            words = _object(one, types, ids, a), _object(two, types, ids, b)
+            if words[0] != words[1] and not _is_same(sides, types, ids, a, b):
+                values.append((ids.removeprefix("sensor_"), *words))
+        if values:
+            yield sides.tell("sensor", "sensor", a, values)
+    yield from sides.extras("sensor", pairs, lambda raw, k: zeros(("sensor_cutoff",), raw, k))
+    ours = [b for _, b in pairs]
+    if ours != sorted(ours):
+        orders = [", ".join(name_of(two, "sensor", b) for b in s) for s in (ours, sorted(ours))]
+        yield ModelDifference("order of sensordata", "sensor", "", (("order", *orders),))
+
+
+def _is_same(sides: Sides, types: str, ids: str, a: int, b: int) -> bool:
+    """Whether what two sensors are of are counterparts, by whatever names."""
+    (kind, here), (other, there) = (
+        (int(getattr(raw, types)[k]), int(getattr(raw, ids)[k]))
+        for raw, k in ((sides.one, a), (sides.two, b))
     )
+    word = str(require("mujoco").mju_type2Str(kind) or "").removeprefix("x")
+    return kind == other and sides.ids.get(word, {}).get(here) == there
 
 
-def _words(drive: tuple[Any, ...]) -> str:
-    kind = _DRIVES.get(drive[0], f"transmission {drive[0]}")
-    return f"{kind} {drive[1]}"
+def _object(raw: Any, types: str, ids: str, k: int) -> str:
+    """What a sensor is of, as its kind and its name."""
+    mujoco = require("mujoco")
+    kind, number = int(getattr(raw, types)[k]), int(getattr(raw, ids)[k])
+    if number < 0:
+        return "none"
+    return f"{mujoco.mju_type2Str(kind)} {mujoco.mj_id2name(raw, kind, number) or number}"

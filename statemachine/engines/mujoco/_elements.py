@@ -1,4 +1,4 @@
-"""What joints, geoms and tendons of two compiled models are set to."""
+"""What joints, geoms, tendons, equalities and contact pairs of two compiled models are set to."""
 
 from __future__ import annotations
 
@@ -6,137 +6,283 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ...installed import require
+from ...interface import Array
+from ...rotations import HERE, Placement, matrix_from_quat
 from ..records import Edit, ModelDifference
 from . import _fields as fields
-from ._element_pairs import ElementPairs, switched_off
-from ._figures import plain, same
-from ._geoms import touches
-from ._solid import HINGE, SLIDE, name_of
+from ._geoms import NO_TOUCH, touches
+from ._sides import HINGE, SLIDE, Pairs, Sides, differing, name_of, plain, quat_of, same, zeros
 
+# In the place of a field: what a pair has is to be that of its geoms, as edited as these are.
+AS_GEOMS = "pair as its geoms"
 _DOFS = {0: 6, 1: 3}  # mjtJoint, where it is not 1
 _OF_A_SLIDE = {"rad": "m", "N·m/rad": "N/m", "N·m": "N", "kg m²": "kg", "N·m·s": "N·s/m"}
 _NUMBERED = (1, 2)  # mjtWrap: a joint with its coefficient, a pulley with its divisor
-_NO_WRAP = {1: "joint", 3: "site", 4: "geom", 5: "geom"}  # mjtWrap, what an entry refers to
+_WRAPS = {1: "joint", 3: "site", 4: "geom", 5: "geom"}  # mjtWrap, what an entry refers to
+_SLACK = (
+    *("tendon_limited", "tendon_stiffness", "tendon_damping"),
+    *("tendon_frictionloss", "tendon_armature"),
+)
+_CONNECT, _WELD, _JOINT, _TENDON = range(4)  # mjtEq
+_BODY = 1  # mjtObj
+_KEEPS = {_BODY: "body", 3: "joint", 5: "geom", 6: "site", 18: "tendon"}  # mjtObj
+_NEAR = 1e-9  # [m], and of entries of matrices: as a file with ten digits leaves it
+_KEPT = fields.EQUALITY[1]
 
 
-class Elements(ElementPairs):
+def elements(sides: Sides) -> Iterator[ModelDifference]:
     """Bodies, joints, geoms and tendons."""
-
-    def found(self) -> Iterator[ModelDifference]:
-        """What they differ in."""
-        yield from self._bodies()
-        yield from self._joints()
-        # Of a geom that only a tendon wraps, or a medium flows around, the shape is all that acts.
-        touching = [*map(touches, (self._one, self._two))]
-        meeting = [(a, b) for a, b in self._geoms if touching[0][a] or touching[1][b]]
-        yield from self._rows("geom", fields.GEOM, meeting)
-        yield from self._tendons()
-
-    def _bodies(self) -> Iterator[ModelDifference]:
-        """The weight that is taken off bodies; of a model without any, nothing is kept."""
-        one, two = self._one, self._two
-        if _sleeps(one) or _sleeps(two):
-            trees = {
-                (int(one.body_treeid[p.one]), int(two.body_treeid[p.two])): p.one
-                for p in reversed(self._pairs.solids)
-            }
-            for (a, b), body in sorted(trees.items()):
-                if a >= 0 and b >= 0:
-                    yield from self._rows("body", fields.TREE, [(a, b)], name_of(one, "body", body))
-        for a, b in sorted(self._ids["body"].items()):
-            ours, theirs = float(one.body_gravcomp[a]), float(two.body_gravcomp[b])
-            if same(ours, theirs):
-                continue
-            values = (("gravcomp", ours, theirs),)
-            edits: tuple[Edit, ...] = ()
-            back: tuple[Edit, ...] = ()
-            if two.ngravcomp:
-                edits = (("body_gravcomp", (b,), ours),)
-            else:  # the engine looks only where the file had some
-                back = (("body_gravcomp", (a,), theirs),)
-            name = name_of(one, "body", a)
-            yield ModelDifference("weight taken off", "body", name, values, "", edits, back)
-
-    def _joints(self) -> Iterator[ModelDifference]:
-        one, two = self._one, self._two
-        for a, b in self._pairs.joints:
-            name = name_of(one, "joint", a)
-            found = [*self._rows("joint", fields.JOINT, [(a, b)]), *self._slack(a, b, name)]
-            here, there = int(one.jnt_dofadr[a]), int(two.jnt_dofadr[b])
-            for row in fields.DOF:
-                of_each = [
-                    self._row("joint", row, here + k, there + k, name)
-                    for k in range(_DOFS.get(int(one.jnt_type[a]), 1))
-                ]
-                differ = [each for each in of_each if each is not None]
-                if differ:
-                    edits = tuple(edit for each in differ for edit in each.edits)
-                    found.append(replace(differ[0], edits=edits))
-            slide = int(one.jnt_type[a]) == SLIDE
-            for each in found:
-                yield replace(each, unit=_OF_A_SLIDE[each.unit]) if slide and each.unit else each
-
-    def _slack(self, a: int, b: int, name: str) -> Iterator[ModelDifference]:
-        """Where the spring of a joint is slack."""
-        one, two = self._one, self._two
-        stiff = ("jnt_stiffness", "jnt_stiffnesspoly")
-        if not any(getattr(one, n)[a].any() or getattr(two, n)[b].any() for n in stiff):
-            return
-        here, there = int(one.jnt_qposadr[a]), int(two.jnt_qposadr[b])
-        number = {0: 7, 1: 4}.get(int(one.jnt_type[a]), 1)
-        ours = one.qpos_spring[here : here + number]
-        theirs = two.qpos_spring[there : there + number]
-        if not same(ours, theirs):
-            edits = tuple(("qpos_spring", (there + k,), float(ours[k])) for k in range(number))
-            unit = "rad" if int(one.jnt_type[a]) in (SLIDE, HINGE) else ""
-            values = (("springref", plain(ours), plain(theirs)),)
-            yield ModelDifference("rest of the spring", "joint", name, values, unit, edits)
-
-    def _tendons(self) -> Iterator[ModelDifference]:
-        one, two = self._one, self._two
-        pairs = sorted(self._ids["tendon"].items())
-        for a, b in pairs:
-            name = name_of(one, "tendon", a)
-            ours, theirs = self._path(one, a, True), self._path(two, b, False)
-            apart = [
-                k for k, pair in enumerate(zip(ours, theirs, strict=False)) if pair[0] != pair[1]
-            ]
-            numbers = [k for k in apart if ours[k][:2] == theirs[k][:2] and ours[k][0] in _NUMBERED]
-            if len(ours) != len(theirs) or numbers != apart:
-                why = "it takes another path"
-                yield ModelDifference("path", "tendon", name, (), refused=why)
-            elif apart:
-                values = tuple((f"coef[{k}]", ours[k][2], theirs[k][2]) for k in apart)
-                start, other = int(one.tendon_adr[a]), int(two.tendon_adr[b])
-                edits: tuple[Edit, ...] = tuple(
-                    ("wrap_prm", (other + k,), float(one.wrap_prm[start + k])) for k in apart
-                )
-                yield ModelDifference("coefficients", "tendon", name, values, "", edits)
-        yield from self._rows("tendon", fields.TENDON, pairs)
-        for side, raw in enumerate((one, two)):
-            matched = {pair[side] for pair in pairs}
-            for k in set(range(raw.ntendon)) - matched:
-                edits = tuple(
-                    (name, (k,), 0.0)
-                    for name in ("tendon_stiffness", "tendon_damping", "tendon_frictionloss")
-                )
-                edits += (("tendon_limited", (k,), False), ("tendon_armature", (k,), 0.0))
-                yield switched_off(side, raw, "tendon", k, edits)
-
-    def _path(self, raw: Any, tendon: int, ours: bool) -> list[tuple[Any, ...]]:
-        start, number = int(raw.tendon_adr[tendon]), int(raw.tendon_num[tendon])
-        found = []
-        for k in range(start, start + number):
-            kind, thing = int(raw.wrap_type[k]), int(raw.wrap_objid[k])
-            target, number = _NO_WRAP.get(kind), round(float(raw.wrap_prm[k]), 9)
-            if ours and target:
-                thing = self._ids[target].get(thing, -1)
-            if ours and target == "geom" and number >= 0:  # the site on whose side it passes
-                number = self._ids["site"].get(int(number), -2)
-            found.append((kind, thing, number))
-        return found
+    yield from _bodies(sides)
+    for a, b in sides.pairs.joints:
+        yield from _joint(sides, a, b)
+    # Of a geom that only a tendon wraps, or a medium flows around, the shape is all that acts.
+    touching = touches(sides.one), touches(sides.two)
+    geoms = [(a, b) for a, b in sides.ids["geom"].items() if touching[0][a] or touching[1][b]]
+    yield from sides.rows("geom", fields.GEOM, geoms)
+    tendons = sorted(sides.ids["tendon"].items())
+    for a, b in tendons:
+        yield from _path(sides, a, b)
+    yield from sides.rows("tendon", fields.TENDON, tendons)
+    yield from sides.extras("tendon", tendons, lambda raw, k: zeros(_SLACK, raw, k))
 
 
-def _sleeps(raw: Any) -> bool:
-    return bool(raw.opt.enableflags & int(require("mujoco").mjtEnableBit.mjENBL_SLEEP))
+def _bodies(sides: Sides) -> Iterator[ModelDifference]:
+    """The weight that is taken off bodies; of a model without any, nothing is kept."""
+    one, two = sides.one, sides.two
+    sleep = int(require("mujoco").mjtEnableBit.mjENBL_SLEEP)
+    if (one.opt.enableflags | two.opt.enableflags) & sleep:
+        trees = {
+            (int(one.body_treeid[p.one]), int(two.body_treeid[p.two])): p.one
+            for p in reversed(sides.pairs.solids)
+        }
+        for (a, b), body in sorted(trees.items()):
+            if a >= 0 and b >= 0:
+                yield from sides.rows("body", fields.TREE, [(a, b)], name_of(one, "body", body))
+    # The engine looks only where the file had some.
+    pairs = sorted(sides.ids["body"].items())
+    yield from sides.rows("body", fields.BODY, pairs, back=not two.ngravcomp)
+
+
+def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+    one, two = sides.one, sides.two
+    name, kind = name_of(one, "joint", a), int(one.jnt_type[a])
+    found = [*sides.rows("joint", fields.JOINT, [(a, b)]), *_rest(sides, a, b)]
+    here, there = int(one.jnt_dofadr[a]), int(two.jnt_dofadr[b])
+    dofs = [(here + k, there + k) for k in range(_DOFS.get(kind, 1))]
+    for row in fields.DOF:
+        if differ := list(sides.rows("joint", [row], dofs, name)):
+            edits = tuple(edit for each in differ for edit in each.edits)
+            found.append(replace(differ[0], edits=edits))
+    for each in found:
+        yield replace(each, unit=_OF_A_SLIDE.get(each.unit, "")) if kind == SLIDE else each
+
+
+def _rest(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+    """Where the spring of a joint is slack."""
+    one, two = sides.one, sides.two
+    stiff = ("jnt_stiffness", "jnt_stiffnesspoly")
+    if not any(getattr(one, n)[a].any() or getattr(two, n)[b].any() for n in stiff):
+        return
+    here, there = int(one.jnt_qposadr[a]), int(two.jnt_qposadr[b])
+    number = {0: 7, 1: 4}.get(int(one.jnt_type[a]), 1)
+    ours, theirs = one.qpos_spring[here : here + number], two.qpos_spring[there : there + number]
+    if not same(ours, theirs):
+        edits = [("qpos_spring", (there + k,), float(ours[k])) for k in range(number)]
+        unit = "rad" if int(one.jnt_type[a]) in (SLIDE, HINGE) else ""
+        values = (("springref", plain(ours), plain(theirs)),)
+        yield sides.tell("rest of the spring", "joint", a, values, unit, edits)
+
+
+def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+    """What a tendon passes, in which order."""
+    ours, theirs = _passes(sides, 0, a), _passes(sides, 1, b)
+    differ = [k for k, pair in enumerate(zip(ours, theirs, strict=False)) if pair[0] != pair[1]]
+    numbers = [k for k in differ if ours[k][:2] == theirs[k][:2] and ours[k][0] in _NUMBERED]
+    if len(ours) != len(theirs) or numbers != differ:
+        yield sides.tell("path", "tendon", a, refused="it takes another path")
+    elif differ:
+        start, other = int(sides.one.tendon_adr[a]), int(sides.two.tendon_adr[b])
+        values = [(f"coef[{k}]", ours[k][2], theirs[k][2]) for k in differ]
+        edits: list[Edit] = [
+            ("wrap_prm", (other + k,), float(sides.one.wrap_prm[start + k])) for k in differ
+        ]
+        yield sides.tell("coefficients", "tendon", a, values, "", edits)
+
+
+def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]]:
+    """What a tendon passes: its kind, its id in the second model, and a number."""
+    raw = (sides.one, sides.two)[side]
+    start, found = int(raw.tendon_adr[tendon]), []
+    for k in range(start, start + int(raw.tendon_num[tendon])):
+        kind, number = int(raw.wrap_type[k]), round(float(raw.wrap_prm[k]), 9)
+        target = _WRAPS.get(kind)
+        if target == "geom":  # the site on whose side it passes
+            number = sides.there(side, "site", int(number))
+        found.append((kind, sides.there(side, target, int(raw.wrap_objid[k])), number))
+    return found
+
+
+def equalities(sides: Sides) -> Iterator[ModelDifference]:
+    """Equalities; the two bodies of a connect or a weld have no order."""
+    pairs = sorted(_match(sides))
+    yield from sides.rows("equality", [row for row in fields.EQUALITY if row is not _KEPT], pairs)
+    for a, b in pairs:
+        if not _is_of_bodies(sides, a):
+            yield from sides.rows("equality", [_KEPT], [(a, b)])
+            continue
+        wanted, there = _wanted(sides, a, b), np.array(sides.two.eq_data[b])
+        used = 6 if int(sides.two.eq_type[b]) == _CONNECT else 11
+        off = np.abs(wanted - there)[:used]
+        if used == 11:  # a quaternion and its negative turn alike
+            turns = [matrix_from_quat(_unit(data[6:10])) for data in (wanted, there)]
+            off = np.append(off[[*range(6), 10]], np.abs(turns[0] - turns[1]).max())
+        if off.max() > _NEAR:
+            values = differing(("eq_data",), [wanted[:used]], [there[:used]])
+            edits = [("eq_data", (b,), wanted)]
+            yield sides.tell(_KEPT.subject, "equality", a, values, "", edits)
+
+    def inactive(raw: Any, k: int) -> tuple[Edit, ...]:
+        return zeros(("eq_active0",), raw, k) if raw.eq_active0[k] else ()
+
+    yield from sides.extras("equality", pairs, inactive)
+
+
+def _match(sides: Sides) -> Iterator[tuple[int, int]]:
+    """What keeps the same two things in the same way; of several the most alike."""
+    left = list(range(sides.two.neq))
+    for a in range(sides.one.neq):
+        ours = _keeps(sides, 0, a)
+        unlike = {
+            b: float(np.abs(_wanted(sides, a, b) - sides.two.eq_data[b]).max())
+            for b in left
+            if _keeps(sides, 1, b) == ours
+        }
+        if unlike:
+            best = min(unlike, key=unlike.__getitem__)
+            left.remove(best)
+            yield a, best
+
+
+def _keeps(sides: Sides, side: int, k: int) -> tuple[int, ...]:
+    """How an equality keeps things, and which, as ids of the second model."""
+    raw = (sides.one, sides.two)[side]
+    kind, of = int(raw.eq_type[k]), int(raw.eq_objtype[k])
+    target = {_JOINT: "joint", _TENDON: "tendon"}.get(kind, _KEEPS.get(of))
+    ids = [sides.there(side, target, int(each[k])) for each in (raw.eq_obj1id, raw.eq_obj2id)]
+    return kind, of, *(sorted(ids) if kind in (_CONNECT, _WELD) else ids)
+
+
+def _is_of_bodies(sides: Sides, a: int) -> bool:
+    one = sides.one
+    return int(one.eq_objtype[a]) == _BODY and int(one.eq_type[a]) in (_CONNECT, _WELD)
+
+
+def _wanted(sides: Sides, a: int, b: int) -> Array:
+    """What the second's equality keeps if it is as the first's, in the second's own terms.
+
+    Of a connect the first three numbers are the point in body 1, the next three that in
+    body 2. Of a weld it is the other way round, and a quaternion follows: the frame of body 2
+    in that of body 1.
+    """
+    one, data = sides.one, np.array(sides.one.eq_data[a])
+    if not _is_of_bodies(sides, a):
+        return data
+    bodies = [int(one.eq_obj1id[a]), int(one.eq_obj2id[a])]
+    turned = sides.ids["body"].get(bodies[0]) != int(sides.two.eq_obj1id[b])
+    frames = [_frame(sides, body) for body in bodies]
+    if not turned and all(frame is HERE for frame in frames):
+        return data
+    weld = int(one.eq_type[a]) == _WELD
+    spans = [slice(3, 6), slice(0, 3)] if weld else [slice(0, 3), slice(3, 6)]
+    points = [frame.of(data[span]) for frame, span in zip(frames, spans, strict=True)]
+    for point, span in zip(points, reversed(spans) if turned else spans, strict=True):
+        data[span] = point
+    if weld:
+        mat = frames[0].mat @ matrix_from_quat(_unit(data[6:10])) @ frames[1].mat.T
+        data[6:10] = quat_of(mat.T if turned else mat)
+    return data
+
+
+def _frame(sides: Sides, body: int) -> Placement:
+    """The frame of a body of the first model in that of its counterpart."""
+    there, pair = sides.ids["body"].get(body), sides.part(body)
+    if there is None or pair is None:
+        return HERE
+    ours, theirs = sides.solids[0].place(body), sides.solids[1].place(there)
+    if pair.align is ours is theirs is HERE:
+        return HERE
+    return theirs.inverse @ pair.align @ ours
+
+
+def _unit(quat: Array) -> Array:
+    return quat / (np.linalg.norm(quat) or 1.0)
+
+
+def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
+    """Which pairs of geoms touch by rules of their own, and which bodies never do."""
+    ours, theirs = (
+        [
+            {sides.there(side, "geom", int(g)) for g in (raw.pair_geom1[k], raw.pair_geom2[k])}
+            for k in range(raw.npair)
+        ]
+        for side, raw in enumerate((sides.one, sides.two))
+    )
+    pairs: Pairs = [(k, theirs.index(each)) for k, each in enumerate(ours) if each in theirs]
+    yield from sides.rows("pair", fields.PAIR, pairs)
+    yield from sides.extras("pair", pairs, lambda _raw, k: ((AS_GEOMS, (k,), None),))
+    apart = [
+        [
+            {sides.there(side, "body", b) for b in (int(s) >> 16, int(s) & 0xFFFF)}
+            for s in raw.exclude_signature
+        ]
+        for side, raw in enumerate((sides.one, sides.two))
+    ]
+    alike = [(k, apart[1].index(each)) for k, each in enumerate(apart[0]) if each in apart[1]]
+    # The world is never apart from itself: an entry without an effect.
+    yield from sides.extras("exclude", alike, lambda raw, k: zeros(("exclude_signature",), raw, k))
+
+
+def as_geoms(raw: Any, k: Any) -> tuple[Edit, ...]:
+    """What makes a pair of its own touch as its two geoms would without it.
+
+    The rules are those of MuJoCo's documentation, "Computation", "Contact parameters".
+    """
+    g, h = int(raw.pair_geom1[k]), int(raw.pair_geom2[k])
+    if not _would_touch(raw, g, h):
+        return (("pair_margin", (k,), NO_TOUCH),)
+    first, second = (g, h) if raw.geom_priority[g] >= raw.geom_priority[h] else (h, g)
+    weights = raw.geom_solmix[[first, second]].clip(1e-15)
+    mix = float(weights[0] / weights.sum())
+    dim, slide = int(raw.geom_condim[first]), raw.geom_friction[first]
+    if raw.geom_priority[first] > raw.geom_priority[second]:
+        mix = 1.0
+    else:
+        dim = max(dim, int(raw.geom_condim[second]))
+        slide = np.maximum(slide, raw.geom_friction[second])
+    refs = raw.geom_solref[[first, second]]
+    mixed = mix * refs[0] + (1 - mix) * refs[1] if (refs[:, 0] > 0).all() else refs.min(axis=0)
+    imps = raw.geom_solimp[[first, second]]
+    return (
+        ("pair_dim", (k,), dim),
+        ("pair_friction", (k,), slide[[0, 0, 1, 2, 2]]),
+        ("pair_solref", (k,), refs[0] if mix == 1.0 else mixed),
+        ("pair_solreffriction", (k,), np.zeros(2)),
+        ("pair_solimp", (k,), mix * imps[0] + (1 - mix) * imps[1]),
+        ("pair_margin", (k,), raw.geom_margin[[g, h]].max()),
+        ("pair_gap", (k,), raw.geom_gap[[g, h]].max()),
+    )
+
+
+def _would_touch(raw: Any, g: int, h: int) -> bool:
+    """Whether two geoms would touch without a pair of their own."""
+    low, high = sorted(int(raw.geom_bodyid[geom]) for geom in (g, h))
+    if (low << 16) + high in raw.exclude_signature:
+        return False
+    masks = raw.geom_contype[[g, h]] & raw.geom_conaffinity[[h, g]]
+    one, two = (int(raw.body_weldid[raw.geom_bodyid[each]]) for each in (g, h))
+    above = [int(raw.body_weldid[raw.body_parentid[each]]) for each in (one, two)]
+    filtered = one and two and (above[0] == two or above[1] == one)
+    return bool(masks.any() and one != two and not filtered)

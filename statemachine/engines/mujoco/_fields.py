@@ -114,6 +114,10 @@ PAIR = (
     FieldRow("margin", ("pair_margin", "pair_gap")),
     FieldRow("adhesion", ("pair_adhesion",)),
 )
+SENSOR = (
+    FieldRow("sensor", ("sensor_intprm", "sensor_delay", "sensor_interval", "sensor_history")),
+    FieldRow("cutoff", ("sensor_cutoff",)),
+)
 TREE = (FieldRow("sleep policy", ("tree_sleep_policy",)),)
 BODY = (FieldRow("weight taken off", ("body_gravcomp",)),)
 

@@ -3,206 +3,169 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...installed import require
-from ...interface import Array
+from ...description.meshes import likest
+from ...description.records import CollisionShape
 from ...measures.text import few
-from ...rotations import HERE, Placement
-from ..records import BodyPair, Counterparts, Edit, ModelDifference
-from . import _meshes as meshes
-from ._element_pairs import switched_off
-from ._figures import plain, same
-from ._meshes import VERTEX
-from ._solid import NEAR, SolidPairs, apart, name_of, quat_of
+from ...rotations import HERE
+from ..records import BodyPair, Edit, ModelDifference
+from . import _shapes as shapes
+from ._sides import NEAR, Pairs, Sides, apart, copies, name_of, same, zeros
 
-_PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
-_SIZES = {_SPHERE: 1, _CAPSULE: 2, _ELLIPSOID: 3, _CYLINDER: 2, _BOX: 3}
-_ROUND = (_CAPSULE, _CYLINDER)
+NO_TOUCH = -1e3  # [m] a margin at which nothing touches
+_VERTEX = 1e-6  # [m]: vertices are single precision
+# How a medium flows around a geom; what follows from its shape stands behind these.
+_FLUID = ("fluidshape", *(f"fluidcoef[{k}]" for k in range(5)))
+_BOUNDS = ("geom_size", "geom_rbound", "geom_aabb")
 _WRAPPED = (4, 5)  # mjtWrap: a sphere, a cylinder
 
 
-class Geoms(SolidPairs):
+class Geoms:
     """The geoms that act on the motion.
 
     Attributes:
-        geoms: Pairs of ids.
+        pairs: Pairs of ids.
         only: For each model those that have no counterpart.
     """
 
-    def __init__(self, one: Any, two: Any, pairs: Counterparts) -> None:
-        super().__init__(one, two, pairs)
-        self._told = set[int]()  # meshes of the second model, whose geoms change together
-        self.geoms: tuple[tuple[int, int], ...] = tuple(sorted(self._match_geoms()))
-        self.only = tuple(
-            [g for g in _acting(raw) if g not in {pair[k] for pair in self.geoms}]
-            for k, raw in enumerate((one, two))
-        )
+    def __init__(self, sides: Sides) -> None:
+        self._sides = sides
+        self._acting = _acting(sides.one), _acting(sides.two)
+        # By id, for each model: the shape on the rigid part, both in the frame of the second's.
+        self._shapes: tuple[dict[int, CollisionShape], dict[int, CollisionShape]] = {}, {}
+        self._copied = set[int]()  # meshes of the second model, whose geoms change together
+        self.pairs: Pairs = sorted(self._match())
+        sides.ids["geom"] = dict(self.pairs)
+        matched = [{pair[k] for pair in self.pairs} for k in (0, 1)]
+        self.only = tuple([g for g in self._acting[k] if g not in matched[k]] for k in (0, 1))
+
+    def _match(self) -> Iterator[tuple[int, int]]:
+        """By name, then by likeness, within each rigid part."""
+        for pair in self._sides.pairs.solids:
+            ours, theirs = self._on(0, pair.one), self._on(1, pair.two)
+            for g, shape in ours.items():
+                ours[g] = replace(shape, place=pair.align @ shape.place)
+            self._shapes[0].update(ours)
+            self._shapes[1].update(theirs)
+            for k, i in likest([*ours.values()], [*theirs.values()]).items():
+                yield [*ours][k], [*theirs][i]
+
+    def _on(self, side: int, head: int) -> dict[int, CollisionShape]:
+        """The shapes of a rigid part, in its frame."""
+        solids = self._sides.solids[side]
+        on = [g for g in self._acting[side] if solids.head(solids.raw.geom_bodyid[g]) == head]
+        return {g: replace(shapes.of(solids.raw, g), place=solids.on("geom", g)) for g in on}
 
     def found(self) -> Iterator[ModelDifference]:
         """What they differ in."""
-        self._told.clear()
-        for pair in self.geoms:
-            yield from self._shape(*pair)
-        yield from self._extra()
-
-    def _match_geoms(self) -> Iterator[tuple[int, int]]:
-        """By name, then by likeness, within each rigid part."""
-        for pair in self._pairs.solids:
-            ours = [g for g in _acting(self._one) if self._head(0, g) == pair.one]
-            theirs = [g for g in _acting(self._two) if self._head(1, g) == pair.two]
-            names = {self._two.geom(g).name: g for g in theirs if self._two.geom(g).name}
-            for g in list(ours):
-                other = names.get(self._one.geom(g).name)
-                if other is not None:
-                    yield g, other
-                    ours.remove(g)
-                    theirs.remove(other)
-            costs = sorted((self._cost(pair, a, b), a, b) for a in ours for b in theirs)
-            for _, a, b in costs:
-                if a in ours and b in theirs:
-                    yield a, b
-                    ours.remove(a)
-                    theirs.remove(b)
-
-    def _head(self, side: int, geom: int) -> int:
-        solids = self._solids[side]
-        return solids.head(int(solids.raw.geom_bodyid[geom]))
-
-    def _cost(self, pair: BodyPair, a: int, b: int) -> float:
-        """How unlike two geoms are: of other types is worse than far apart."""
-        ours, theirs = pair.align @ self._solids[0].geom(a), self._solids[1].geom(b)
-        cost = ours.distance(theirs)
-        if self._one.geom_type[a] != self._two.geom_type[b]:
-            return cost + 100.0
-        return cost + float(np.abs(_size(self._one, a) - _size(self._two, b)).sum())
+        for a, b in self.pairs:
+            yield from self._shape(a, b)
+        for side, raw in enumerate((self._sides.one, self._sides.two)):
+            for g in self.only[side]:  # is switched off there
+                edits = zeros(("geom_contype", "geom_conaffinity", "geom_fluid"), raw, g)
+                pairs = np.flatnonzero((raw.pair_geom1 == g) | (raw.pair_geom2 == g)).tolist()
+                edits += tuple(("pair_margin", (k,), NO_TOUCH) for k in pairs)
+                yield self._sides.alone(side, "geom", g, edits, "shape", shapes.kind(raw, g))
 
     def _shape(self, a: int, b: int) -> Iterator[ModelDifference]:
-        one, two = self._one, self._two
-        pair = self._pair_of(int(one.geom_bodyid[a]))
-        assert pair is not None  # geoms are matched within a pair
-        name = name_of(one, "geom", a)
-        kinds = int(one.geom_type[a]), int(two.geom_type[b])
-        if kinds == (_MESH, _MESH):
-            yield from self._mesh(pair, a, b, name)
+        sides, one, two = self._sides, self._sides.one, self._sides.two
+        ours, theirs = self._shapes[0][a], self._shapes[1][b]
+        kinds = ours.kind, theirs.kind
+        if kinds == ("mesh", "mesh"):
+            yield from self._mesh(a, b)
             return
-        if kinds[0] != kinds[1] and not {*kinds} <= _SIZES.keys():
-            values = (("type", _kind(kinds[0]), _kind(kinds[1])),)
+        values: list[tuple[Any, ...]] = [("type", *kinds)] if kinds[0] != kinds[1] else []
+        if values and not {*kinds} <= shapes.PRIMITIVES.keys():
             why = "one of them is no primitive, and cannot become the other"
-            yield ModelDifference("shape", "geom", name, values, refused=why)
+            yield sides.tell("shape", "geom", a, values, refused=why)
             return
-        if kinds[0] == _HFIELD:
-            yield from meshes.heights(one, two, a, b, name)
-        copied = ("geom_type", "geom_size", "geom_rbound", "geom_aabb", "geom_fluid")
-        values = []
-        if kinds[0] != kinds[1]:
-            values.append(("type", _kind(kinds[0]), _kind(kinds[1])))
-        if kinds[0] in _SIZES and not same(_size(one, a), _size(two, b)):
-            values.append(("size", plain(_size(one, a)), plain(_size(two, b))))
-        if not same(one.geom_fluid[a], two.geom_fluid[b]):
-            values.append(("fluid", "as given", "as given"))
+        if kinds[0] == "hfield":
+            yield from shapes.heights(sides, a, b)
+        if not same(ours.size, theirs.size):
+            values.append(("size", ours.size, theirs.size))
+        values += [
+            (name, *map(float, fluid))
+            for name, *fluid in zip(_FLUID, one.geom_fluid[a], two.geom_fluid[b], strict=False)
+            if not same(*fluid)
+        ]
         if values:
-            edits = tuple((field, (b,), _copied(one, field, a)) for field in copied)
-            yield ModelDifference("shape", "geom", name, tuple(values), "m", edits)
-        wanted, theirs = pair.align @ self._solids[0].geom(a), self._solids[1].geom(b)
-        if _off(kinds[0], wanted, theirs):
-            yield self._moved(pair, a, b, wanted, theirs, name)
+            edits = copies(("geom_type", *_BOUNDS, "geom_fluid"), one, a, b)
+            yield sides.tell("shape", "geom", a, values, "m", edits)
+        if _off(ours, theirs):
+            yield self._moved(a, b)
 
-    def _moved(
-        self, pair: BodyPair, a: int, b: int, wanted: Placement, theirs: Placement, name: str
-    ) -> ModelDifference:
-        one, two = self._one, self._two
-        bodies = int(one.geom_bodyid[a]), int(two.geom_bodyid[b])
-        if pair.align is HERE and bodies == (pair.one, pair.two):
-            pos, quat = one.geom_pos[a].copy(), one.geom_quat[a].copy()
-        else:
-            inner = self._solids[1].place(bodies[1]).inverse @ wanted
-            pos, quat = inner.pos, quat_of(inner.mat)
-        values = [("place", plain(wanted.pos), plain(theirs.pos))]
-        if wanted.distance(theirs) <= NEAR:
-            values = [("turned by [rad]", 0.0, wanted.angle(theirs))]
-        edits: tuple[Edit, ...] = (("geom_pos", (b,), pos), ("geom_quat", (b,), quat))
-        return ModelDifference("place", "geom", name, tuple(values), "m", edits)
+    def _moved(self, a: int, b: int) -> ModelDifference:
+        sides, pair = self._sides, self._part(a)
+        bodies = sides.one.geom_bodyid[a], sides.two.geom_bodyid[b]
+        exact = pair.align is HERE and bodies == (pair.one, pair.two)
+        places = self._shapes[0][a].place, self._shapes[1][b].place
+        return sides.elsewhere("geom", a, b, *places, exact)
 
-    def _mesh(self, pair: BodyPair, a: int, b: int, name: str) -> Iterator[ModelDifference]:
+    def _part(self, a: int) -> BodyPair:
+        pair = self._sides.part(int(self._sides.one.geom_bodyid[a]))
+        assert pair is not None  # geoms are matched within a pair
+        return pair
+
+    def _mesh(self, a: int, b: int) -> Iterator[ModelDifference]:
         """A mesh acts by its convex hull, whatever the order of its vertices and faces."""
-        one, two = self._one, self._two
-        ours = pair.align.pos + self._solids[0].vertices(a) @ pair.align.mat.T
-        theirs = self._solids[1].vertices(b)
-        corners = meshes.corners(one, a, ours), meshes.corners(two, b, theirs)
-        off = meshes.apart(*corners)
-        if off <= VERTEX:
+        one, two = self._sides.one, self._sides.two
+        ours, theirs = self._shapes[0][a], self._shapes[1][b]
+        points = ours.corners, theirs.corners
+        corners = shapes.hull(one, a, points[0]), shapes.hull(two, b, points[1])
+        off = shapes.apart(*corners)
+        if off <= _VERTEX:
             return
-        own = [meshes.corners(raw, g, meshes.vertices(raw, g)) for raw, g in ((one, a), (two, b))]
-        if meshes.apart(*own) <= VERTEX:
-            wanted, there = pair.align @ self._solids[0].geom(a), self._solids[1].geom(b)
-            yield self._moved(pair, a, b, wanted, there, name)
+        if (
+            shapes.apart(shapes.hull(one, a, ours.points), shapes.hull(two, b, theirs.points))
+            <= _VERTEX
+        ):
+            yield self._moved(a, b)
             return
-        values: tuple[tuple[str, Any, Any], ...] = (("farthest corner", 0.0, off),)
-        if len(corners[0]) != len(corners[1]):
-            values = (("corners of its hull", len(corners[0]), len(corners[1])),)
-        subject = "hull" if meshes.apart(ours, theirs) <= VERTEX else "shape"
-        together, why = ((a, b),), ""
+        subject = "hull" if shapes.apart(*points) <= _VERTEX else "shape"
+        mesh, together, why = int(two.geom_dataid[b]), [(a, b)], ""
         edits: tuple[Edit, ...] = ()
         if b in self._choices:
             edits = (("geom_dataid", (b,), self._choices[b]),)
+        elif mesh in self._copied:
+            return  # its geoms change together
+        elif pairs := self._together(a, b):
+            together = pairs
+            edits, why = shapes.copied(one, two, int(one.geom_dataid[a]), mesh)
+            self._copied.add(mesh)
         else:
-            mesh = int(two.geom_dataid[b])
-            if mesh in self._told:
-                return  # its geoms change together
-            together, why = self._together(a, b), "another geom keeps this mesh, or gets a third"
-            if together:
-                edits, why = meshes.copied(one, two, int(one.geom_dataid[a]), mesh)
-                self._told.add(mesh)
-        if edits:
-            edits += tuple(edit for each in together for edit in self._as_there(*each))
-        name = few([name_of(one, "geom", each) for each, _ in together]) or name
-        unit = "m" if values[0][0] == "farthest corner" else ""
-        yield ModelDifference(subject, "geom", name, values, unit, edits, (), why)
+            why = "another geom keeps this mesh, or gets a third"
+        for pair in together if edits else ():
+            edits += (*copies(_BOUNDS, one, *pair), *self._moved(*pair).edits)
+        name = few([name_of(one, "geom", each) for each, _ in together])
+        counts, unit = [len(each) for each in corners], ""
+        value = ("corners of its hull", *counts)
+        if counts[0] == counts[1]:
+            value, unit = ("farthest corner", 0.0, off), "m"
+        yield ModelDifference(subject, "geom", name, (value,), unit, edits, (), why)
 
     @cached_property
     def _choices(self) -> dict[int, int]:
         """By geom of the second model the mesh there that its counterpart has."""
-        one, two = self._one, self._two
-        pairs = [(a, b) for a, b in self.geoms if one.geom_type[a] == two.geom_type[b] == _MESH]
-        return meshes.chosen(one, two, pairs)
+        kinds = self._sides.one.geom_type, self._sides.two.geom_type
+        pairs = [(a, b) for a, b in self.pairs if kinds[0][a] == kinds[1][b] == shapes.MESH]
+        return shapes.chosen(self._sides.one, self._sides.two, pairs)
 
-    def _as_there(self, a: int, b: int) -> tuple[Edit, ...]:
-        """Edits that give a mesh geom the place and the bounds of its counterpart."""
-        pair = self._pair_of(int(self._one.geom_bodyid[a]))
-        assert pair is not None
-        wanted, there = pair.align @ self._solids[0].geom(a), self._solids[1].geom(b)
-        moved = self._moved(pair, a, b, wanted, there, "").edits
-        return (*meshes.bounds(self._one, a, b), *moved)
-
-    def _together(self, a: int, b: int) -> tuple[tuple[int, int], ...]:
+    def _together(self, a: int, b: int) -> list[tuple[int, int]]:
         """The pairs that share the mesh of `b`, if those of the first model share one, too."""
-        one, two = self._one, self._two
-        sharing = (two.geom_type == _MESH) & (two.geom_dataid == two.geom_dataid[b])
-        pairs = tuple(pair for pair in self.geoms if sharing[pair[1]])
-        alike = len(pairs) == sum(sharing[g] for g in _acting(two)) and all(
-            one.geom_type[each] == _MESH
-            and meshes.identical(one, int(one.geom_dataid[a]), one, int(one.geom_dataid[each]))
+        one, two = self._sides.one, self._sides.two
+        sharing = (two.geom_type == shapes.MESH) & (two.geom_dataid == two.geom_dataid[b])
+        pairs = [pair for pair in self.pairs if sharing[pair[1]]]
+        alike = len(pairs) == sum(sharing[g] for g in self._acting[1]) and all(
+            one.geom_type[each] == shapes.MESH
+            and shapes.identical(one, int(one.geom_dataid[a]), one, int(one.geom_dataid[each]))
             for each, _ in pairs
         )
-        return pairs if alike else ()
-
-    def _extra(self) -> Iterator[ModelDifference]:
-        """Geoms that only one has are switched off there."""
-        for side, raw in enumerate((self._one, self._two)):
-            for g in self.only[side]:
-                kind = _kind(int(raw.geom_type[g]))
-                edits: tuple[Edit, ...] = (("geom_contype", (g,), 0), ("geom_conaffinity", (g,), 0))
-                edits += (("geom_fluid", (g,), np.zeros(raw.geom_fluid.shape[1])),)
-                edits += tuple(
-                    ("pair_margin", (k,), -1e3)
-                    for k in range(raw.npair)
-                    if g in (raw.pair_geom1[k], raw.pair_geom2[k])
-                )
-                yield switched_off(side, raw, "geom", g, edits, called="shape", what=kind)
+        return pairs if alike else []
 
 
 def touches(raw: Any) -> Any:
@@ -219,28 +182,14 @@ def _acting(raw: Any) -> list[int]:
     return np.flatnonzero(found).tolist()
 
 
-def _off(kind: int, one: Placement, two: Placement) -> bool:
+def _off(one: CollisionShape, two: CollisionShape) -> bool:
     """Whether a shape is elsewhere; some look alike when they are turned."""
-    far, turn = apart(one, two)
-    z, other = one.mat[:, 2], two.mat[:, 2]
-    if kind == _SPHERE:
-        return far > NEAR
-    if kind == _PLANE:
-        tilt, depth = np.abs(z - other).max(), abs(z @ (one.pos - two.pos))
-        return bool(max(tilt, depth) > NEAR)
-    if kind in _ROUND:
-        across = min(np.abs(z - other).max(), np.abs(z + other).max())
-        return far > NEAR or bool(across > NEAR)
-    return far > NEAR or turn > NEAR
-
-
-def _size(raw: Any, geom: int) -> Array:
-    return np.array(raw.geom_size[geom][: _SIZES.get(int(raw.geom_type[geom]), 0)])
-
-
-def _kind(kind: int) -> str:
-    return require("mujoco").mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
-
-
-def _copied(raw: Any, field: str, index: int) -> Any:
-    return np.array(getattr(raw, field)[index])
+    far, turn = apart(one.place, two.place)
+    z, other = one.place.mat[:, 2], two.place.mat[:, 2]
+    if one.kind == "sphere":
+        turn = 0.0
+    elif one.kind == "plane":
+        far, turn = abs(z @ (one.place.pos - two.place.pos)), np.abs(z - other).max()
+    elif one.kind in ("capsule", "cylinder"):
+        turn = min(np.abs(z - other).max(), np.abs(z + other).max())
+    return bool(max(far, turn) > NEAR)

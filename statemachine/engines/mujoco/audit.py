@@ -12,7 +12,7 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array, Model
-from ..auditing import ONLY, Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
+from ..auditing import ONLY, Disturbance, Driver, Restore, SaveMethod, SavePoint
 
 # What another past may have left in them, as a part of the weight or inertia that it acts on.
 _PUSH = 0.1
@@ -69,18 +69,10 @@ class MujocoDriver(Driver):
         data.userdata[:] += 1.0
         data.eq_active[:] = 1 - data.eq_active
 
-    def _measure(self, point: SavePoint) -> Measured:
-        with self.at(point) as data:
-            self.mj.mj_forward(data.model, data)
-            kind = self.mj.mjtConstraint
-            return Measured(
-                point.name,
-                point.how,
-                float(data.time),
-                int(data.ncon),
-                int(np.isin(data.efc_type, (int(kind.mjCNSTR_LIMIT_JOINT),)).sum()),
-                float(np.abs(data.qvel).max(initial=0.0)),
-            )
+    def touching(self, machine: Any) -> tuple[int, int]:
+        self.mj.mj_forward(machine.model, machine)
+        limit = int(self.mj.mjtConstraint.mjCNSTR_LIMIT_JOINT)
+        return int(machine.ncon), int((machine.efc_type == limit).sum())
 
     def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         """Parts of the integration state, then all of it but one component."""

@@ -143,26 +143,19 @@ class MujocoWatch(CallWatch):
 
     def name(self, namespace: Mapping[str, Any]) -> None:
         for label, value in named(namespace):
-            if isinstance(value, Model):
-                self._name_model(label, value)
-            elif isinstance(value, Data):
-                self._name_model(f"{label}.model", value.model)
-                raw = getattr(value, "_raw", None)  # of a closed one there is none
-                if isinstance(raw, self._kinds):
-                    self._label(raw, label)
-            elif isinstance(value, self._kinds):
-                self._label(value, label, raw=True)
-
-    def _name_model(self, label: str, model: Model) -> None:
-        if isinstance(model.raw, self._kinds):
-            self._label(model.raw, label)
-        elif isinstance(model.compiled, self._kinds):
-            self._label(model.compiled, f"the description of {label}", raw=True)
-
-    def _label(self, thing: Any, label: str, raw: bool = False) -> None:
-        watched = self._watched(thing)
-        watched.raw = watched.raw if watched.named else raw
-        watched.lead(label)
+            leads = [(label, value, True)]
+            if isinstance(value, (Model, Data)):
+                model = value if isinstance(value, Model) else value.model
+                where = label if model is value else f"{label}.model"
+                described = f"the description of {where}"
+                leads = [(where, model.raw, False), (described, model.compiled, True)]
+            if isinstance(value, Data):  # of a closed one there is none
+                leads.append((label, getattr(value, "_raw", None), False))
+            for said, thing, raw in leads:
+                if isinstance(thing, self._kinds):
+                    watched = self._watched(thing)
+                    watched.raw = watched.raw if watched.named else raw
+                    watched.lead(said)
 
     def living(self) -> Sequence[WatchedObject]:
         self._known = {key: known for key, known in self._known.items() if known.thing is not None}

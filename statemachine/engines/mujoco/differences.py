@@ -9,7 +9,8 @@ second model to the first, in the second one's own terms.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,28 +18,18 @@ import numpy as np
 from ...installed import require
 from ..records import Counterparts, Edit, ModelDifference
 from . import _fields as fields
-from ._contact_pairs import ContactPairs
-from ._drives import Drives
-from ._elements import Elements
-from ._entries import entries
-from ._equalities import Equalities
-from ._figures import plain, same
+from ._drives import drives, sensors
+from ._elements import AS_GEOMS, as_geoms, contact_pairs, elements, equalities
 from ._geoms import Geoms
-from ._places import Places
-from ._sensors import sensors
-from ._weights import Weights
+from ._parts import places, weights
+from ._sides import Sides, plain, same
 
-__all__ = ["differences", "edited", "entries", "sensors"]
+__all__ = ["differences", "edited", "entries", "sensors", "settings_of"]
 
 # After these the boxes around the geoms of a body are no longer where they were.
 _MOVES = {
-    "body_ipos",
-    "body_iquat",
-    "geom_pos",
-    "geom_quat",
-    "geom_size",
-    "geom_margin",
-    "geom_gap",
+    *("body_ipos", "body_iquat", "geom_pos", "geom_quat", "geom_size"),
+    *("geom_margin", "geom_gap"),
 }
 
 
@@ -53,16 +44,17 @@ def differences(
         pairs: What of one is what of the other.
         world: Whether gravity and the timestep are compared, too.
     """
-    geoms = Geoms(one, two, pairs)
+    sides = Sides(one, two, pairs)
+    geoms = Geoms(sides)
     return (
         *_options(one, two, world),
-        *Weights(one, two, pairs).found(),
-        *Places(one, two, pairs).found(),
+        *weights(sides),
+        *places(sides),
         *geoms.found(),
-        *Elements(one, two, pairs, geoms.geoms).found(),
-        *Equalities(one, two, pairs, geoms.geoms).found(),
-        *Drives(one, two, pairs, geoms.geoms).found(),
-        *ContactPairs(one, two, pairs, geoms.geoms).found(),
+        *elements(sides),
+        *equalities(sides),
+        *drives(sides),
+        *contact_pairs(sides),
         *_whole(one, two),
     )
 
@@ -73,14 +65,15 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
     What the compiler computes once (inverse weights, masks of bodies) is computed again. The tree
     of boxes that sorts out pairs of geoms is not: it is switched off, which changes no contact.
     """
+    from ...backends._edits import put
+
     mujoco = require("mujoco")
-    made, own_scale = copy.copy(raw), _scale(raw) is None
-    edits = list(edits)
+    made = copy.copy(raw)
+    # After what is done to the geoms: what makes a pair as its geoms are then.
+    edits = sorted(edits, key=lambda edit: edit[0] == AS_GEOMS)
     for name, index, value in edits:
-        if "." in name:
-            _set_option(made, name, index, value)
-        else:
-            getattr(made, name)[index] = value
+        for edit in as_geoms(made, *index) if name == AS_GEOMS else ((name, index, value),):
+            put(made, edit[0], edit[2], edit[1])
     if any(name in _MOVES for name, _, _ in edits):
         made.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
     _frames(made, edits)
@@ -88,23 +81,18 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
     made.flg_adhesion = made.flg_adhesion or made.geom_adhesion.any()
     made.flg_surfacevel = made.flg_surfacevel or made.geom_surfacevel.any()
     mujoco.mj_setConst(made, mujoco.MjData(made))
-    if own_scale and made.nv:
-        made.stat.meaninertia = made.dof_M0.mean()
     return made
 
 
-def _set_option(raw: Any, name: str, index: tuple[Any, ...], value: Any) -> None:
-    holder, _, field = name.rpartition(".")
-    owner = getattr(raw, holder)
-    if index and np.ndim(getattr(owner, field)):
-        getattr(owner, field)[index] = value
-    elif index:  # a bit of a set of flags
-        flags = int(getattr(owner, field))
-        setattr(owner, field, flags | index[0] if value else flags & ~index[0])
-    elif np.ndim(getattr(owner, field)):
-        getattr(owner, field)[:] = value
-    else:
-        setattr(owner, field, value)
+def _read(raw: Any, edit: Edit) -> Any:
+    """What stands where an edit goes."""
+    from ...backends._edits import held
+
+    holder, field = held(raw, edit[0])
+    now = getattr(holder, field)
+    if np.ndim(now):
+        return np.array(now[edit[1]])
+    return bool(now & edit[1][0]) if edit[1] else now
 
 
 def _frames(raw: Any, edits: Iterable[Edit]) -> None:
@@ -131,37 +119,34 @@ def _masks(raw: Any) -> None:
     raw.body_margin[:] = margin
 
 
-def _scale(raw: Any) -> float | None:
-    """The mean inertia by which a solver decides to stop, where a file gives it; else None."""
-    if not raw.nv:
-        return None
-    given = float(raw.stat.meaninertia)
-    return None if np.isclose(given, raw.dof_M0.mean(), rtol=1e-9) else given
-
-
-def _options(one: Any, two: Any, world: bool) -> list[ModelDifference]:
-    found = []
+def _options(one: Any, two: Any, world: bool) -> Iterator[ModelDifference]:
+    overrides = int(require("mujoco").mjtEnableBit.mjENBL_OVERRIDE)
+    overridden = (one.opt.enableflags | two.opt.enableflags) & overrides
     for subject, names in fields.OPTIONS.items():
-        if not world and subject in ("gravity", "timestep"):
-            continue
-        if subject == "contact override" and not (_overrides(one) or _overrides(two)):
-            continue
-        values, edits = [], list[Edit]()
-        for name in names:
-            a, b = getattr(one.opt, name), getattr(two.opt, name)
-            if not same(a, b):
-                values.append((name, _told(name, a), _told(name, b)))
-                edits.append((f"opt.{name}", (), copy.copy(a)))
-        if values:
+        idle = (not world and subject in ("gravity", "timestep")) or (
+            subject == "contact override" and not overridden
+        )
+        both = [(name, getattr(one.opt, name), getattr(two.opt, name)) for name in names]
+        differ = [] if idle else [each for each in both if not same(*each[1:])]
+        if differ:
+            values = tuple((name, _told(name, a), _told(name, b)) for name, a, b in differ)
+            edits = tuple((f"opt.{name}", (), copy.copy(a)) for name, a, _ in differ)
             unit = fields.OPTION_UNITS.get(subject, "")
-            found.append(ModelDifference(subject, "option", "", tuple(values), unit, tuple(edits)))
-    ours, theirs = _scale(one), _scale(two)
-    if (ours is None) != (theirs is None) or not same(ours or 0.0, theirs or 0.0):
-        value = one.stat.meaninertia
-        values = (("meaninertia", float(value), float(two.stat.meaninertia)),)
-        edits = (("stat.meaninertia", (), value),)
-        found.append(ModelDifference("scale of the solver", "option", "", values, edits=edits))
-    return found + _flags(one, two)
+            yield ModelDifference(subject, "option", "", values, unit, edits)
+    for field, word, bit in _flag_bits():
+        switches = [_switch(raw, field, bit) for raw in (one, two)]
+        if switches[0] != switches[1]:
+            values = ((f"flag {word}", *switches),)
+            edits = ((f"opt.{field}", (bit,), bool(getattr(one.opt, field) & bit)),)
+            yield ModelDifference(word, "flag", "", values, edits=edits)
+
+
+def settings_of(raw: Any) -> dict[str, Any]:
+    """The options and flags of a compiled model by name, as they are told."""
+    names = [name for group in fields.OPTIONS.values() for name in group]
+    options = {name: _told(name, getattr(raw.opt, name)) for name in names}
+    flags = {f"flag {word}": _switch(raw, field, bit) for field, word, bit in _flag_bits()}
+    return options | flags
 
 
 def _told(name: str, value: Any) -> Any:
@@ -172,40 +157,125 @@ def _told(name: str, value: Any) -> Any:
     return chosen.partition("_")[2].lower()
 
 
-def _overrides(raw: Any) -> bool:
-    return bool(raw.opt.enableflags & int(require("mujoco").mjtEnableBit.mjENBL_OVERRIDE))
-
-
-def _flags(one: Any, two: Any) -> list[ModelDifference]:
-    mujoco, found = require("mujoco"), []
+def _flag_bits() -> Iterator[tuple[str, str, int]]:
+    """The flags that can change a motion: their field, what they are called, their bit."""
+    mujoco = require("mujoco")
     for field, bits in zip(fields.FLAGS, (mujoco.mjtDisableBit, mujoco.mjtEnableBit), strict=True):
         for name, bit in bits.__members__.items():
-            number = int(bit)
-            a, b = (bool(int(getattr(each.opt, field)) & number) for each in (one, two))
-            if number.bit_count() != 1 or a == b or name in fields.IDLE_FLAGS:
-                continue
-            word = name.partition("_")[2].lower()
-            on = field == "enableflags"
-            values = ((word, _switch(a == on), _switch(b == on)),)
-            edits: tuple[Edit, ...] = ((f"opt.{field}", (number,), a),)
-            found.append(ModelDifference(word, "flag", "", values, edits=edits))
-    return found
+            if int(bit).bit_count() == 1 and "_" in name and name not in fields.IDLE_FLAGS:
+                yield field, name.partition("_")[2].lower(), int(bit)
 
 
-def _switch(on: bool) -> str:
-    return "on" if on else "off"
+def _switch(raw: Any, field: str, bit: int) -> str:
+    raised = bool(int(getattr(raw.opt, field)) & bit)
+    return "on" if raised == (field == "enableflags") else "off"
 
 
-def _whole(one: Any, two: Any) -> list[ModelDifference]:
+def _whole(one: Any, two: Any) -> Iterator[ModelDifference]:
     """What is compared as a whole and brought to nothing: deformable bodies, plugins."""
-    found = []
     for subject, pattern in (("deformable bodies", "flex_"), ("plugins", "plugin")):
-        names = [name for name in dir(one) if name.startswith(pattern)]
-        names = [name for name in names if fields.known(name) == "whole"]
-        differing = [n for n in names if not same(getattr(one, n), getattr(two, n))]
-        if differing:
+        names = [n for n in dir(one) if n.startswith(pattern) and fields.known(n) == "whole"]
+        if not all(same(getattr(one, n), getattr(two, n)) for n in names):
             counts = [int(getattr(raw, f"n{pattern.rstrip('_')}", 0)) for raw in (one, two)]
-            values = (("count", counts[0], counts[1]),)
             why = "they are compared as a whole, and not brought over"
-            found.append(ModelDifference(subject, "model", "", values, refused=why))
-    return found
+            yield ModelDifference(subject, "model", "", (("count", *counts),), refused=why)
+
+
+# Fields whose entries mean something one by one, and what each is called; a name with {} is of all.
+_AXES, _ENDS, _NUMBERED = ("x", "y", "z"), ("lower end", "upper end"), ("{}[{}]",)
+_SPLIT: dict[str, Sequence[str]] = {
+    **dict.fromkeys(
+        (
+            *("body_ipos", "body_pos", "jnt_pos", "geom_pos", "site_pos", "geom_surfacevel"),
+            *("opt.gravity", "opt.wind", "opt.magnetic"),
+        ),
+        _AXES,
+    ),
+    **dict.fromkeys(
+        (
+            *("jnt_range", "jnt_actfrcrange", "tendon_range", "tendon_actfrcrange"),
+            *("actuator_ctrlrange", "actuator_forcerange", "actuator_actrange"),
+        ),
+        _ENDS,
+    ),
+    **dict.fromkeys(
+        ("body_inertia", "geom_size", "geom_friction", "pair_friction", "actuator_gear"), _NUMBERED
+    ),
+    **dict.fromkeys(("actuator_gainprm", "actuator_biasprm"), _NUMBERED),
+}
+_CALLED = {"body_inertia": "diaginertia"}
+# A difference that sets one of these is a thing of one piece: the rest means something else then.
+_KINDS = ("geom_type", "actuator_gaintype", "actuator_biastype", "actuator_dyntype", "body_iquat")
+_TURNS = ("body_quat", "geom_quat", "site_quat")
+
+
+def entries(two: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
+    """A difference by its single entries, or itself where it is of one piece.
+
+    Args:
+        two: The compiled model that its edits are of.
+        difference: One of `differences`.
+    """
+    if difference.edits_one or difference.refused or difference.subject.startswith("extra "):
+        return (difference,)
+    edits = [edit for edit in difference.edits if not same(edit[2], _read(two, edit))]
+    if any(
+        name in _KINDS or name.endswith("limited") or any(isinstance(each, slice) for each in index)
+        for name, index, _ in edits
+    ):
+        return (difference,)
+    found = tuple(
+        replace(
+            difference,
+            subject=f"{difference.subject} ({word})",
+            values=((word, one, other),),
+            unit=unit or difference.unit,
+            edits=those,
+        )
+        for word, one, other, unit, those in _by_entry(two, edits)
+    )
+    return found if len(found) > 1 else (difference,)
+
+
+# What an entry is called, both values, its unit where that is another, and what brings it over.
+_Entry = tuple[str, Any, Any, str, tuple[Edit, ...]]
+
+
+def _by_entry(two: Any, edits: Sequence[Edit]) -> Iterator[_Entry]:
+    servo = [edit for edit in edits if edit[0] in ("actuator_gainprm", "actuator_biasprm")]
+    wanted, now = [edit[2] for edit in servo], [_read(two, edit) for edit in servo]
+    rest = list(edits)
+    if len(servo) == 2 and _is_servo(*wanted) and _is_servo(*now):
+        # The gain of a servo stands in two places.
+        (gain, index, _), (bias, _, _) = servo
+        kp, others = float(wanted[0][0]), wanted[1].tolist()
+        yield (
+            "kp",
+            kp,
+            float(now[0][0]),
+            "",
+            ((gain, (*index, 0), kp), (bias, (*index, 1), others[1])),
+        )
+        rest = [edit for edit in edits if edit not in servo]
+        rest += [(bias, (*index, k), others[k]) for k in range(2, len(others))]
+        rest = [edit for edit in rest if not same(edit[2], _read(two, edit))]
+    for edit in rest:
+        (name, index, value), old = edit, _read(two, edit)
+        word = _CALLED.get(name, name.partition("_")[2] or name).removeprefix("opt.")
+        names = _SPLIT.get(name)
+        if name in _TURNS:
+            angle = 2 * float(np.arccos(np.clip(abs(np.dot(value, old)), 0.0, 1.0)))
+            yield "turn", 0.0, angle, "rad", (edit,)
+        elif names is None or not np.ndim(value):
+            word += "".join(f"[{k}]" for k in index[1:2])
+            yield word, plain(value), plain(old), "", (edit,)
+        else:
+            for k in range(len(value)):
+                if not same(value[k], old[k]):
+                    called = names[0].format(word, k) if names is _NUMBERED else names[k]
+                    one, other = float(value[k]), float(old[k])
+                    yield called, one, other, "", ((name, (*index, k), one),)
+
+
+def _is_servo(gains: Any, biases: Any) -> bool:
+    return bool(np.ndim(gains) and gains[0] == -biases[1] and not gains[1:].any() and not biases[0])

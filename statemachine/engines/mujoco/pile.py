@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -36,27 +37,23 @@ _FIELDS = {
 }
 
 
-def _copied(scene: MujocoPile) -> Iterator[Callable[[], object]]:
-    data = scene.data
-    qpos, qvel = np.array(data.qpos), np.array(data.qvel)
+@contextmanager
+def _copied(scene: MujocoPile) -> Iterator[Callable[[MujocoPile], object]]:
+    qpos, qvel = np.array(scene.data.qpos), np.array(scene.data.qvel)
 
-    def restore() -> None:
-        data.qpos[:], data.qvel[:] = qpos, qvel
+    def restore(other: MujocoPile) -> None:
+        other.data.qpos[:], other.data.qvel[:] = qpos, qvel
 
     yield restore
 
 
-def _state(part: str) -> Callable[[MujocoPile], Iterator[Callable[[], object]]]:
+@contextmanager
+def _state(scene: MujocoPile, part: str) -> Iterator[Callable[[MujocoPile], object]]:
     """The components of a mask of mjtState."""
-
-    def saved(scene: MujocoPile) -> Iterator[Callable[[], object]]:
-        mj, model, data = scene.mj, scene.model, scene.data
-        mask = getattr(mj.mjtState, part)
-        kept = np.empty(mj.mj_stateSize(model, mask))
-        mj.mj_getState(model, data, kept, mask)
-        yield lambda: mj.mj_setState(model, data, kept, mask)
-
-    return saved
+    mask = getattr(scene.mj.mjtState, part)
+    state = np.empty(scene.mj.mj_stateSize(scene.model, mask))
+    scene.mj.mj_getState(scene.model, scene.data, state, mask)
+    yield lambda other: other.mj.mj_setState(other.model, other.data, state, mask)
 
 
 class MujocoPile(Pile):
@@ -67,9 +64,9 @@ class MujocoPile(Pile):
         "mj_resetData": lambda scene: scene.mj.mj_resetData(scene.model, scene.data)
     }
     ways_to_save: ClassVar = {
-        "qpos and qvel copied": contextmanager(_copied),
-        "mjSTATE_FULLPHYSICS": contextmanager(_state("mjSTATE_FULLPHYSICS")),
-        "mjSTATE_INTEGRATION": contextmanager(_state("mjSTATE_INTEGRATION")),
+        "qpos and qvel copied": _copied,
+        "mjSTATE_FULLPHYSICS": partial(_state, part="mjSTATE_FULLPHYSICS"),
+        "mjSTATE_INTEGRATION": partial(_state, part="mjSTATE_INTEGRATION"),
     }
 
     def __init__(self) -> None:

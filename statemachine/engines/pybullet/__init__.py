@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ...installed import require
 from .. import RawEngine
 
 if TYPE_CHECKING:
+    from ...backends import pybullet_backend as backend
     from ...description.records import Robot
     from ...drawing.camera import Camera
     from ...drawing.shots import Drawer
@@ -54,17 +55,16 @@ class PybulletEngine(RawEngine):
 
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
         """Of a Model with `defaults="engine"`."""
-        from ...backends.pybullet_backend import PybulletModel
+        from ...backends import pybullet_backend as backend
         from .dials import PybulletDials
 
-        as_it_comes = isinstance(model, PybulletModel) and model.defaults == "engine"
-        return PybulletDials(model, options) if as_it_comes else None
-
-    def frictionless(self, model: Model) -> Model:
-        """By changeDynamics on every link."""
-        from .dials import frictionless
-
-        return frictionless(model)
+        if not isinstance(model, backend.PybulletModel) or model.defaults != "engine":
+            return None
+        emulated = backend.load(model.path).replace(**options)
+        return PybulletDials(
+            cast("backend.PybulletModel", model.replace(**options)),
+            cast("backend.PybulletModel", emulated),
+        )
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
         """A function of `conventions`."""
@@ -96,10 +96,11 @@ class PybulletEngine(RawEngine):
         NaN for free bodies, of which the engine does not tell it, and between trees.
         """
         from ...backends._bullet_client import pb
+        from ...backends._bullet_ghost import ghost_of
 
-        shared = data.machine.world._shared  # type: ignore[attr-defined]
         # What is stepped carries the armature in links of its own: the ghost is the true arm.
-        world = shared.ghost if shared.kind == "stepped" else data.raw
+        own = cast("backend.PybulletModel", model)
+        world = data.raw if own.defaults == "engine" else ghost_of(own.plan)
         armature = model.capabilities.behaviours["armature"].support != "unsupported"
         mass = super().mass_matrix(model, data, qpos)
         for tree in world.trees:

@@ -7,10 +7,9 @@ model into a client of its own, as the engine's users do, and lets it be.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -20,10 +19,10 @@ from ...backends._bullet_plan import Plan
 from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
-from ..auditing import Restore, SavePoint
+from ..auditing import Save, SavePoint
 from ..records import LeftAlone, Term, WayBack
-from .audit import Client, PybulletDriver, in_memory, put_back
-from .world import fresh_world, gravity_of, limp
+from .audit import Client, PybulletDriver, put_back
+from .world import fresh_world, gravity_of, limp, saved_in_memory
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.
 _BEFORE, _AFTER = 10, 100
@@ -119,7 +118,9 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
         joint: Id of a hinge or slide.
     """
     steps = max(1, round(seconds / ENGINE_TIMESTEP))
-    runs, fresh = [], _fresh_gravity()
+    runs = []
+    with fresh_world() as client:
+        fresh = float(np.linalg.norm(gravity_of(client)))
     for label, gravity, motors, damping in (
         ("as loadURDF leaves it", False, True, True),
         ("gravity set", True, True, True),
@@ -156,12 +157,6 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
     return tuple(runs)
 
 
-def _fresh_gravity() -> float:
-    """The length of the gravity that a world has before anybody sets it."""
-    with fresh_world() as client:
-        return float(np.linalg.norm(gravity_of(client)))
-
-
 def _explicit(world: World, tree: Tree) -> float:
     """The largest eigenvalue of h·D/M where the tree stands."""
     states = pb.getJointStates(tree.body, tree.joints, world.client)
@@ -182,10 +177,9 @@ def _joint(world: World, model: Model, joint: int) -> tuple[Tree, int]:
 class _AsLoaded(PybulletDriver):
     """The bodies as loadURDF leaves them."""
 
-    def fresh(self, point: SavePoint) -> Client:
-        world = World(cast("PybulletModel", point.model).plan, "engine")
-        qpos, qvel = point.qpos.copy(), point.qvel.copy()
-        return Client(SimpleNamespace(raw=world, qpos=qpos, qvel=qvel, close=world.close))
+    def opened(self, model: Model) -> Client:
+        world = World(cast("PybulletModel", model).plan, "engine")
+        return Client(world, world)
 
 
 def ways_back(model: Model) -> tuple[WayBack, ...]:
@@ -199,26 +193,22 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     start = SavePoint("start", "", model, qpos, np.zeros(model.nv), ctrl, 0)
     middle, driver = replace(start, run_in=_BEFORE), _AsLoaded(model, 0)
 
-    def off(first: Array, second: Array) -> float:
-        gap = (first - second)[1:, : driver.coordinates.width]
-        return float(np.abs(gap).max(initial=0.0))
-
-    def back(point: SavePoint, way: Callable[[Client], Iterator[Restore]]) -> float:
-        with driver.at(point) as machine, contextmanager(way)(machine) as restore:
+    def back(point: SavePoint, save: Save) -> float:
+        with driver.at(point) as machine, save(machine) as restore:
             first = driver.drive(machine, point, _AFTER)
             restore(machine)
-            return off(first, driver.drive(machine, point, _AFTER))
-
-    def to_the_start(_machine: Client) -> Iterator[Restore]:
-        yield lambda machine: driver.start(machine, start)
+            return driver.off(first, driver.drive(machine, point, _AFTER))
 
     runs = [driver.run(start, _BEFORE + _AFTER).future for _ in range(2)]
     with driver.at(middle) as machine:
         touching = sum(point[8] <= 0 for point in machine.world.contact_points())
     moment = f"after {_BEFORE} steps, {touching} contacts"
     return (
-        WayBack("a new client, loaded again", off(*runs)),
-        WayBack("resetJointState, resetBase… to the start", back(start, to_the_start)),
-        WayBack(f"saveState, restoreState {moment}", back(middle, in_memory)),
+        WayBack("a new client, loaded again", driver.off(*runs)),
+        WayBack(
+            "resetJointState, resetBase… to the start",
+            back(start, lambda _: nullcontext(lambda machine: driver.start(machine, start))),
+        ),
+        WayBack(f"saveState, restoreState {moment}", back(middle, saved_in_memory)),
         WayBack(f"written back {moment}", back(middle, put_back)),
     )

@@ -9,26 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
 
 import numpy as np
 
 from ...backends._bullet_client import pb
-from ...interface import Array, JointType, Model, make_data
+from ...backends._bullet_world import World
+from ...interface import Array, Data, JointType, Model, make_data
 from ...measures import JointPlaces
 from ..auditing import (
     Disturbance,
     Driver,
     HiddenState,
-    Measured,
     Restore,
     Save,
     SaveMethod,
     SavePoint,
 )
-from .world import aim, read_into, saved_in_a_file, saved_in_memory, servos_of
+from .world import poses_and_rates, saved_in_a_file, saved_in_memory, written
 
 _RETARGET = 0.2  # what a target is changed by, to see whether a restore brings it back [rad or m]
 _PUSH = 5.0  # of a force that waits for the next step [N]
@@ -36,92 +34,42 @@ _BEST = "written + targets"  # all that can be read and written
 _SLIPPERY = 0.05  # a friction that the model does not have
 
 
-@dataclass
 class Client:
     """A world, and what its user knows of it that the engine does not tell.
 
     Attributes:
-        data: Holds the world; none of its verbs is called.
+        world: The bodies and their ids; client: its number.
+        joints: PyBullet's body and index of each; bases: PyBullet's ids of the free bodies.
+        solids: PyBullet's body and link of all that can touch.
         time: Simulated time [s]: the engine has no clock.
         targets: (nu,) what the motors aim at; None where they are off.
     """
 
-    data: Any
-    time: float = 0.0
-    targets: Array | None = None
-
-    @property
-    def world(self) -> Any:
-        """The bodies and their ids."""
-        return self.data.raw
-
-    @property
-    def id(self) -> int:
-        """What the engine's functions want as physicsClientId."""
-        return self.world.client
+    def __init__(self, world: World, owner: World | Data) -> None:
+        """Of a world; the owner gives it back."""
+        self.world, self.client, self.close = world, world.client, owner.close
+        self.joints = [(body, index) for body, index, _ in world.joints()]
+        self.bases = [tree.body for tree in world.trees if tree.free]
+        self.solids = [(body, link) for body, link, _ in world.solids()]
+        self.time = 0.0
+        self.targets: Array | None = None
 
 
-def bases(machine: Client) -> list[int]:
-    """PyBullet's ids of the free bodies."""
-    return [tree.body for tree in machine.world.trees if tree.free]
-
-
-def solids(machine: Client) -> list[tuple[int, int]]:
-    """PyBullet's body and link of all that can touch."""
-    return [(body, link) for body, link, _ in machine.world.solids()]
-
-
-def written(machine: Client) -> Iterator[Restore]:
-    """What can be read of positions and velocities is written back."""
-    joints = [
-        pb.getJointStates(tree.body, tree.joints, machine.id) if tree.joints else ()
-        for tree in machine.world.trees
-    ]
-    poses = [
-        (pb.getBasePositionAndOrientation(b, machine.id), pb.getBaseVelocity(b, machine.id))
-        for b in bases(machine)
-    ]
-
-    def restore(other: Client) -> None:
-        for tree, states in zip(other.world.trees, joints, strict=True):
-            for index, state in zip(tree.joints, states, strict=False):
-                pb.resetJointState(tree.body, index, state[0], state[1], other.id)
-        for body, (pose, rates) in zip(bases(other), poses, strict=True):
-            pb.resetBasePositionAndOrientation(body, *pose, other.id)
-            pb.resetBaseVelocity(body, *rates, other.id)
-
-    yield restore
-
-
-def in_memory(machine: Client) -> Iterator[Restore]:
-    """The engine's saveState."""
-    with saved_in_memory(machine.id) as restore:
-        yield lambda other: restore(other.id)
-
-
-def in_a_file(machine: Client) -> Iterator[Restore]:
-    """The engine's file."""
-    with saved_in_a_file(machine.id) as restore:
-        yield lambda other: restore(other.id)
-
-
+@contextmanager
 def put_back(machine: Client, how: str = "put") -> Iterator[Restore]:
-    """What can be read of positions and velocities, as the backend writes it."""
-    qpos, qvel = machine.data.qpos.copy(), machine.data.qvel.copy()
-    read_into(machine.world, qpos, qvel)
-    yield lambda other: getattr(other.world, how)(qpos, qvel)
+    """What can be read of positions and velocities, as the backend writes it.
 
-
-def taken_apart(machine: Client) -> Iterator[Restore]:
-    """Every body is taken far away and brought back, which leaves no memory of contacts."""
-    yield from put_back(machine, "place")
+    To "place" takes every body far away and brings it back, which leaves no memory of contacts.
+    """
+    state = machine.world.read()
+    yield lambda other: getattr(other.world, how)(*state)
 
 
 def let_pass(machine: Client) -> None:
     """Nothing touches anything any more."""
-    for body, link in solids(machine):
-        pb.setCollisionFilterGroupMask(body, link, 0, 0, machine.id)
-    pb.performCollisionDetection(machine.id)
+    for body, link in machine.solids:
+        pb.setCollisionFilterGroupMask(body, link, 0, 0, machine.client)
+    pb.performCollisionDetection(machine.client)
 
 
 class PybulletDriver(Driver):
@@ -140,7 +88,8 @@ class PybulletDriver(Driver):
     def __init__(self, model: Model, seed: int) -> None:
         super().__init__(model, seed)
         self.name = f"PyBullet {model.engine_version} itself"
-        self._servos = servos_of(model)
+        joints = enumerate(model.actuator_jntid.tolist())
+        self._servos = {int(model.jnt_dofadr[j]): actuator for actuator, j in joints if j >= 0}
 
     def lacks(self, point: SavePoint) -> str:
         limits = point.model.capabilities.behaviours["joint limits"]
@@ -151,20 +100,21 @@ class PybulletDriver(Driver):
     @cached_property
     def coordinates(self) -> JointPlaces:
         """Joints, tree by tree; then position and quaternion of each free base."""
-        with make_data(self.model) as data:
-            machine = Client(data)
-            trees = [tree.dofs for tree in machine.world.trees if tree.joints]
-            joints = np.concatenate([*trees, np.zeros(0, int)])
-            free = len(joints) + 7 * np.arange(len(list(bases(machine))))
+        machine = self.opened(self.model)
+        dofs = [dof for _, _, dof in machine.world.joints()]
+        count, free = len(dofs), len(machine.bases)
+        machine.close()
         types = dict(zip(self.model.jnt_dofadr.tolist(), self.model.jnt_type.tolist(), strict=True))
-        kinds = [types[dof] for dof in joints.tolist()] + [int(JointType.FREE)] * len(free)
-        return JointPlaces.of(kinds, [*range(len(joints)), *free.tolist()])
+        kinds = [types[dof] for dof in dofs] + [int(JointType.FREE)] * free
+        return JointPlaces.of(kinds, [*range(count), *range(count, count + 7 * free, 7)])
+
+    def opened(self, model: Model) -> Client:
+        """The bodies of a Data; none of its verbs is called."""
+        data = make_data(model)
+        return Client(data.raw, data)
 
     def fresh(self, point: SavePoint) -> Client:
-        return Client(make_data(point.model))
-
-    def close(self, machine: Client) -> None:
-        machine.data.close()
+        return self.opened(point.model)
 
     def start(self, machine: Client, point: SavePoint) -> None:
         machine.world.put(point.qpos, point.qvel)
@@ -172,65 +122,52 @@ class PybulletDriver(Driver):
             self.command(machine, point.ctrl)
 
     def command(self, machine: Client, ctrl: Array) -> None:
-        machine.targets = np.clip(ctrl, *self.model.actuator_ctrlrange.T)
-        aim(machine.world, self._servos, machine.targets)
+        """Let the engine's own motors go to ctrl [rad or m]."""
+        machine.targets = targets = np.clip(ctrl, *self.model.actuator_ctrlrange.T)
+        for body, index, dof in machine.world.joints():
+            if dof in self._servos:
+                pb.setJointMotorControl2(
+                    body,
+                    index,
+                    pb.POSITION_CONTROL,
+                    targetPosition=float(targets[self._servos[dof]]),
+                    physicsClientId=machine.client,
+                )
 
     def advance(self, machine: Client, nstep: int = 1) -> None:
         for _ in range(nstep):
-            pb.stepSimulation(machine.id)
+            pb.stepSimulation(machine.client)
             machine.time += self.model.timestep
 
     def read(self, machine: Client) -> Array:
-        places, speeds = [], []
-        for joint in self._joints(machine):
-            places.append(joint[0])
-            speeds.append(joint[1])
-        for body in bases(machine):
-            pos, quat = pb.getBasePositionAndOrientation(body, machine.id)
-            linear, angular = pb.getBaseVelocity(body, machine.id)
-            places += (*pos, *quat)
-            speeds += (*linear, *angular)
+        states = [pb.getJointState(*joint, machine.client) for joint in machine.joints]
+        bodies = poses_and_rates(machine)
+        places = [*(state[0] for state in states), *(x for (a, b), _ in bodies for x in (*a, *b))]
+        speeds = [*(state[1] for state in states), *(x for _, (a, b) in bodies for x in (*a, *b))]
         return np.array(places + speeds)
 
-    def _joints(self, machine: Client) -> Iterator[Any]:
-        for tree in machine.world.trees:
-            if tree.joints:
-                yield from pb.getJointStates(tree.body, tree.joints, machine.id)
-
-    def time(self, machine: Client) -> float:
-        return machine.time
-
-    def _measure(self, point: SavePoint) -> Measured:
-        with self.at(point) as machine:
-            speeds = self.read(machine)[self.coordinates.width :]
-            points = pb.getContactPoints(physicsClientId=machine.id)
-            return Measured(
-                point.name,
-                point.how,
-                machine.time,
-                sum(each[8] <= 0 for each in points),
-                None,
-                float(np.abs(speeds).max(initial=0.0)),
-            )
+    def touching(self, machine: Client) -> tuple[int, None]:
+        points = pb.getContactPoints(physicsClientId=machine.client)
+        return sum(point[8] <= 0 for point in points), None
 
     def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         """The engine's ways with and without what its user must add: targets and time."""
         return (
             SaveMethod("written", self._way(written, known=False)),
             SaveMethod(_BEST, self._way(written)),
-            SaveMethod("saveState + targets", self._way(in_memory), travels=False),
-            SaveMethod("saveBullet + targets", self._way(in_a_file)),
-            SaveMethod("taken apart + targets", self._way(taken_apart)),
+            SaveMethod("saveState + targets", self._way(saved_in_memory), travels=False),
+            SaveMethod("saveBullet + targets", self._way(saved_in_a_file)),
+            SaveMethod("taken apart + targets", self._way(partial(put_back, how="place"))),
         )
 
-    def _way(self, save: Callable[[Client], Iterator[Restore]], known: bool = True) -> Save:
+    def _way(self, save: Save, known: bool = True) -> Save:
         """A way to save; `known`: with what the user knows and the engine does not tell."""
 
         @contextmanager
         def whole(machine: Client) -> Iterator[Restore]:
             time = machine.time
             targets = None if machine.targets is None else machine.targets.copy()
-            with contextmanager(save)(machine) as restore:
+            with save(machine) as restore:
 
                 def back(other: Client) -> None:
                     restore(other)
@@ -247,8 +184,8 @@ class PybulletDriver(Driver):
         """What the engine's ways forget, each way without what its user must add."""
         ways = {
             "written": self._way(written, known=False),
-            "saveState": self._way(in_memory, known=False),
-            "saveBullet": self._way(in_a_file, known=False),
+            "saveState": self._way(saved_in_memory, known=False),
+            "saveBullet": self._way(saved_in_a_file, known=False),
         }
         best = SaveMethod(_BEST, self._way(written))
         return HiddenState(ways, self._changes(point), let_pass, best)
@@ -258,55 +195,63 @@ class PybulletDriver(Driver):
             self.command(machine, point.ctrl - _RETARGET)
 
         def waiting_force(machine: Client) -> None:
-            for body, link in solids(machine):
+            for body, link in machine.solids:
                 pb.applyExternalForce(
-                    body, link, (_PUSH, 0, 0), (0, 0, 0), pb.LINK_FRAME, physicsClientId=machine.id
+                    body,
+                    link,
+                    (_PUSH, 0, 0),
+                    (0, 0, 0),
+                    pb.LINK_FRAME,
+                    physicsClientId=machine.client,
                 )
 
         def friction(machine: Client) -> None:
-            for body, link in solids(machine):
-                pb.changeDynamics(body, link, lateralFriction=_SLIPPERY, physicsClientId=machine.id)
+            for body, link in machine.solids:
+                pb.changeDynamics(
+                    body, link, lateralFriction=_SLIPPERY, physicsClientId=machine.client
+                )
 
-        found: dict[str, Callable[[Client], None]] = {
-            "motor targets": motor_targets,
+        motors = {"motor targets": motor_targets} if point.powered and self._servos else {}
+        return {
+            **motors,
             "a waiting force": waiting_force,
             "collision masks": let_pass,
             "frictions": friction,
         }
-        if not point.powered or not self._servos:
-            found.pop("motor targets")
-        return found
 
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         def links(machine: Client) -> None:
-            for tree in machine.world.trees:
-                for index in range(pb.getNumJoints(tree.body, machine.id)):
+            for body, link, _ in machine.world.links():
+                if link >= 0:
                     pb.getLinkState(
-                        tree.body, index, computeForwardKinematics=1, physicsClientId=machine.id
+                        body, link, computeForwardKinematics=1, physicsClientId=machine.client
                     )
 
         def dynamics(machine: Client) -> None:
+            qpos, _ = machine.world.read()
             for tree in machine.world.trees:
-                if tree.joints and not tree.free:
-                    places = [s[0] for s in pb.getJointStates(tree.body, tree.joints, machine.id)]
+                if tree.joints:
+                    places = qpos[tree.qpos].tolist()
                     none = [0.0] * len(places)
                     pb.calculateInverseDynamics(
-                        tree.body, places, none, none, physicsClientId=machine.id
+                        tree.body, places, none, none, physicsClientId=machine.client
                     )
-                    pb.calculateMassMatrix(tree.body, places, physicsClientId=machine.id)
+                    pb.calculateMassMatrix(tree.body, places, physicsClientId=machine.client)
 
         def save(machine: Client) -> None:
-            state = pb.saveState(machine.id)
-            pb.removeState(state, physicsClientId=machine.id)
+            state = pb.saveState(machine.client)
+            pb.removeState(state, physicsClientId=machine.client)
 
         return (
             Disturbance("getLinkState, forward kinematics", links),
-            Disturbance("getContactPoints", lambda m: pb.getContactPoints(physicsClientId=m.id)),
+            Disturbance(
+                "getContactPoints", lambda m: pb.getContactPoints(physicsClientId=m.client)
+            ),
             Disturbance("inverse dynamics, mass matrix", dynamics),
             Disturbance("saveState", save),
             Disturbance(
                 "performCollisionDetection",
-                lambda m: pb.performCollisionDetection(m.id),
+                lambda m: pb.performCollisionDetection(m.client),
                 promised=False,
             ),
         )

@@ -139,10 +139,8 @@ def damping(seconds: float, fast: float) -> tuple[float, float]:
 
 def _tip(client: int, body: int, compute: bool = False) -> Array:
     """Where the pendulum's tip is (3,) [m]."""
-    if not compute:
-        return np.array(pb.getLinkState(body, 1, physicsClientId=client)[4])
-    state = pb.getLinkState(body, 1, computeForwardKinematics=1, physicsClientId=client)
-    return np.array(state[4])
+    link = pb.getLinkState(body, 1, computeForwardKinematics=compute, physicsClientId=client)
+    return np.array(link[4])
 
 
 def _put_ball(client: int, height: float) -> int:

@@ -9,22 +9,18 @@ The servo law decides what the others are turned in: the engine's motors live in
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 
-from ...backends import load
 from ...backends._bullet_client import pb
-from ...backends._bullet_driven import DrivenWorld
+from ...backends._bullet_driven import Act
 from ...backends._bullet_plan import Plan
-from ...backends._bullet_shared import Shared
 from ...backends._bullet_surfaces import Surfaces
 from ...backends._bullet_world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletModel
-from ...errors import EngineError
 from ...interface import Array, Model
 from ..records import Setting
 
@@ -34,22 +30,17 @@ FRICTION = 0.5
 CONTACT_ERP = 0.08
 _FASTEST = 100.0  # [rad/s]
 _WIDE = 1e6  # [rad or m] a range that no joint leaves
-_CLOSE = 1e-6  # relative: the engine reports some figures in single precision
-
-Act = Callable[[World], None]
 
 
 class PybulletDials:
     """One file on PyBullet, and all that can be set in the engine's way or in the model's.
 
     Attributes:
-        model: As it comes: `load(…, defaults="engine")`, with the options of an experiment.
-        emulated: The same file behind the contract, with the same options.
-        with_servo: What only an adapter can give, and so only the world of the model's law.
+        model: As it comes: `load(…, defaults="engine")`.
+        emulated: The same file behind the contract.
         words: The engine's own setting of a factor.
     """
 
-    with_servo: tuple[str, ...] = ("armature", "frictionloss")
     words: Mapping[str, str] = {
         "inertia": "of shapes",
         "damping": "explicit, +0.04",
@@ -60,30 +51,29 @@ class PybulletDials:
         "contact": "its own",
     }
 
-    def __init__(self, model: Model, options: Mapping[str, Any]) -> None:
-        """Of a Model with `defaults="engine"`, and the options of an experiment."""
-        self.model = cast("PybulletModel", model.replace(**options))
-        emulated = load(model.path, backend="pybullet").replace(**options)
-        self.emulated = cast("PybulletModel", emulated)
+    def __init__(self, model: PybulletModel, emulated: PybulletModel) -> None:
+        """Of a Model with `defaults="engine"`, and of the same file behind the contract."""
+        self.model, self.emulated = model, emulated
+
+    def of(self, model: Model, emulated: Model) -> PybulletDials:
+        """The dials of an edited file."""
+        return PybulletDials(cast("PybulletModel", model), cast("PybulletModel", emulated))
 
     def build(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         """A Model with some dials at "model" or "off", the others as the engine comes.
 
         Args:
             dials: Of gravity, timestep, inertia, servo, armature, damping, frictionloss,
-                limits, surfaces, contact.
+                limits, surfaces, contact; armature and frictionloss only with the servo, whose
+                law gives the engine what it has not.
             values: What gravity (3,) [m/s²], timestep (step [s], substeps), and armature,
                 damping and frictionloss (nv,) are at "model".
 
         Raises:
-            ValueError: Armature or dry friction without the model's servo law.
-            EngineError: A dial did not act: the engine reports another figure.
+            UnsupportedError: The backend cannot run it.
         """
-        if "servo" not in dials:
-            if any(name in dials for name in self.with_servo):
-                raise ValueError("without the model's servo law there is no armature or friction")
-            return self._with_motors(dials, values)
-        return self._with_law(dials, values)
+        build = self._with_law if "servo" in dials else self._with_motors
+        return build(dials, values)
 
     def _with_motors(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         raw = self.model.compiled
@@ -122,7 +112,7 @@ class PybulletDials:
             raw = copy.copy(model.compiled)
             raw.body_inertia[:] = self.shapes
             plan = Plan(raw)
-        return _dialled(model, acts, plan) if acts or plan else model
+        return _dialled(model, acts, plan)
 
     @property
     def shapes(self) -> np.ndarray:
@@ -131,7 +121,7 @@ class PybulletDials:
         inertias = np.array(raw.body_inertia)
         with self.model._make_data() as data:
             world = data.raw
-            for body, link, b in _links(world):
+            for body, link, b in world.links():
                 inertias[b] = pb.getDynamicsInfo(body, link, world.client)[2]
         return inertias
 
@@ -144,46 +134,11 @@ class PybulletDials:
         return np.array(told)
 
 
-def frictionless(model: Model) -> Model:
-    """The same Model with surfaces that have no friction."""
-    return _dialled(model, [_smooth])
-
-
-class DialledWorld(DrivenWorld):
-    """A world that is given some settings when it is opened."""
-
-    def __init__(self, shared: Shared, acts: tuple[Act, ...]) -> None:
-        super().__init__(shared)
-        self._acts = acts
-        for act in acts:
-            act(self.raw)
-
-    def _anew(self) -> DialledWorld:
-        return DialledWorld(self._shared, self._acts)
-
-
-class DialledModel(PybulletModel):
-    """A Model whose Data have such worlds. What `forward` computes knows nothing of the dials."""
-
-    _acts: tuple[Act, ...]
-
-    def __init__(
-        self,
-        plan: Plan,
-        path: Path,
-        substeps: int,
-        defaults: Literal["model", "engine"],
-        acts: tuple[Act, ...],
-    ) -> None:
-        super().__init__(plan, path, substeps, defaults)
-        vars(self).update(_acts=acts, _open_world=partial(DialledWorld, self._shared, acts))
-
-
-def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> Model:
-    if not acts and plan is None:
-        return model
+def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
+    """A Model whose worlds are given some settings; what `forward` computes knows nothing of it."""
     own = cast("PybulletModel", model)
-    return DialledModel(plan or own.plan, own.path, own.substeps, own.defaults, tuple(acts))
+    every = (*own.acts, *acts)
+    return PybulletModel(plan or own.plan, own.path, own.substeps, own.defaults, own._asked, every)
 
 
 def _world_options(dials: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -209,74 +164,32 @@ def _ranges(model: Model) -> dict[int, tuple[float, float]]:
     }
 
 
-def _links(world: World) -> Iterator[tuple[int, int, int]]:
-    """PyBullet's body and link, and MuJoCo's body, of all that has a mass."""
-    for tree in world.trees:
-        for b, link in tree.links.items():
-            yield tree.body, link, b
-
-
-def _joints(world: World) -> Iterator[tuple[int, int, int]]:
-    """PyBullet's body and joint, and its degree of freedom."""
-    for tree in world.trees:
-        for index, dof in zip(tree.joints, np.atleast_1d(tree.dofs).tolist(), strict=False):
-            yield tree.body, index, dof
-
-
-def _change(world: World, body: int, link: int, **settings: Any) -> None:
-    pb.changeDynamics(body, link, physicsClientId=world.client, **settings)
-
-
-def _verify(what: str, wanted: Any, told: Any) -> None:
-    """Raise EngineError unless the engine reports what it was given."""
-    if not np.allclose(told, wanted, rtol=_CLOSE, atol=1e-15):
-        raise EngineError(f"PyBullet did not take {what}: it was given {wanted}, reports {told}")
-
-
 def _set_inertias(world: World, inertias: np.ndarray) -> None:
-    for body, link, b in _links(world):
-        wanted = inertias[b].tolist()
-        _change(world, body, link, localInertiaDiagonal=wanted)
-        _verify("an inertia", wanted, pb.getDynamicsInfo(body, link, world.client)[2])
+    for body, link, b in world.links():
+        world.change(body, link, localInertiaDiagonal=inertias[b].tolist())
 
 
 def _set_damping(world: World, body: float, joint: np.ndarray) -> None:
     for tree in world.trees:
-        for link in range(-1, pb.getNumJoints(tree.body, world.client)):
-            _change(world, tree.body, link, linearDamping=body, angularDamping=body)
-    for tree_body, index, dof in _joints(world):
+        world.change_all(tree.body, linearDamping=body, angularDamping=body)
+    for tree_body, index, dof in world.joints():
         # getJointInfo goes on telling what the URDF said.
-        _change(world, tree_body, index, jointDamping=float(joint[dof]))
+        world.change(tree_body, index, jointDamping=float(joint[dof]))
 
 
 def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) -> None:
     """The engine's own limits, of position and of speed; without ranges, none."""
-    for body, index, dof in _joints(world):
-        low, high = (-_WIDE, _WIDE) if ranges is None else ranges.get(dof, (-_WIDE, _WIDE))
-        _change(world, body, index, jointLowerLimit=low, jointUpperLimit=high)
+    for body, index, dof in world.joints():
+        low, high = (ranges or {}).get(dof, (-_WIDE, _WIDE))
+        world.change(body, index, jointLowerLimit=low, jointUpperLimit=high)
     fastest = UNCLAMPED if ranges is None else _FASTEST
     for tree in world.trees:
-        for link in range(-1, pb.getNumJoints(tree.body, world.client)):
-            _change(world, tree.body, link, maxJointVelocity=fastest)
+        world.change_all(tree.body, maxJointVelocity=fastest)
 
 
 def _set_surfaces(world: World, surfaces: Surfaces) -> None:
     world.soften()
-    for k, (body, link, _) in enumerate(world.solids()):
-        wanted = [float(friction[k]) for friction in (surfaces.slide, surfaces.roll, surfaces.spin)]
-        _rub(world, body, link, wanted)
-
-
-def _smooth(world: World) -> None:
-    for body, link, _ in world.solids():
-        _rub(world, body, link, [0.0, 0.0, 0.0])
-
-
-def _rub(world: World, body: int, link: int, wanted: list[float]) -> None:
-    slide, roll, spin = wanted
-    _change(world, body, link, lateralFriction=slide, rollingFriction=roll, spinningFriction=spin)
-    told = pb.getDynamicsInfo(body, link, world.client)
-    _verify("a friction", wanted, [told[1], told[6], told[7]])
+    world.rub(surfaces.slide, surfaces.spin, surfaces.roll)
 
 
 def _harden(world: World) -> None:
@@ -290,8 +203,8 @@ def _fresh_surfaces(world: World, plan: Plan) -> None:
     """Friction and hardness of what was loaded, and links of one robot that do not meet."""
     _harden(world)
     solids = list(world.solids())
-    for body, link, _ in solids:
-        _rub(world, body, link, [FRICTION, 0.0, 0.0])
+    none = np.zeros(len(solids))
+    world.rub(none + FRICTION, none, none)
     for (i, j), meet in plan.surfaces.pairs.items():
         (body, link, solid), (other, other_link, other_solid) = solids[i], solids[j]
         # What never moves does not meet what never moves; of the rest, all that are two bodies.

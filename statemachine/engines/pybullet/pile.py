@@ -7,24 +7,23 @@ next step show in what the next step does.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from functools import partial
+from contextlib import contextmanager
 from typing import ClassVar
 
 import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
-from ..pile import HALF, PLACES, TILT, Pile, Saved
+from ..pile import HALF, PLACES, TILT, Pile
 from ..samples import GRAVITY, PENDULUM_URDF
 from .world import (
-    Restore,
     fresh_world,
     load,
     put_floor,
     saved_in_a_file,
     saved_in_memory,
     timestep,
+    written,
 )
 
 _TURNS = (np.array((*TILT[1:], TILT[0])) / np.linalg.norm(TILT), *[np.array((0, 0, 0, 1.0))] * 2)
@@ -100,33 +99,9 @@ _QUANTITIES: dict[str, tuple[Write, Read]] = {
 
 
 def _put_back(scene: BulletPile) -> None:
-    for box, place, turn in zip(scene.boxes, PLACES, _TURNS, strict=True):
+    for box, place, turn in zip(scene.bases, PLACES, _TURNS, strict=True):
         pb.resetBasePositionAndOrientation(box, place, turn.tolist(), scene.client)
     pb.resetJointState(scene.arm, 0, 0, 0, scene.client)
-
-
-def _of_the_world(save: Callable[[int], AbstractContextManager[Restore]]) -> Saved:
-    @contextmanager
-    def saved(scene: BulletPile) -> Iterator[Callable[[], None]]:
-        with save(scene.client) as restore:
-            yield partial(restore, scene.client)
-
-    return saved
-
-
-def _read_and_written(scene: BulletPile) -> Iterator[Callable[[], None]]:
-    client = scene.client
-    poses = [pb.getBasePositionAndOrientation(box, client) for box in scene.boxes]
-    rates = [pb.getBaseVelocity(box, client) for box in scene.boxes]
-    joint = pb.getJointState(scene.arm, 0, client)[:2]
-
-    def restore() -> None:
-        for box, pose, rate in zip(scene.boxes, poses, rates, strict=True):
-            pb.resetBasePositionAndOrientation(box, *pose, client)
-            pb.resetBaseVelocity(box, *rate, client)
-        pb.resetJointState(scene.arm, 0, *joint, client)
-
-    yield restore
 
 
 class BulletPile(Pile):
@@ -139,9 +114,9 @@ class BulletPile(Pile):
         "resetBase…, resetJointState": _put_back,
     }
     ways_to_save: ClassVar = {
-        "positions, velocities written": contextmanager(_read_and_written),
-        "saveState, restoreState": _of_the_world(saved_in_memory),
-        "saveBullet, restoreState": _of_the_world(saved_in_a_file),
+        "positions, velocities written": written,
+        "saveState, restoreState": saved_in_memory,
+        "saveBullet, restoreState": saved_in_a_file,
     }
 
     def __init__(self, client: int) -> None:
@@ -150,7 +125,7 @@ class BulletPile(Pile):
         put_floor(client)
         edges = (HALF, HALF, HALF)
         shape = pb.createCollisionShape(pb.GEOM_BOX, halfExtents=edges, physicsClientId=client)
-        self.boxes = tuple(
+        self.bases = tuple(
             pb.createMultiBody(
                 1,
                 shape,
@@ -160,8 +135,9 @@ class BulletPile(Pile):
             )
             for place, turn in zip(PLACES, _TURNS, strict=True)
         )
-        self.box = self.boxes[0]  # the lowest, at which quantities are looked at
+        self.box = self.bases[0]  # the lowest, at which quantities are looked at
         self.arm = load(client, PENDULUM_URDF, fixed=True)
+        self.joints = [(self.arm, 0)]
         pb.resetBasePositionAndOrientation(self.arm, (2, 0, 2), (0, 0, 0, 1), client)
 
     @classmethod
@@ -199,7 +175,7 @@ class BulletPile(Pile):
         for _ in range(steps):
             pb.stepSimulation(client)
             places: list[float] = []
-            for box in self.boxes:
+            for box in self.bases:
                 pos, quat = pb.getBasePositionAndOrientation(box, client)
                 places += (*pos, *quat)
             trace.append((*places, _joint(self, 0)))

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...backends import load
+from ...backends._bullet_client import connect, disconnect, pb
 from ...drawing import Part, drawing_of
 from ...drawing.camera import Camera
 from ...drawing.shots import GHOST, Shot
-from ...installed import require
 from ...interface import Array
 from ...rotations import xyzw_from_wxyz
-from ...silence import silence
 
 _MOST = 20_000  # faces of one shape; PyBullet takes 131072 vertices
 _TILE = 0.1  # [m] of a floor without an end, laid out so that its perspective is seen
@@ -30,13 +29,11 @@ class BulletFrames:
 
     def __init__(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> None:
         """Connect to a world for each side; the arguments are those of `RawEngine.drawer`."""
-        pb = require("pybullet")
-        self._pb, self._size, self._camera = pb, size, camera
+        self._size, self._camera = size, camera
         self._clients: list[int] = []
         self._placed: list[list[tuple[int, int]]] = []
         for k, file in enumerate(files):
-            with silence():
-                client = pb.connect(pb.DIRECT)
+            client = connect()
             self._clients.append(client)
             parts = [part for part in drawing_of(load(file)).parts if k == 0 or part.body]
             self._placed.append(
@@ -53,7 +50,7 @@ class BulletFrames:
 
     def shot(self, side: int, xpos: Array, xquat: Array) -> Shot:
         """A side with its bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
-        pb, client = self._pb, self._clients[side]
+        client = self._clients[side]
         turned = xyzw_from_wxyz(xquat)
         for number, body in self._placed[side]:
             pb.resetBasePositionAndOrientation(
@@ -85,19 +82,19 @@ class BulletFrames:
     def close(self) -> None:
         """Give the worlds back."""
         for client in self._clients:
-            self._pb.disconnect(client)
+            disconnect(client)
 
     def _made(self, client: int, shape: tuple[Any, Any], rgba: Sequence[float]) -> int:
         vertices, faces = shape
-        look = self._pb.createVisualShape(
-            self._pb.GEOM_MESH,
+        look = pb.createVisualShape(
+            pb.GEOM_MESH,
             vertices=vertices.tolist(),
             indices=faces.ravel().tolist(),
             rgbaColor=list(rgba),
             specularColor=[0.1, 0.1, 0.1],
             physicsClientId=client,
         )
-        return self._pb.createMultiBody(0, -1, look, physicsClientId=client)
+        return pb.createMultiBody(0, -1, look, physicsClientId=client)
 
 
 def _shapes(

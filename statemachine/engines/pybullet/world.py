@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, Protocol
 
 from ...backends._bullet_client import as_file, connect, disconnect, pb
-from ...backends._bullet_world import World
-from ...interface import Array, Model
 from ...silence import silence
 
-Restore = Callable[[int], None]  # puts what was saved into the world with this number
+
+class HasClient(Protocol):
+    """A world: its number, the numbers of its free bodies, and its joints, body by index."""
+
+    @property
+    def client(self) -> int: ...
+    @property
+    def bases(self) -> Sequence[int]: ...
+    @property
+    def joints(self) -> Sequence[tuple[int, int]]: ...
+
+
+Restore = Callable[[HasClient], None]  # puts what was saved into a world
 
 
 @contextmanager
@@ -44,39 +55,6 @@ def limp(body: int, client: int, joint: int = 0) -> None:
     pb.setJointMotorControl2(body, joint, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
 
 
-def servos_of(model: Model) -> dict[int, int]:
-    """The actuator of each degree of freedom that has one."""
-    return {
-        int(model.jnt_dofadr[joint]): actuator
-        for actuator, joint in enumerate(model.actuator_jntid.tolist())
-        if joint >= 0
-    }
-
-
-def aim(world: World, servos: dict[int, int], targets: Array) -> None:
-    """Let the engine's own motors go to targets (nu,) [rad or m]."""
-    for tree in world.trees:
-        for index, dof in zip(tree.joints, tree.dofs.tolist() if tree.joints else (), strict=False):
-            if dof in servos:
-                pb.setJointMotorControl2(
-                    tree.body,
-                    index,
-                    pb.POSITION_CONTROL,
-                    targetPosition=float(targets[servos[dof]]),
-                    physicsClientId=world.client,
-                )
-
-
-def read_into(world: World, qpos: Array, qvel: Array) -> None:
-    """Write what the engine tells of positions (nq,) and velocities (nv,)."""
-    for tree in world.trees:
-        if tree.joints:
-            states = pb.getJointStates(tree.body, tree.joints, world.client)
-            qpos[tree.qpos], qvel[tree.qvel] = [s[0] for s in states], [s[1] for s in states]
-        if tree.free:
-            qpos[tree.qpos], qvel[tree.qvel] = world.read_free(tree)
-
-
 def timestep(client: int) -> float:
     """What the engine tells of its step [s]."""
     return pb.getPhysicsEngineParameters(client)["fixedTimeStep"]
@@ -88,27 +66,52 @@ def gravity_of(client: int) -> tuple[float, float, float]:
     return tuple(told[f"gravityAcceleration{axis}"] for axis in "XYZ")
 
 
+def poses_and_rates(machine: HasClient) -> list[tuple[Any, Any]]:
+    """Of each free body position and quaternion, and velocity and rate of turning."""
+    client = machine.client
+    return [
+        (pb.getBasePositionAndOrientation(b, client), pb.getBaseVelocity(b, client))
+        for b in machine.bases
+    ]
+
+
 @contextmanager
-def saved_in_memory(client: int) -> Iterator[Restore]:
+def written(machine: HasClient) -> Iterator[Restore]:
+    """What can be read of positions and velocities is written back."""
+    bodies = poses_and_rates(machine)
+    states = [pb.getJointState(*joint, machine.client)[:2] for joint in machine.joints]
+
+    def restore(other: HasClient) -> None:
+        for (body, index), state in zip(other.joints, states, strict=True):
+            pb.resetJointState(body, index, *state, other.client)
+        for body, (pose, rates) in zip(other.bases, bodies, strict=True):
+            pb.resetBasePositionAndOrientation(body, *pose, other.client)
+            pb.resetBaseVelocity(body, *rates, other.client)
+
+    yield restore
+
+
+@contextmanager
+def saved_in_memory(machine: HasClient) -> Iterator[Restore]:
     """The engine's saveState: for the world that it was made in."""
-    state = pb.saveState(client)
+    state = pb.saveState(machine.client)
     try:
-        yield lambda other: pb.restoreState(state, physicsClientId=other)
+        yield lambda other: pb.restoreState(state, physicsClientId=other.client)
     finally:
-        pb.removeState(state, physicsClientId=client)
+        pb.removeState(state, physicsClientId=machine.client)
 
 
 @contextmanager
-def saved_in_a_file(client: int) -> Iterator[Restore]:
+def saved_in_a_file(machine: HasClient) -> Iterator[Restore]:
     """The engine's file, which another world of the same bodies takes too."""
     with tempfile.TemporaryDirectory() as folder:
         file = os.fspath(Path(folder) / "world.bullet")
         with silence():
-            pb.saveBullet(file, physicsClientId=client)
+            pb.saveBullet(file, physicsClientId=machine.client)
 
-        def restore(other: int) -> None:
+        def restore(other: HasClient) -> None:
             with silence():
-                pb.restoreState(fileName=file, physicsClientId=other)
+                pb.restoreState(fileName=file, physicsClientId=other.client)
 
         yield restore
 

@@ -11,7 +11,15 @@ A judge is a module with
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
+
+from ..answers import Answer
+from ..calls import FaultError
+from ..worlds import ExerciseWorld
 
 # By the functions of the student's file, in the order in which they stand there.
 JUDGES = {
@@ -25,3 +33,53 @@ JUDGES = {
 def judge_of(function: str) -> Any:
     """The judge of a function of `JUDGES`."""
     return importlib.import_module(JUDGES[function], __name__)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What was found out about one function.
+
+    Attributes:
+        function: Its name.
+        written: False where it is still to be written.
+        passed: Whether it does what it should.
+        remarks: What is wrong with it, or what was verified, a line each.
+        judged: False where there is no verdict, for which the machine may be the reason.
+    """
+
+    function: str
+    written: bool
+    passed: bool
+    remarks: tuple[str, ...]
+    judged: bool = True
+
+
+def judged(
+    function: str,
+    worlds: Sequence[ExerciseWorld],
+    rights: Sequence[Any],
+    answers: Iterable[Answer | FaultError],
+) -> Judgement | None:
+    """The judgement on what came of a function, world after world, until one shows a fault.
+
+    None if there are fewer answers than worlds, and no fault.
+    """
+    passed: list[str] = []  # one text a world
+    for world, right, answer in zip(worlds, rights, answers, strict=False):
+        try:
+            if isinstance(answer, FaultError):
+                raise answer
+            with np.errstate(all="ignore"):
+                found = judge_of(function).judge(answer, world, right)
+        except FaultError as fault:
+            found = [str(fault)]
+            if not fault.written:
+                return Judgement(function, False, False, tuple(found))
+        if not isinstance(found, str):
+            where = f"{world.where}: " if world.where else ""
+            return Judgement(function, True, False, tuple(where + text for text in found))
+        passed.append(found)
+    if len(passed) < len(worlds):
+        return None
+    also = f"; right in {len(worlds) - 1} other case{'s' * (len(worlds) > 2)}"
+    return Judgement(function, True, True, (passed[0] + also,))

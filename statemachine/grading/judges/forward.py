@@ -92,7 +92,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[str] | str:
             for k, each in enumerate(parts(answer.result, 4, "four positions"), start=1)
         ]
     )
-    if passed := [run.end_time - run.time for run in answer.runs]:
+    if passed := [run.end.time - run.start.time for run in answer.runs]:
         remarks = [
             (
                 f"{passed[0]:g} s passed: step was called. forward recomputes what is derived "
@@ -193,7 +193,7 @@ def _poses(found: Array, model: Model, answer: Answer, away: str) -> Iterator[st
     """What the last reading is, if it belongs to one of the poses that forward met."""
     place, lift = address(model), f"{LIFT} is at qpos[{address(model)}]"
     with make_data(model) as data:
-        start = Inputs(0, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
+        start = Inputs(0, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy(), data.time)
         for met in reversed([each for each in answer.forwards if each.qpos.shape == (model.nq,)]):
             data.qpos[:] = met.qpos
             forward(model, data)

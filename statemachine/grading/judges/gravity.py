@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Array, Ints, Model, make_data, step
+from ...interface import Array, Ints, make_data, step
 from ...measures.text import count
 from ..answers import Answer
 from ..calls import reason
@@ -36,40 +36,28 @@ _NO_STEP = "no step was taken with the model that you got"
 
 
 @dataclass(frozen=True)
-class FallCurve:
-    """qpos (steps + 1, nq), qvel (steps + 1, nv) and time (steps + 1,) [s] after each step."""
-
-    qpos: Array
-    qvel: Array
-    time: Array
-
-
-@dataclass(frozen=True)
 class Fall:
-    """What is right on one world.
+    """What is right on one world: with servos and without, for a second longer than asked for.
 
     Attributes:
-        on, off: What happens, for a second longer than asked for.
+        place: Where the joint is in qpos.
+        angles: (2, steps + 1, nq) qpos as degrees.
+        speed: (2, steps + 1) that of the joint [rad/s].
+        time: (steps + 1,) of the Data [s].
         marks: (seconds + 1,) the steps at which whole seconds are over.
         course: (2, …) what is right on the course's own model, if this is another [degrees].
     """
 
-    on: FallCurve
-    off: FallCurve
+    place: int
+    angles: Array
+    speed: Array
+    time: Array
     marks: Ints
     course: Array | None = None
 
-    def trace(self, limp: bool) -> FallCurve:
-        """With the servos off, or on."""
-        return self.off if limp else self.on
-
-    def degrees(self, limp: bool, place: int) -> Array:
-        """(seconds + 1,) an entry of qpos at whole seconds, as degrees."""
-        return np.degrees(self.trace(limp).qpos[self.marks, place])
-
-    def speed(self, limp: bool, model: Model) -> Array:
-        """(seconds + 1,) that of the joint at whole seconds [rad/s]."""
-        return self.trace(limp).qvel[self.marks, int(model.jnt_dofadr[model.joint_id(LIFT)])]
+    def degrees(self, limp: bool) -> Array:
+        """(seconds + 1,) the joint at whole seconds."""
+        return self.angles[int(limp), self.marks, self.place]
 
 
 def worlds(scenes: Scenes) -> list[ExerciseWorld]:
@@ -85,24 +73,24 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
 
 def right(worlds: list[ExerciseWorld]) -> list[Fall]:
     """The fall on each."""
-    course = worlds[0].model
     first = _fall(worlds[0])
-    usual = np.array([first.degrees(limp, address(course)) for limp in (False, True)])
+    usual = first.angles[:, first.marks, first.place]
     return [first, *(_fall(world, usual) for world in worlds[1:])]
 
 
 def _fall(world: ExerciseWorld, course: Array | None = None) -> Fall:
     model, (seconds,) = world.model, world.arguments
-    each = round(1 / model.timestep)
-    traces = []
-    for variant in (model, model.replace(actuation=False)):
+    each, dof = round(1 / model.timestep), int(model.jnt_dofadr[model.joint_id(LIFT)])
+    size = (2, (seconds + 1) * each + 1)
+    qpos, speed, time = np.empty((*size, model.nq)), np.empty(size), np.empty(size[1])
+    for limp, variant in enumerate((model, model.replace(actuation=False))):
         with make_data(variant) as data:
-            moments = [(data.qpos.copy(), data.qvel.copy(), data.time)]
-            for _ in range((seconds + 1) * each):
-                step(variant, data)
-                moments.append((data.qpos.copy(), data.qvel.copy(), data.time))
-        traces.append(FallCurve(*(np.array(column) for column in zip(*moments, strict=True))))
-    return Fall(traces[0], traces[1], np.arange(seconds + 1) * each, course)
+            for k in range(size[1]):
+                if k:
+                    step(variant, data)
+                qpos[limp, k], speed[limp, k], time[k] = data.qpos, data.qvel[dof], data.time
+    marks = np.arange(seconds + 1) * each
+    return Fall(address(model), np.degrees(qpos), speed, time, marks, course)
 
 
 def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[str] | str:
@@ -115,8 +103,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[str] | str:
         for name, each in zip(_NAMES, pair, strict=True)
     ]
     remarks += _command(answer)
-    place = address(world.model)
-    falls = [right.degrees(limp, place) for limp in (False, True)]
+    falls = [right.degrees(limp) for limp in (False, True)]
     if near(given[0], falls[1], TOLERANCE) and near(given[1], falls[0], TOLERANCE):
         return [*remarks, "the two lists are swapped: (on, off) is the order"]
     for limp, name in enumerate(_NAMES):
@@ -143,13 +130,13 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[str] | str:
 def _why(given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer) -> str:
     """What a wrong list is, where one mistake gives all of its numbers."""
     mine, other = given[limp], given[not limp]
-    right = fall.degrees(limp, address(world.model))
+    right = fall.degrees(limp)
     # The farthest, but not the start, where all is zero in any unit.
     k = int(np.argmax(np.nan_to_num(abs(mine - right), nan=np.inf)))
     figures = told_apart(mine[k], right[k], lambda value, digits: f"{value + 0.0:.{digits}g}")
     figures = f"you return {figures.replace(' where', f' at {k} s where')} is expected"
     own = [run for run in answer.runs if run.own]
-    speed = fall.speed(limp, world.model)
+    speed = fall.speed[int(limp), fall.marks]
     nothing = float(abs(mine).max()) <= TOLERANCE < float(abs(right).max())
     mistakes = (
         (_is(mine, mistaken, right), text)
@@ -160,7 +147,7 @@ def _why(given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, answe
         *mistakes,
         (not own, _NO_STEP),
         (
-            nothing and any(near(run.end, run.qpos, _STILL) for run in own),
+            nothing and any(near(run.end.qpos, run.start.qpos, _STILL) for run in own),
             "nothing moves in this run, as where there is no gravity",
         ),
         (
@@ -187,18 +174,18 @@ def _mistakes(
     limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer
 ) -> Iterator[tuple[Array, str]]:
     """What typical mistakes give, and what to say of them."""
-    model, trace, place = world.model, fall.trace(limp), address(world.model)
-    right, marks = fall.degrees(limp, place), fall.marks
+    model, place, marks = world.model, fall.place, fall.marks
+    angles, right = fall.angles[int(limp)], fall.degrees(limp)
     yield np.radians(right), "that is radians; np.degrees(…) makes degrees of them"
     yield np.degrees(right), "degrees were made of it twice"
     for entry in set(range(model.nq)) - {place}:
         yield (
-            fall.degrees(limp, entry),
+            angles[marks, entry],
             f"that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at "
             "model.jnt_qposadr[model.joint_id(…)]",
         )
     for unit in _UNITS:
-        yield unit(fall.speed(limp, model)), _SPEED
+        yield unit(fall.speed[int(limp), marks]), _SPEED
     if fall.course is not None:
         loaded = "" if all(run.own for run in answer.runs) else " (it steps a model of its own)"
         yield (
@@ -206,13 +193,12 @@ def _mistakes(
             f"that belongs to the course's own scene, not to the model that you got{loaded}",
         )
     how = "still on" if limp else "off already"
-    yield fall.degrees(not limp, place), f"the servos were {how} in this run"
-    degrees, last = np.degrees(trace.qpos[:, place]), len(trace.qpos) - 1
+    yield fall.degrees(not limp), f"the servos were {how} in this run"
     for nstep in dict.fromkeys(run.nstep for run in answer.runs):
         each = nstep // (len(marks) - 1)
-        if each != marks[1] and (len(marks) - 1) * each <= last:
+        if each != marks[1] and (len(marks) - 1) * each < len(angles):
             yield (
-                degrees[np.arange(len(marks)) * each],
+                angles[np.arange(len(marks)) * each, place],
                 f"you took {count(each, 'step')} for a second, and at "
                 f"{model.timestep * 1e3:g} ms a step a second has {marks[1]}: "
                 "round(1 / model.timestep)",
@@ -222,7 +208,8 @@ def _mistakes(
 def _goes_on(given: Array, other: Array, world: ExerciseWorld, answer: Answer) -> str:
     """Whether a run began where another had ended."""
     place = address(world.model)
-    fresh = sum(abs(np.degrees(run.qpos[place])) <= TOLERANCE for run in answer.runs if run.own)
+    starts = [np.degrees(run.start.qpos[place]) for run in answer.runs if run.own]
+    fresh = sum(abs(start) <= TOLERANCE for start in starts)
     if fresh >= 2 or abs(given[0]) <= TOLERANCE or abs(given[0] - other[-1]) > TOLERANCE:
         return ""
     return (
@@ -233,8 +220,8 @@ def _goes_on(given: Array, other: Array, world: ExerciseWorld, answer: Answer) -
 
 def _late(given: Array, limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer) -> str:
     """Whether the list is right for other moments, to which one of the runs came."""
-    place, marks, timestep = address(world.model), fall.marks, world.model.timestep
-    trace = np.degrees(fall.trace(limp).qpos[:, place])
+    marks, timestep = fall.marks, world.model.timestep
+    trace = fall.angles[int(limp), :, fall.place]
     slack = _SAME + grain(given)
     found = [
         late
@@ -253,16 +240,15 @@ def _late(given: Array, limp: bool, world: ExerciseWorld, fall: Fall, answer: An
 
 def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) -> str:
     """Whether it was stepped while data.time was below whole seconds, where that is a step off."""
-    trace = fall.trace(limp)
-    degrees = np.degrees(trace.qpos[:, address(world.model)])
-    marks = np.searchsorted(trace.time, np.arange(len(fall.marks)))
+    degrees = fall.angles[int(limp), :, fall.place]
+    marks = np.searchsorted(fall.time, np.arange(len(fall.marks)))
     if not _is(given, degrees[marks], degrees[fall.marks]):
         return ""
     k = int(np.argmax(np.diff(marks) != fall.marks[1])) + 1
     before = int(marks[k]) - 1
     return (
         f"you took {marks[k] - marks[k - 1]} steps from {k - 1} s to {k} s, where a second has "
-        f"{fall.marks[1]}: after {before} data.time is {float(trace.time[before])!r}, since "
+        f"{fall.marks[1]}: after {before} data.time is {float(fall.time[before])!r}, since "
         f"adding up {world.model.timestep:g} rounds each time. A sum of time is no counter of "
         "steps: count them, round(1 / model.timestep)"
     )
@@ -270,14 +256,9 @@ def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) ->
 
 def _command(answer: Answer) -> list[str]:
     """Whether ctrl was written, to anything but what a new Data has."""
-    return [
-        (
-            f"ctrl was written ({listed(answer.ends[run.data].ctrl)}): here it must stay as a new "
-            "Data has it"
-        )
-        for run in answer.runs
-        if run.ctrl.any() or run.ctrl_changed is not None
-    ][:1]
+    written = [run for run in answer.runs if run.start.ctrl.any() or run.ctrl_changed is not None]
+    ends = [listed(answer.ends[run.start.data].ctrl) for run in written[:1]]
+    return [f"ctrl was written ({end}): here it must stay as a new Data has it" for end in ends]
 
 
 def _left(answer: Answer) -> list[str]:

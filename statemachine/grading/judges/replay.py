@@ -99,7 +99,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[str] | str
     if remarks:
         return remarks
     one, two = answer.runs
-    apart = float(abs(one.end - two.end).max())
+    apart = float(abs(one.end.qpos - two.end.qpos).max())
     if apart and world.nudge is None:
         return [
             (
@@ -107,7 +107,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[str] | str
                 "of the first was left over. sm.reset clears all, or use a new Data"
             )
         ]
-    if bool(same) != same_bits(one.end, two.end):
+    if bool(same) != same_bits(one.end.qpos, two.end.qpos):
         unlike = (
             f"the two runs ended {apart:.1e} apart and you call them equal: nearly is not "
             "equal. np.array_equal compares every bit; np.allclose, round, or a comparison "
@@ -182,14 +182,14 @@ def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str
     """What is wrong with a run, by what it concerns; "" for nothing."""
     ctrl, nstep = world.arguments
     gaps = {
-        "qpos": float(abs(run.qpos - start.qpos).max()),
-        "qvel": float(abs(run.qvel - start.qvel).max()),
+        "qpos": float(abs(run.start.qpos - start.qpos).max()),
+        "qvel": float(abs(run.start.qvel - start.qvel).max()),
     }
     name = max(gaps, key=lambda each: gaps[each])
-    moved = run.qpos[abs(run.qpos - start.qpos) > _START]
+    moved = run.start.qpos[abs(run.start.qpos - start.qpos) > _START]
     elsewhere = not (gaps["qpos"] <= _START and gaps["qvel"] <= _START)
     misplaced = bool(elsewhere and moved.size and np.isin(moved, ctrl).all())
-    of = ", the keyframe's time" if run.time == start.time else ""
+    of = ", the keyframe's time" if run.start.time == start.time else ""
     return {
         "start": reason(
             (
@@ -202,10 +202,10 @@ def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str
                 f"it did not begin at keyframe 0: {name} was up to {gaps[name]:.2g} away. "
                 "sm.reset(model, data, keyframe=0)",
             ),
-            (run.time, f"it began at {run.time:g} s{of}: set data.time to zero"),
+            (run.start.time, f"it began at {run.start.time:g} s{of}: set data.time to zero"),
         ),
         "ctrl": reason(
-            (not (misplaced or same_bits(run.ctrl, ctrl)), _command(run, ctrl, start)),
+            (not (misplaced or same_bits(run.start.ctrl, ctrl)), _command(run, ctrl, start)),
             (
                 run.ctrl_changed is not None,
                 f"ctrl was changed after step {run.ctrl_changed}: it must stay fixed",
@@ -222,18 +222,18 @@ def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str
 
 def _command(run: EngineRun, ctrl: Array, start: Start) -> str:
     """What ctrl was in a run where it was not what is asked for, and why it may have been."""
-    own, late = same_bits(run.ctrl, start.ctrl), run.ctrl_changed is not None
-    had = "the keyframe's own" if own else listed(run.ctrl)
+    own, late = same_bits(run.start.ctrl, start.ctrl), run.ctrl_changed is not None
+    had = "the keyframe's own" if own else listed(run.start.ctrl)
     after = f", and was written only after {count(run.ctrl_changed or 0, 'step')}" if late else ""
     why = reason(
         (own and not late, " (a reset overwrites ctrl: write it after)"),
         (
-            near(run.ctrl, start.ctrl + ctrl, 1e-9),
+            near(run.start.ctrl, start.ctrl + ctrl, 1e-9),
             ": += adds to the keyframe's own ctrl; data.ctrl[:] = ctrl sets it",
         ),
         *(
             (
-                near(run.ctrl, convert(ctrl), 1e-9),
+                near(run.start.ctrl, convert(ctrl), 1e-9),
                 f": {unit} were made of it; ctrl is in radians as it is",
             )
             for unit, convert in (("degrees", np.degrees), ("radians", np.radians))
@@ -245,11 +245,11 @@ def _command(run: EngineRun, ctrl: Array, start: Start) -> str:
 def _ends(ends: list[Array], runs: tuple[EngineRun, ...]) -> list[str]:
     """Whether what was returned is what the runs ended in; the first that is not."""
     for name, given, run in zip(_COUNT, ends, runs, strict=True):
-        away, rounding = float(abs(given - run.end).max()), grain(given)
+        away, rounding = float(abs(given - run.end.qpos).max()), grain(given)
         why = reason(
-            (same_bits(given, run.qpos), "that is qpos at the start"),
-            (same_bits(given, runs[0].end), "the first run was returned twice"),
-            (same_bits(given, runs[1].end), "that is the end of the second run"),
+            (same_bits(given, run.start.qpos), "that is qpos at the start"),
+            (same_bits(given, runs[0].end.qpos), "the first run was returned twice"),
+            (same_bits(given, runs[1].end.qpos), "that is the end of the second run"),
             (
                 rounding and away <= rounding * 1.001,
                 "was it rounded? Every bit counts here",
@@ -257,7 +257,7 @@ def _ends(ends: list[Array], runs: tuple[EngineRun, ...]) -> list[str]:
             (away < 1e-3, "was it rounded, or read before the last step?"),
             (True, "return data.qpos.copy() after the last step"),
         )
-        if not same_bits(given, run.end):
+        if not same_bits(given, run.end.qpos):
             text = f"{name} is up to {away:.1e} away from qpos at the end of its run: {why}"
             return [text]
     return []

@@ -100,3 +100,4 @@ _ALL = (
 )
 MUTANTS = {mutant.name: mutant for mutant in _ALL}
 FAULT = "STATEMACHINE_FAULT"  # the variable that names a fault to the plugin
+IMPORT = "the import of the file"  # where that failed, in place of a test's name

@@ -25,7 +25,7 @@ import statemachine as sm
 from ...engines import rooms_with
 from ...installed import DEFAULT
 from ..guard import Guard
-from . import FAULT
+from . import FAULT, IMPORT
 
 if TYPE_CHECKING:
     from statemachine import Data, Model
@@ -82,18 +82,16 @@ class PytestRecorder:
     """Writes down what was found, what began and how it ended.
 
     Lines: {"ready": true} once the fault is in, {"tests": names}, {"began": name},
-    {"failed": name, "why": …}, {"skipped": name}, {"ended": name}, and {"broken": why} for a
-    file that cannot be imported.
+    {"failed": name, "why": …} (of `IMPORT` for a file that cannot be imported), {"skipped": name}
+    and {"ended": name}.
     """
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("a", encoding="utf-8", buffering=1)
-        self._process = os.getpid()
         self._write(ready=True)
 
     def _write(self, **facts: Any) -> None:
-        if os.getpid() == self._process:  # not a fork of it that a test forgot to end
-            self._file.write(json.dumps(facts) + "\n")
+        self._file.write(json.dumps(facts) + "\n")
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
@@ -102,7 +100,7 @@ class PytestRecorder:
     def pytest_exception_interact(self, node: Any, call: Any, report: Any) -> None:
         if isinstance(report, pytest.CollectReport):
             error = call.excinfo.value
-            self._write(broken=_said(error.__cause__ or error, node.path))
+            self._write(failed=IMPORT, why=_said(error.__cause__ or error, node.path))
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         self._write(began=_name(nodeid))

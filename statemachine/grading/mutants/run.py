@@ -12,11 +12,10 @@ import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from ...backends import backend_names
 from ...engines import rooms_with
@@ -29,13 +28,10 @@ from ...errors import (
     unknown_name,
 )
 from ...installed import DEFAULT, engine_version, require
-from ...processes import checked_jobs
-from .. import sandbox
-from ..calls import reason
-from ..parallel import in_parallel
+from ...processes import checked_jobs, sandbox
+from ...processes.parallel import in_parallel, unwinding
 from ..recording import content
-from ..unwinding import unwinding
-from . import FAULT, MUTANTS, Mutant
+from . import FAULT, IMPORT, MUTANTS, Mutant
 
 _SECONDS = 60.0  # of computing, for the tests on the healthy arm
 _CLOCK = 300.0  # on the clock: the machine may be busy with others
@@ -44,7 +40,6 @@ _TIMES, _AND, _CLOCK_AND = 5.0, 15.0, 120.0
 _RECORD_MOST = 10_000_000  # bytes
 _PYTEST_FAILS = "INTERNALERROR>"  # how pytest's report of an error of its own begins, on stdout
 _LONGEST = 300  # characters of what was said last
-_IMPORT = "the import of the file"
 _OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
 
@@ -140,44 +135,32 @@ def examine(
         check_name("mutant", name, MUTANTS)
     mutants = [MUTANTS[name] for name in dict.fromkeys(only or MUTANTS)]
     version = _ready(backend)
-    with unwinding():
-        return _examine(path, backend, version, mutants, seconds, clock, progress)
-
-
-def _examine(
-    path: Path,
-    backend: str,
-    version: str,
-    mutants: Sequence[Mutant],
-    seconds: float,
-    clock: float,
-    progress: Callable[[float], None],
-) -> Examination:
-    healthy = _run(path, backend, None, seconds, clock)
-    if healthy.broken:
-        raise BadInputError(f"{path.name} cannot be imported: {healthy.broken}")
-    if not healthy.tests:
-        reason = "each was skipped" if healthy.skipped else "a test is a function test_…"
-        raise BadInputError(f"there are no tests in {path.name}: {reason}")
     records: dict[str, _Record] = {}
-    if not healthy.failures:
-        patience = _TIMES * healthy.cpu + _AND, _TIMES * healthy.wall + _CLOCK_AND
-        stop, total = threading.Event(), len(mutants) + 1
-        work = {m.name: partial(_run, path, backend, m.name, *patience, stop) for m in mutants}
-        in_parallel(
-            work,
-            checked_jobs(None),
-            records.__setitem__,
-            stop.set,
-            lambda left: progress((total - left) / total),
-        )
+    with unwinding():
+        healthy = _run(path, backend, None, seconds, clock)
+        if broken := healthy.failures.get(IMPORT):
+            raise BadInputError(f"{path.name} cannot be imported: {broken}")
+        if not healthy.tests:
+            why = "each was skipped" if healthy.skipped else "a test is a function test_…"
+            raise BadInputError(f"there are no tests in {path.name}: {why}")
+        if not healthy.failures:
+            took = healthy.outcome
+            patience = _TIMES * took.cpu + _AND, _TIMES * took.wall + _CLOCK_AND
+            stop, total = threading.Event(), len(mutants) + 1
+            in_parallel(
+                {m.name: partial(_run, path, backend, m.name, *patience, stop) for m in mutants},
+                checked_jobs(None),
+                records.__setitem__,
+                stop.set,
+                lambda left: progress((total - left) / total),
+            )
     return Examination(
         file=path.name,
         backend=backend,
         engine_version=version,
         tests=healthy.tests,
-        failures=healthy.failures,
-        trials=tuple(MutantTrial(m, records[m.name].failures) for m in mutants if records),
+        failures=_told(healthy),
+        trials=tuple(MutantTrial(m, _told(records[m.name])) for m in mutants if records),
     )
 
 
@@ -212,12 +195,14 @@ def _ready(backend: str) -> str:
 class _Record:
     """What one run of pytest came to; tests that were skipped are no tests."""
 
+    outcome: sandbox.ProcessOutcome
     tests: tuple[str, ...]
     skipped: int
-    failures: tuple[Failure, ...]
-    broken: str
-    cpu: float
-    wall: float
+    failures: dict[str, str]
+
+
+def _told(record: _Record) -> tuple[Failure, ...]:
+    return tuple(Failure(test, why) for test, why in record.failures.items())
 
 
 def _run(
@@ -249,7 +234,7 @@ def _run(
             writable=folder,
             stop=stop,
         )
-        return _read(record, outcome, seconds, clock)
+        return _read(record, outcome)
 
 
 def _environment() -> dict[str, str]:
@@ -266,17 +251,21 @@ def _environment() -> dict[str, str]:
     }
 
 
-def _read(record: Path, outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> _Record:
+def _read(record: Path, outcome: sandbox.ProcessOutcome) -> _Record:
+    if not outcome.started:  # of which no test can be the reason
+        raise EngineError(f"pytest stopped before the tests: it {_end(outcome)}")
     tests: list[str] | None = None
-    ready = False
-    running, broken = "", ""
-    ended: list[str] = []
+    running, ended = "", 0
     skipped: set[str] = set()
     failures: dict[str, str] = {}
-    for found in _lines(record):
+    for line in content(record, _RECORD_MOST).splitlines():
+        try:
+            found = json.loads(line)
+        except (ValueError, RecursionError):
+            found = None
         match found:
             case {"ready": True}:
-                ready = True
+                pass
             case {"tests": [*names]} if all(isinstance(name, str) for name in names):
                 tests = names
             case {"began": str(name)}:
@@ -285,63 +274,25 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome, seconds: float, clock: 
                 failures.setdefault(name, why)  # the test itself, before its teardown
             case {"skipped": str(name)}:
                 skipped.add(name)
-            case {"ended": str(name)}:
-                ended.append(name)
-            case {"broken": str(why)}:
-                broken = why
+            case {"ended": str()}:
+                ended += 1
             case _:
                 raise BadInputError("the tests wrote into the record of what they do")
-    if not ready:  # of which no test can be the reason
-        how = _ended(outcome, seconds, clock)
-        raise EngineError(f"pytest {how} before the tests: {_last(outcome) or 'it said nothing'}")
-    if broken or tests is None:
-        broken = broken or f"it {_end(outcome, seconds, clock)}"
-        failures[_IMPORT] = broken
-    elif len(ended) < len(tests):  # one ended them all
-        failures.setdefault(running or tests[0], _end(outcome, seconds, clock))
-    return _Record(
-        tests=tuple(test for test in tests or () if test not in skipped),
-        skipped=len(skipped),
-        failures=tuple(Failure(test, why) for test, why in failures.items()),
-        broken=broken,
-        cpu=outcome.cpu,
-        wall=outcome.wall,
-    )
+    if tests is None:
+        failures.setdefault(IMPORT, f"it {_end(outcome)}")
+    elif IMPORT not in failures and ended < len(tests):  # one ended them all
+        failures.setdefault(running or tests[0], _end(outcome))
+    left = tuple(test for test in tests or () if test not in skipped)
+    return _Record(outcome, left, len(skipped), failures)
 
 
-def _lines(record: Path) -> Iterator[Any]:
-    """What the lines of a record say; None for one that says nothing."""
-    for line in content(record, _RECORD_MOST).splitlines():
-        try:
-            yield json.loads(line)
-        except (ValueError, RecursionError):
-            yield None
+def _end(outcome: sandbox.ProcessOutcome) -> str:
+    """How a run ended that did not come to its end, and the last line of an error, if any.
 
-
-def _end(outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> str:
-    """How a run ended that did not come to its end, and what it said last."""
-    how, said = _ended(outcome, seconds, clock), _last(outcome)
-    return f"{how}: {said}" if said else how
-
-
-def _last(outcome: sandbox.ProcessOutcome) -> str:
-    """The last line of an error, pytest's own among them; "" where nothing was said."""
+    pytest's own among them.
+    """
     lines = [line.strip() for line in outcome.stderr.splitlines() if line.strip()]
     lines += [line for line in outcome.stdout.splitlines() if line.startswith(_PYTEST_FAILS)]
     said = [line for line in lines if "rror" in line.removeprefix(_PYTEST_FAILS)] or lines
-    return said[-1].removeprefix(_PYTEST_FAILS).strip()[:_LONGEST] if said else ""
-
-
-def _ended(outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> str:
-    number = outcome.signal or 0
-    return reason(
-        (outcome.out_of_cpu, f"took longer than {seconds:.0f} s of computing"),
-        (outcome.flooded, "wrote without end"),
-        (
-            outcome.timed_out,
-            f"took longer than {clock:.0f} s on the clock, and computed for {outcome.cpu:.0f} s",
-        ),
-        (outcome.out_of_memory, "took more memory than it may"),
-        (number, f"ended the process by signal {number} ({sandbox.signal_name(number)})"),
-        (True, f"ended the process with code {outcome.returncode}"),
-    )
+    words = f": {said[-1].removeprefix(_PYTEST_FAILS).strip()[:_LONGEST]}" if said else ""
+    return outcome.how + words

@@ -94,10 +94,10 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
     states = {run.point.name: interface.state(run.point) for run in runs[interface]}
     if not states:
         raise BadInputError(f"nothing can be saved in {model.path.name}: {'; '.join(diverged)}")
-    job = elsewhere.Job(model, seed, nstep, states, tuple(map(type, drivers)))
+    kinds = tuple(map(type, drivers))
     findings: dict[Driver, list[AuditFinding]] = {driver: [] for driver in drivers}
     with ThreadPoolExecutor(1) as pool:
-        child = pool.submit(elsewhere.run, job)
+        child = pool.submit(elsewhere.run, model, seed, nstep, states, kinds)
         work = [(driver, run) for driver in drivers for run in runs[driver]]
         for done, (driver, run) in enumerate(work):
             progress(done / (len(work) + len(drivers)))
@@ -112,15 +112,18 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
             if driver.layer == "engine":
                 findings[driver] += trials.falls(driver)
         findings[interface] += elsewhere.pickled(child.result(), interface, runs[interface], states)
-    audited = []
-    for driver in drivers:
-        measured = tuple(driver.measure(run.point) for run in runs[driver])
-        of_driver = tuple(findings[driver])
-        conclusion = conclude(of_driver)
-        audited.append(
-            Audited(driver.layer, driver.name, driver.legend, measured, of_driver, conclusion)
+    audited = tuple(
+        Audited(
+            driver.layer,
+            driver.name,
+            driver.legend,
+            points=tuple(driver.measure(run.point) for run in runs[driver]),
+            findings=tuple(findings[driver]),
+            conclusion=conclude(findings[driver]),
         )
-    return Audit(nstep, tuple(audited), without + diverged, provenance(model, seed))
+        for driver in drivers
+    )
+    return Audit(nstep, audited, without + diverged, provenance(model, seed))
 
 
 # A question to a driver about one save point, given the run from there that nothing disturbed.
@@ -153,11 +156,11 @@ def _runs(
             # The interface first: it raises, where an engine may go on and warn.
             able = [driver for driver in reversed(drivers) if not driver.lacks(point)]
             undisturbed = [(driver, driver.run(point, steps)) for driver in able]
-            reasons = [(driver.name, driver.lacks(point)) for driver in drivers]
-            without += [f"{point.name}: on {name}, {why}" for name, why in reasons if why]
         except DivergedError:
             without.append(f"{point.name}: the run diverges")
             continue
+        lacking = [driver for driver in drivers if driver not in able]
+        without += [f"{point.name}: on {each.name}, {each.lacks(point)}" for each in lacking]
         for driver, run in undisturbed:
             runs[driver].append(run)
     return runs, tuple(without)

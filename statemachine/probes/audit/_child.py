@@ -1,4 +1,4 @@
-"""The fresh process: it reads a job, does it and writes the answer."""
+"""The fresh process: it is told what to run, runs it and writes the answer."""
 
 from __future__ import annotations
 
@@ -6,33 +6,29 @@ import pickle
 import sys
 from pathlib import Path
 
-from .elsewhere import ChildRuns, Job, Traces
+from ...engines.auditing import Driver
+from ...interface import Model, State
+from .elsewhere import Answer, Traces
 from .interface_driver import InterfaceDriver
 from .points import points
 
 
-def answer(job: Job) -> ChildRuns:
+def answer(
+    model: Model, seed: int, steps: int, states: dict[str, State], kinds: tuple[type[Driver], ...]
+) -> Answer:
     """All runs from the start, and a future of each State."""
     runs: Traces = {}
     futures = {}
-    places, _ = points(job.model, job.seed)
-    for driver in (kind(job.model, job.seed) for kind in job.drivers):
-        # A point without a State is one at which somebody diverged.
+    # A point without a State is one at which somebody diverged.
+    places = [point for point in points(model, seed)[0] if point.name in states]
+    for driver in (kind(model, seed) for kind in kinds):
         for point in places:
-            name = point.name
-            if name not in job.states or driver.lacks(point):
-                continue
-            runs[driver.layer, name] = driver.run(point, job.steps).future
+            if not driver.lacks(point):
+                runs[driver.layer, point.name] = driver.run(point, steps).future
             if isinstance(driver, InterfaceDriver):
-                futures[name] = driver.future(point, job.states[name], job.steps)
-    return ChildRuns(runs, futures)
-
-
-def main(asked: str, answered: str) -> None:
-    """Read the one file, write the other."""
-    job = pickle.loads(Path(asked).read_bytes())
-    Path(answered).write_bytes(pickle.dumps(answer(job)))
+                futures[point.name] = driver.future(point, states[point.name], steps)
+    return runs, futures
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    Path(sys.argv[1]).write_bytes(pickle.dumps(answer(*pickle.load(sys.stdin.buffer))))

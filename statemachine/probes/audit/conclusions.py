@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ...engines.auditing import ITSELF, ONLY
@@ -77,41 +77,41 @@ class Conclusion:
 
 def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
     """Draw the conclusion of one driver's findings."""
-    restores = [finding for finding in findings if finding.experiment == RESTORE]
-    tried = _by_case(finding for finding in restores if finding.into != EACH_OTHER)
-    among = _by_case(finding for finding in restores if finding.into == EACH_OTHER)
-    left_out = _by_case(
-        finding
-        for finding in findings
-        if finding.experiment == WITHOUT and finding.into != EACH_OTHER
-    )
+
+    def by_case(experiment: str, among: bool = False) -> dict[str, list[AuditFinding]]:
+        cases: dict[str, list[AuditFinding]] = {}
+        for finding in findings:
+            if finding.experiment == experiment and (finding.into == EACH_OTHER) == among:
+                cases.setdefault(finding.case, []).append(finding)
+        return cases
+
+    tried, among, left_out = by_case(RESTORE), by_case(RESTORE, among=True), by_case(WITHOUT)
     alone = tried.pop(ONLY, None)
+    missing = [_missing(name, of_name) for name, of_name in left_out.items()]
+    forgets = [f for f in findings if f.experiment == FORGETS and f.into != NOT_RESTORED]
+    restores = {(f.case, f.into, f.point): f.gap for f in findings if f.experiment == RESTORE}
+    without_contacts = [finding for finding in findings if finding.experiment == NO_CONTACTS]
     return Conclusion(
         suffice=tuple(case for case in tried if not _differing(tried[case])),
         fail={case: _worst(tried[case]) for case in tried if _differing(tried[case])},
         agree=tuple(case for case in among if case in tried and not _differing(among[case])),
-        missing=tuple(_missing(name, left_out[name]) for name in _that_matter(left_out)),
-        idle=tuple(name for name in left_out if name not in _that_matter(left_out)),
+        missing=tuple(each for each in missing if each.points),
+        idle=tuple(each.field for each in missing if not each.points),
         smallest=None if alone is None else not _differing(alone),
-        forgotten=_forgotten(findings),
-        touching=_touching(findings),
+        forgotten={
+            way: tuple(f.case for f in forgets if f.into == way and not f.gap.exact)
+            for way in dict.fromkeys(finding.into for finding in forgets)
+        },
+        touching={
+            off.point: (restores[off.case, off.into, off.point], off.gap)
+            for off in without_contacts
+        },
         not_read_back={
             case: points
             for case, of_case in tried.items()
             if (points := _differing(finding for finding in of_case if finding.gap.first == 0))
         },
     )
-
-
-def _by_case(findings: Iterable[AuditFinding]) -> dict[str, list[AuditFinding]]:
-    cases: dict[str, list[AuditFinding]] = {}
-    for finding in findings:
-        cases.setdefault(finding.case, []).append(finding)
-    return cases
-
-
-def _that_matter(cases: Mapping[str, Sequence[AuditFinding]]) -> list[str]:
-    return [name for name, findings in cases.items() if _differing(findings)]
 
 
 def _differing(findings: Iterable[AuditFinding]) -> tuple[str, ...]:
@@ -126,24 +126,3 @@ def _worst(findings: Sequence[AuditFinding]) -> FutureGap:
 def _missing(name: str, findings: Sequence[AuditFinding]) -> Missing:
     itself = _differing(finding for finding in findings if finding.into == ITSELF)
     return Missing(name, _differing(findings), itself, _worst(findings))
-
-
-def _forgotten(findings: Iterable[AuditFinding]) -> dict[str, tuple[str, ...]]:
-    """What each way to save does not bring back."""
-    forgotten: dict[str, dict[str, None]] = {}
-    for finding in findings:
-        if finding.experiment == FORGETS and finding.into != NOT_RESTORED:
-            cases = forgotten.setdefault(finding.into, {})
-            if not finding.gap.exact:
-                cases[finding.case] = None
-    return {way: tuple(cases) for way, cases in forgotten.items()}
-
-
-def _touching(findings: Sequence[AuditFinding]) -> dict[str, tuple[FutureGap, FutureGap]]:
-    """By save point the same restore, as it stands and with contacts switched off."""
-    restores = {(f.case, f.into, f.point): f.gap for f in findings if f.experiment == RESTORE}
-    return {
-        off.point: (restores[off.case, off.into, off.point], off.gap)
-        for off in findings
-        if off.experiment == NO_CONTACTS
-    }

@@ -7,7 +7,6 @@ import pickle
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from ...engines.auditing import Driver, ReferenceRun
@@ -15,6 +14,7 @@ from ...engines.futures import gap
 from ...errors import EngineError
 from ...interface import Array, Model, State
 from ...processes import fresh_python
+from ...processes.pipes import last_line
 from .interface_driver import InterfaceDriver
 from .trials import AuditFinding, finding_of
 
@@ -25,41 +25,26 @@ _PATIENCE = 300.0  # seconds
 Traces = dict[tuple[str, str], Array]
 
 
-@dataclass(frozen=True)
-class Job:
-    """What the other process is to do."""
-
-    model: Model
-    seed: int
-    steps: int
-    states: dict[str, State]
-    drivers: tuple[type[Driver], ...]
+# Of each run from the start, by layer and point; of each State, by point.
+Answer = tuple[Traces, dict[str, Array]]
 
 
-@dataclass(frozen=True)
-class ChildRuns:
-    """What it did: runs from the start, and futures of the States by point."""
-
-    runs: Traces
-    futures: dict[str, Array]
-
-
-def run(job: Job) -> ChildRuns:
-    """Do a job in a fresh Python, whose strings hash otherwise; nothing of it is left.
+def run(
+    model: Model, seed: int, steps: int, states: dict[str, State], kinds: tuple[type[Driver], ...]
+) -> Answer:
+    """Run the drivers of these kinds in a fresh Python, whose strings hash otherwise.
 
     Raises:
         EngineError: The process did not come to its end.
     """
     with tempfile.TemporaryDirectory() as folder:
-        asked, answered = Path(folder) / "job", Path(folder) / "answer"
-        asked.write_bytes(pickle.dumps(job))
-        files = os.fspath(asked), os.fspath(answered)
-        command, environment = fresh_python(f"{__package__}._child", *files)
+        answered = Path(folder) / "answer"
+        command, environment = fresh_python(f"{__package__}._child", os.fspath(answered))
         try:
             done = subprocess.run(
                 command,
                 env={**environment, "PYTHONHASHSEED": "1"},
-                stdin=subprocess.DEVNULL,
+                input=pickle.dumps((model, seed, steps, states, kinds)),
                 stdout=subprocess.DEVNULL,  # engines greet there
                 stderr=subprocess.PIPE,
                 timeout=_PATIENCE,
@@ -68,23 +53,22 @@ def run(job: Job) -> ChildRuns:
         except subprocess.TimeoutExpired:
             raise EngineError(f"a fresh process did not end in {_PATIENCE:g} s") from None
         if done.returncode:
-            said = done.stderr.decode(errors="replace").strip().splitlines()
-            last = said[-1] if said else f"exit code {done.returncode}"
-            raise EngineError(f"a fresh process failed: {last}")
+            said = last_line(done.stderr, done.returncode)
+            raise EngineError(f"a fresh process failed: {said}")
         return pickle.loads(answered.read_bytes())
 
 
 def findings(
-    answer: ChildRuns, driver: Driver, runs: Sequence[ReferenceRun]
+    answer: Answer, driver: Driver, runs: Sequence[ReferenceRun]
 ) -> Iterator[AuditFinding]:
     """The other process's runs against those of this one."""
     for run in runs:
-        off = driver.gap(run, answer.runs[driver.layer, run.point.name])
+        off = driver.gap(run, answer[0][driver.layer, run.point.name])
         yield finding_of(driver, PROCESS, run, "a fresh process", "this process", off)
 
 
 def pickled(
-    answer: ChildRuns,
+    answer: Answer,
     driver: InterfaceDriver,
     runs: Sequence[ReferenceRun],
     states: dict[str, State],
@@ -92,7 +76,7 @@ def pickled(
     """The future of a State that was pickled to another process, against its future here."""
     for run in runs:
         here = driver.future(run.point, states[run.point.name], run.steps)
-        off = gap(here, answer.futures[run.point.name], driver.coordinates)
+        off = gap(here, answer[1][run.point.name], driver.coordinates)
         yield finding_of(
             driver, PICKLED, run, "a pickled State, in a fresh one", "in this process", off
         )

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 
 import numpy as np
 
-from ...engines.auditing import Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
+from ...engines.auditing import Disturbance, Driver, Restore, SaveMethod, SavePoint
 from ...errors import UnsupportedError
 from ...interface import (
     DERIVED,
@@ -47,19 +47,16 @@ class InterfaceDriver(Driver):
     def advance(self, machine: Data, nstep: int = 1) -> None:
         step(machine.model, machine, nstep)
 
-    def _measure(self, point: SavePoint) -> Measured:
-        with self.at(point) as machine:
-            forward(machine.model, machine)
-            speed = float(np.abs(machine.qvel).max(initial=0.0))
-            contacts = len(machine.contacts)
-            return Measured(point.name, point.how, machine.time, contacts, None, speed)
+    def touching(self, machine: Data) -> tuple[int, None]:
+        forward(machine.model, machine)
+        return len(machine.contacts), None
 
     def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         exact = point.model.capabilities.exact_restore
         return (
-            _written("qpos", "qvel"),
-            _written("qpos", "qvel", "ctrl", "time"),
-            SaveMethod("get_state, set_state", _state, promised=exact, agree=True),
+            written("qpos", "qvel"),
+            written("qpos", "qvel", "ctrl", "time"),
+            SaveMethod("get_state, set_state", as_a_state, promised=exact, agree=True),
         )
 
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
@@ -86,7 +83,9 @@ class InterfaceDriver(Driver):
             return self.drive(machine, point, steps)
 
 
-def _written(*names: str) -> SaveMethod:
+def written(*names: str) -> SaveMethod:
+    """Arrays of a Data, and its time, that are written back."""
+
     @contextmanager
     def save(machine: Data) -> Iterator[Restore]:
         kept = {name: np.array(getattr(machine, name)) for name in names}
@@ -101,7 +100,8 @@ def _written(*names: str) -> SaveMethod:
 
 
 @contextmanager
-def _state(machine: Data) -> Iterator[Restore]:
+def as_a_state(machine: Data) -> Iterator[Restore]:
+    """By get_state and set_state."""
     kept = get_state(machine.model, machine)
     yield lambda other: set_state(other.model, other, kept)
 

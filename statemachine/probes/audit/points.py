@@ -6,8 +6,6 @@ They are found by running a model, so that any model has some. What a moment is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-
 import numpy as np
 
 from ...engines.auditing import STIR, SavePoint, within
@@ -30,108 +28,67 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
         model: The model.
         seed: Of the command in motion.
     """
-    with make_data(model) as data:
-        zero = data.qpos.copy()
-    found, without = [], []
-    for name, make in _MAKERS.items():
+    found: list[SavePoint] = []
+    without: list[str] = []
+
+    def add(
+        name: str, how: str, qpos: Array, qvel: Array, ctrl: Array, seconds: float,
+        lacks: str = "", limp: bool = False, **special: bool,
+    ) -> None:  # fmt: skip
+        variant = model
         try:
-            found.append(make(model, zero, seed))
-        except (UnsupportedError, LookupError) as error:
-            without.append(f"{name}: {error}")
-    return tuple(found), tuple(without)
+            variant = model.replace(actuation=False) if limp and model.nu else model
+        except UnsupportedError as error:
+            lacks = lacks or str(error)
+        if lacks:
+            without.append(f"{name}: {lacks}")
+            return
+        steps, ctrl = min(max(round(seconds / model.timestep), 1), _LONGEST), within(model, ctrl)
+        found.append(
+            SavePoint(name, how, variant, qpos, qvel, ctrl, steps, powered=not limp, **special)
+        )
 
+    with make_data(model) as data:
+        zero, still, none = data.qpos.copy(), np.zeros(model.nv), np.zeros(model.nu)
+    add("default", "default pose, no command, and time to settle", zero, still, none, _SETTLE)
 
-def _default(model: Model, zero: Array, _seed: int) -> SavePoint:
-    how = "default pose, no command, and time to settle"
-    still, none = np.zeros(model.nv), within(model, np.zeros(model.nu))
-    return SavePoint("default", how, model, zero, still, none, _steps(model, _SETTLE))
-
-
-def _motion(model: Model, zero: Array, seed: int) -> SavePoint:
-    qpos, qvel = _lifted(model, zero)
-    stir = np.random.default_rng(seed).uniform(-STIR, STIR, model.nu)
-    ways = ["free bodies thrown"] if list(_free(model)) else []
+    air, thrown = zero.copy(), still.copy()
+    free = np.flatnonzero(model.jnt_type == int(JointType.FREE))
+    for place, dof in zip(model.jnt_qposadr[free], model.jnt_dofadr[free], strict=True):
+        air[place + 2] += _ABOVE
+        thrown[dof : dof + 6] = _THROWN
+    ways = ["free bodies thrown"] if len(free) else []
     ways += ["each servo on its way"] if model.nu else []
-    how = ", ".join(ways) or "default pose, let go"
-    return SavePoint("motion", how, model, qpos, qvel, within(model, stir), _steps(model, _WAY))
+    stir = np.random.default_rng(seed).uniform(-STIR, STIR, model.nu)
+    add("motion", ", ".join(ways) or "default pose, let go", air, thrown, stir, _WAY)
 
+    lacks = "" if model.keyframes else "the model has no keyframe"
+    key = model.keyframes[0] if model.keyframes else Keyframe("", 0.0, zero, still, none)
+    start = "default pose" if lacks else f"keyframe {key.name!r}" if key.name else "keyframe 0"
+    moved = key.ctrl.copy()
+    moved[: len(_MOVE)] += _MOVE[: model.nu]
+    how = f"{start}, command moved away from it"
+    add("keyframe", how, key.qpos, key.qvel, moved, 2 * _WAY, lacks)
 
-def _keyframe(model: Model, _zero: Array, _seed: int) -> SavePoint:
-    if not model.keyframes:
-        raise LookupError("the model has no keyframe")
-    key, ctrl = model.keyframes[0], model.keyframes[0].ctrl.copy()
-    ctrl[: len(_MOVE)] += _MOVE[: model.nu]
-    how = f"{_named(key)}, command moved away from it"
-    steps = _steps(model, 2 * _WAY)
-    return SavePoint("keyframe", how, model, key.qpos, key.qvel, within(model, ctrl), steps)
-
-
-def _limp(model: Model, zero: Array, _seed: int) -> SavePoint:
-    if not model.nu:
-        raise LookupError("the model has no servo to switch off")
+    lacks = "" if model.nu else "the model has no servo to switch off"
     how = "default pose, servos off, and time to fall"
-    still, none = np.zeros(model.nv), np.zeros(model.nu)
-    limp = model.replace(actuation=False)
-    return SavePoint("limp", how, limp, zero, still, none, _steps(model, _FALL), powered=False)
+    add("limp", how, zero, still, none, _FALL, lacks, limp=True)
 
-
-def _limit(model: Model, zero: Array, _seed: int) -> SavePoint:
-    qpos, qvel = _lifted(model, zero)
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     limited = np.flatnonzero(model.jnt_limited & scalar)
-    if not len(limited):
-        raise LookupError("no joint of the model has a limit")
     lower, upper = model.jnt_range[limited].T
     reach = np.minimum(_REACH, (upper - lower) / 10)
-    qpos[model.jnt_qposadr[limited]] = upper - reach
-    qvel[model.jnt_dofadr[limited]] = reach / (_ARRIVAL * model.timestep)
+    near, towards = air.copy(), thrown.copy()
+    near[model.jnt_qposadr[limited]] = upper - reach
+    towards[model.jnt_dofadr[limited]] = reach / (_ARRIVAL * model.timestep)
+    lacks = "" if len(limited) else "no joint of the model has a limit"
     how = "servos off, each joint run into its upper limit"
-    none = np.zeros(model.nu)
-    loose = model.replace(actuation=False) if model.nu else model
-    return SavePoint(
-        "limit", how, loose, qpos, qvel, none, _ARRIVAL + 3, powered=False, at_limit=True
-    )
+    add(
+        "limit", how, near, towards, none, (_ARRIVAL + 3) * model.timestep,
+        lacks, limp=True, at_limit=True,
+    )  # fmt: skip
 
-
-def _clock(model: Model, zero: Array, _seed: int) -> SavePoint:
-    if not model.nu:
-        raise LookupError("the model has no actuator")
-    qpos, qvel, ctrl, start = zero, np.zeros(model.nv), np.zeros(model.nu), "default pose"
-    if model.keyframes:
-        key = model.keyframes[0]
-        qpos, qvel, ctrl, start = key.qpos, key.qvel, key.ctrl, _named(key)
+    lacks = "" if model.nu else "the model has no actuator"
     how = f"{start}, a controller that reads the time before each step"
-    steps = _steps(model, 2 * _WAY)
-    return SavePoint("clock", how, model, qpos, qvel, ctrl, steps, swings=True)
-
-
-_MAKERS: dict[str, Callable[[Model, Array, int], SavePoint]] = {
-    "default": _default,
-    "motion": _motion,
-    "keyframe": _keyframe,
-    "limp": _limp,
-    "limit": _limit,
-    "clock": _clock,
-}
-
-
-def _named(key: Keyframe) -> str:
-    return f"keyframe {key.name!r}" if key.name else "keyframe 0"
-
-
-def _steps(model: Model, seconds: float) -> int:
-    return min(max(round(seconds / model.timestep), 1), _LONGEST)
-
-
-def _lifted(model: Model, zero: Array) -> tuple[Array, Array]:
-    """Configuration and velocity with every free body in the air."""
-    qpos, qvel = zero.copy(), np.zeros(model.nv)
-    for place, dof in _free(model):
-        qpos[place + 2] += _ABOVE
-        qvel[dof : dof + 6] = _THROWN
-    return qpos, qvel
-
-
-def _free(model: Model) -> Iterator[tuple[int, int]]:
-    for joint in np.flatnonzero(model.jnt_type == int(JointType.FREE)):
-        yield int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+    add("clock", how, key.qpos, key.qvel, key.ctrl, 2 * _WAY, lacks, swings=True)
+    return tuple(found), tuple(without)

@@ -260,7 +260,7 @@ BOXES, DROPS, STEPS = 4, 4, 300
 _HALF = 0.05  # of an edge [m]
 _MODEL = """<mujoco><option timestep="0.005"/><worldbody><geom type="plane" size="2 2 .1"/>
 {}</worldbody></mujoco>"""
-_BOX = '<body><freejoint/><geom type="box" size="{0} {0} {0}" mass=".2"/></body>\n'
+_BOX = '<body pos="0 0 {}"><freejoint/><geom type="box" size=".05 .05 .05" mass=".2"/></body>\n'
 _ASIDE, _TILTED = 0.03, 0.4  # at most, at the start [m], [rad]
 
 
@@ -272,7 +272,9 @@ def falls(driver: Driver) -> Iterator[AuditFinding]:
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "boxes.xml"
-        path.write_text(_MODEL.format(BOXES * _BOX.format(_HALF)), encoding="utf-8")
+        path.write_text(
+            _MODEL.format("".join(map(_BOX.format, range(1, BOXES + 1)))), encoding="utf-8"
+        )
         model = load(path, backend=driver.model.backend)
     other = type(driver)(model, driver.seed)
     for point in _drops(model, driver.seed):
@@ -281,13 +283,13 @@ def falls(driver: Driver) -> Iterator[AuditFinding]:
 
 def _drops(model: Model, seed: int) -> Iterator[SavePoint]:
     random = np.random.default_rng(seed)
+    heights = 2 * _HALF + 2.6 * _HALF * np.arange(float(BOXES))
+    how = f"{BOXES} boxes, one above the other, let go"
     for number in range(1, DROPS + 1):
-        poses = np.zeros((BOXES, 7))
-        poses[:, :2] = random.uniform(-_ASIDE, _ASIDE, (BOXES, 2))
-        poses[:, 2] = 2 * _HALF + 2.6 * _HALF * np.arange(BOXES)
+        aside = random.uniform(-_ASIDE, _ASIDE, (BOXES, 2))
         half = random.uniform(-_TILTED, _TILTED, (BOXES, 3)) / 2
-        poses[:, 3:] = np.column_stack([np.ones(BOXES), half])
-        poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+        quats = np.column_stack([np.ones(BOXES), half])
+        quats /= np.linalg.norm(quats, axis=1, keepdims=True)
+        qpos = np.hstack([aside, heights[:, None], quats]).ravel()
         still, none = np.zeros(model.nv), np.zeros(model.nu)
-        how = f"{BOXES} boxes, one above the other, let go"
-        yield SavePoint(f"{FALL} {number}", how, model, poses.ravel(), still, none, 0)
+        yield SavePoint(f"{FALL} {number}", how, model, qpos, still, none, 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,9 +58,13 @@ class Convention:
     answer: Callable[[Any], Answers]
 
 
-def question(title: str, why: str, *given: Any) -> Callable[[Callable[[Any], Answers]], Convention]:
-    """The Convention of a function that lets the answer follow from a measurement."""
-    return lambda answer: Convention(EngineQuestion(title, why), given, answer)
+def question(
+    title: str, why: str, *given: Any
+) -> Callable[[Callable[[Any], Iterator[EngineAnswer]]], Convention]:
+    """The Convention of a function that lets its answers follow from a measurement."""
+    return lambda answers: Convention(
+        EngineQuestion(title, why), given, lambda measured: tuple(answers(measured))
+    )
 
 
 def closest(distances: Mapping[str, float], part: float = 0.25) -> tuple[str, float, float]:

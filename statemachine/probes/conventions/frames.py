@@ -10,7 +10,7 @@ import numpy as np
 from ...engines.measured import Measurement
 from ...engines.samples import CENTRE, FIXED, MARKS, TREE
 from ...interface import Array
-from .answers import UNDECIDED, Answers, EngineAnswer, closest, question
+from .answers import UNDECIDED, EngineAnswer, closest, question
 
 # A turn whose four numbers are all different: about (1, 2, 3), by 1 rad.
 _ANGLE, _AXIS = 1.0, np.array([1.0, 2, 3]) / np.sqrt(14)
@@ -31,7 +31,7 @@ def _turned(point: Array) -> Array:
     "Do not test with a third of a turn about 1 1 1: its four numbers are the same.",
     list(_FOURS.values()),
 )
-def quaternion(turned: Sequence[tuple[Array, Array]]) -> Answers:
+def quaternion(turned: Sequence[tuple[Array, Array]]) -> Iterator[EngineAnswer]:
     """The order in which four numbers turn the marks as they should.
 
     Args:
@@ -51,7 +51,7 @@ def quaternion(turned: Sequence[tuple[Array, Array]]) -> Answers:
         )
         words = words if reads == words else f"{words} written, {reads} read"
     figures = Measurement("off by", off, "m"), Measurement("the next order", following, "m")
-    return (EngineAnswer(words, figures),)
+    yield EngineAnswer(words, figures)
 
 
 _PLACE = np.array([0.2, -0.1, 0.3])
@@ -102,7 +102,7 @@ def _nearest(off: Mapping[str, float], unit: str, part: str) -> EngineAnswer:
     _SIX,
     _SHORT,
 )
-def velocity(marks: tuple[Array, Array]) -> Answers:
+def velocity(marks: tuple[Array, Array]) -> Iterator[EngineAnswer]:
     """What explains where the marked body is, and how it moved in one short step, part by part.
 
     Args:
@@ -119,11 +119,10 @@ def velocity(marks: tuple[Array, Array]) -> Answers:
         name: float(np.abs(before[0] + _turn(before) @ point - _PLACE).max())
         for name, point in _POINTS.items()
     }
-    answers = [_nearest(places, "m", "position")]
+    yield _nearest(places, "m", "position")
     for k, (part, meanings) in enumerate(_PARTS.items()):
         best = {words: min(off[full] for full in off if full[k] == words) for words in meanings}
-        answers.append(_nearest(best, "m/s", part))
-    return tuple(answers)
+        yield _nearest(best, "m/s", part)
 
 
 def _below(parent: str, by_name: bool) -> list[str]:
@@ -162,21 +161,15 @@ ORDERS = {
     "In which order do the joints come, and does a fixed one take a number?",
     "A command in the order of another engine moves the wrong joints. Look joints up by name.",
 )
-def joints(names: Mapping[str, Sequence[str]]) -> Answers:
+def joints(names: Mapping[str, Sequence[str]]) -> Iterator[EngineAnswer]:
     """Which rule gives the engine's names, by format; and whether the fixed joint is among them."""
-    return tuple(answer for form, order in names.items() for answer in _ordered(form, order))
-
-
-def _ordered(form: str, names: Sequence[str]) -> Answers:
-    moving = [name for name in names if name != FIXED]
-    words = next(
-        (rule for rule, order in ORDERS.items() if [n for n in order if n != FIXED] == moving),
-        UNDECIDED,
-    )
-    counted = Measurement("joints with a number", len(names))
-    return (
-        EngineAnswer(words, (Measurement("", tuple(moving)),), form),
-        EngineAnswer(
-            "takes a number" if FIXED in names else "none", (counted,), f"fixed joint, {form}"
-        ),
-    )
+    for form, found in names.items():
+        moving = [name for name in found if name != FIXED]
+        words = next(
+            (rule for rule, order in ORDERS.items() if [n for n in order if n != FIXED] == moving),
+            UNDECIDED,
+        )
+        yield EngineAnswer(words, (Measurement("", tuple(moving)),), form)
+        counted = Measurement("joints with a number", len(found))
+        fixed = "takes a number" if FIXED in found else "none"
+        yield EngineAnswer(fixed, (counted,), f"fixed joint, {form}")

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ...engines.measured import Futures, Measurement, ReadTwice
 from ...interface import Array
-from .answers import NO_ANSWER, UNDECIDED, Answers, EngineAnswer, question
+from .answers import NO_ANSWER, UNDECIDED, EngineAnswer, question
 
 _SAME = 1e-6  # m; PyBullet tells a link's frame in single precision
 
 
-def _stale_or_fresh(readings: Sequence[ReadTwice]) -> Answers:
+def _stale_or_fresh(readings: Sequence[ReadTwice]) -> Iterator[EngineAnswer]:
     """How far off is what is read, and what is recomputed then?"""
-    answers = []
     for part, read, recomputed, true in readings:
         off, again = (
             float(np.linalg.norm(np.subtract(value, true))) for value in (read, recomputed)
         )
         words = "fresh" if off < _SAME else "stale" if again < _SAME else UNDECIDED
         figures = Measurement("off by", off, "m"), Measurement("recomputed", again, "m")
-        answers.append(EngineAnswer(words, figures, part))
-    return tuple(answers)
+        yield EngineAnswer(words, figures, part)
 
 
 write = question(
@@ -47,15 +45,13 @@ step = question(
     "An episode that starts with something of the last one is no repetition. What a reset "
     "leaves alone has to be set by hand.",
 )
-def reset(still_there: Mapping[str, Mapping[str, bool]]) -> Answers:
+def reset(still_there: Mapping[str, Mapping[str, bool]]) -> Iterator[EngineAnswer]:
     """What each way to reset keeps of what was written before."""
-    answers = []
     for way, there in still_there.items():
         kept, gone = _split(there)
         gone = [f"{name} (gone)" if name == "bodies" else name for name in gone]
         sets = Measurement("sets back", tuple(gone))
-        answers.append(EngineAnswer("keeps " + (", ".join(kept) or "nothing"), (sets,), way))
-    return tuple(answers)
+        yield EngineAnswer("keeps " + (", ".join(kept) or "nothing"), (sets,), way)
 
 
 def _split(names: Mapping[str, bool]) -> tuple[list[str], list[str]]:
@@ -67,7 +63,7 @@ def _split(names: Mapping[str, bool]) -> tuple[list[str], list[str]]:
     "You save, go on, and restore: what does not come back?",
     "What is not in the saved state keeps the value of the run that you wanted to undo.",
 )
-def save(back: Mapping[str, Mapping[str, bool]] | float) -> Answers:
+def save(back: Mapping[str, Mapping[str, bool]] | float) -> Iterator[EngineAnswer]:
     """What each way to save does not bring back.
 
     Args:
@@ -76,15 +72,12 @@ def save(back: Mapping[str, Mapping[str, bool]] | float) -> Answers:
     """
     if not isinstance(back, Mapping):
         shown = Measurement("a used Data's acceleration is off by", back, "rad/s²")
-        return (EngineAnswer("forgets a Data's past" if back else NO_ANSWER, (shown,)),)
-    answers = []
+        yield EngineAnswer("forgets a Data's past" if back else NO_ANSWER, (shown,))
+        return
     for way, comes in back.items():
         kept, forgotten = _split(comes)
         brings = Measurement("brings back", tuple(kept))
-        answers.append(
-            EngineAnswer("forgets " + (", ".join(forgotten) or "nothing"), (brings,), way)
-        )
-    return tuple(answers)
+        yield EngineAnswer("forgets " + (", ".join(forgotten) or "nothing"), (brings,), way)
 
 
 @question(
@@ -94,7 +87,7 @@ def save(back: Mapping[str, Mapping[str, bool]] | float) -> Answers:
     (0.3, 0.4, 0.5, 0.6, 0.7),  # when the boxes have met, a trial each [s]
     200,  # steps of the futures
 )
-def future(trials: Mapping[str, Sequence[Futures]] | float) -> Answers:
+def future(trials: Mapping[str, Sequence[Futures]] | float) -> Iterator[EngineAnswer]:
     """Whether each way back, to the start or to moments in the middle, is exact, bit by bit.
 
     Args:
@@ -102,8 +95,8 @@ def future(trials: Mapping[str, Sequence[Futures]] | float) -> Answers:
     """
     if not isinstance(trials, Mapping):
         off = Measurement("acceleration off by", trials, "rad/s²")
-        return (EngineAnswer("differs" if trials else "exact", (off,), "a used Data, a new one"),)
-    answers = []
+        yield EngineAnswer("differs" if trials else "exact", (off,), "a used Data, a new one")
+        return
     for way, futures in trials.items():
         exact = sum(np.array_equal(first, second) for first, second in futures)
         figures = (
@@ -111,8 +104,7 @@ def future(trials: Mapping[str, Sequence[Futures]] | float) -> Answers:
             Measurement("boxes off by", max(_apart(*pair) for pair in futures), "m"),
         )
         words = "exact" if exact == len(futures) else "differs"
-        answers.append(EngineAnswer(words, figures, way))
-    return tuple(answers)
+        yield EngineAnswer(words, figures, way)
 
 
 def _apart(first: Array, second: Array) -> float:

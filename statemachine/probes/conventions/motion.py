@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ...engines.measured import LetGo, Measurement, OneStep, Sliding
 from ...engines.samples import RATE, limp
-from .answers import UNDECIDED, Answers, EngineAnswer, closest, question
+from .answers import UNDECIDED, EngineAnswer, closest, question
 
 _SAME = 1e-6  # m/s², s, m/s
 
@@ -19,13 +19,13 @@ _SAME = 1e-6  # m/s², s, m/s
     "An arm that holds itself up without any control may only be an arm that weighs nothing.",
     50,  # steps
 )
-def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Answers:
+def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Iterator[EngineAnswer]:
     """The gravity (3,) [m/s²] that a body feels, unless the engine tells of another."""
     told, measured = gravity
     felt, said = (" ".join(f"{g:g}" for g in np.round(each, 2) + 0.0) for each in (measured, told))
     agree = np.allclose(told, measured, atol=_SAME)
     figures = (Measurement("falls with", tuple(map(float, measured)), "m/s²"),)
-    return (EngineAnswer(felt if agree else f"told {said}, felt {felt}", figures),)
+    yield EngineAnswer(felt if agree else f"told {said}, felt {felt}", figures)
 
 
 @question(
@@ -33,17 +33,15 @@ def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Answers:
     "The same number of steps is another span of time on each engine. A controller that runs "
     "at a fixed rate must know how many steps there are to one of its own.",
 )
-def timestep(step: OneStep) -> Answers:
+def timestep(step: OneStep) -> Iterator[EngineAnswer]:
     """The step [s] that a body at 1 m/s tells by how far it comes, and the engine's clock."""
     told, moved, clock, ticked = step
     told_ms, moved_ms = (f"{span * 1e3:.4g} ms" for span in (told, moved))
     words = moved_ms if abs(told - moved) < _SAME else f"told {told_ms}, moves {moved_ms}"
     moves = Measurement("at 1 m/s a body moves", moved, "m")
     ticks = Measurement("it goes on by", ticked, "s")
-    return (
-        EngineAnswer(words, (moves,), "one step"),
-        EngineAnswer(clock if ticked else "none", (ticks,), "clock"),
-    )
+    yield EngineAnswer(words, (moves,), "one step")
+    yield EngineAnswer(clock if ticked else "none", (ticks,), "clock")
 
 
 @question(
@@ -52,16 +50,14 @@ def timestep(step: OneStep) -> Answers:
     "start, and for an actuator to which zero is a target, before you blame gravity.",
     0.25,  # s
 )
-def actuation(runs: Sequence[LetGo]) -> Answers:
+def actuation(runs: Sequence[LetGo]) -> Iterator[EngineAnswer]:
     """What the joint does, by how it moves and how it would move if nothing held it."""
-    answers = []
     for part, moved, seconds, forces in runs:
         verb, unit = ("starts with", "rad/s²") if seconds is None else ("moves", "rad")
         free = RATE if seconds is None else limp(seconds)
         words = _share(moved / free, "falls", "held")
         figures = Measurement(verb, moved, unit), Measurement("limp", free, unit), *forces
-        answers.append(EngineAnswer(words, figures, part))
-    return tuple(answers)
+        yield EngineAnswer(words, figures, part)
 
 
 def _share(share: float, whole: str, nothing: str) -> str:
@@ -75,15 +71,13 @@ def _share(share: float, whole: str, nothing: str) -> str:
     "taken back.",
     1.0,  # N·m
 )
-def command(speeds: Mapping[str, Sequence[float]]) -> Answers:
+def command(speeds: Mapping[str, Sequence[float]]) -> Iterator[EngineAnswer]:
     """From the speeds (3,) [rad/s] at rest and after each step, by the kind of command."""
-    answers = []
     for kind, three in speeds.items():
         first, second = np.diff(three).tolist()
         words = _share(second / first if first else math.nan, "stays", "lasts one step")
         figures = Measurement("first step", first, "rad/s"), Measurement("second", second, "rad/s")
-        answers.append(EngineAnswer(words, figures, kind))
-    return tuple(answers)
+        yield EngineAnswer(words, figures, kind)
 
 
 _FAST = 200.0  # rad/s
@@ -96,16 +90,14 @@ _FAST = 200.0  # rad/s
     1.0,  # s
     _FAST,
 )
-def damping(speeds: tuple[float, float]) -> Answers:
+def damping(speeds: tuple[float, float]) -> Iterator[EngineAnswer]:
     """Of a body that began at 1 m/s, after 1 s [m/s]; of a joint, one step after [rad/s]."""
     left, joint = speeds
     body = "keeps it" if abs(left - 1) < _SAME else f"loses {100 * (1 - left):.1f} % in 1 s"
     turns = "keeps it" if abs(joint / _FAST - 1) < 1e-3 else f"cut to {joint:.3g} rad/s"
     after = Measurement("one step after", joint, "rad/s")
-    return (
-        EngineAnswer(body, (Measurement("left after 1 s", left),), "a body at 1 m/s"),
-        EngineAnswer(turns, (after,), "a joint at 200 rad/s"),
-    )
+    yield EngineAnswer(body, (Measurement("left after 1 s", left),), "a body at 1 m/s")
+    yield EngineAnswer(turns, (after,), "a joint at 200 rad/s")
 
 
 SMOOTH, ROUGH = 0.25, 0.75
@@ -128,13 +120,13 @@ _HALVINGS = 10
     "A grip that is tuned on one engine may drop its object on another, with the same two "
     "numbers in the file.",
 )
-def friction(speeds: Mapping[str, Sliding]) -> Answers:
+def friction(speeds: Mapping[str, Sliding]) -> Iterator[EngineAnswer]:
     """Which rule explains on which slope a block begins to slide, one way round and the other.
 
     Args:
         speeds: By what is special about the block, its speed on a floor.
     """
-    answers, pairs = [], ((SMOOTH, ROUGH), (ROUGH, SMOOTH))
+    pairs = ((SMOOTH, ROUGH), (ROUGH, SMOOTH))
     for of, speed in speeds.items():
         measured = [_slope(speed, *pair) for pair in pairs]
         words, _, _ = closest(
@@ -147,8 +139,7 @@ def friction(speeds: Mapping[str, Sliding]) -> Answers:
             Measurement(f"{block:g} on {floor:g} slides from", mu)
             for (block, floor), mu in zip(pairs, measured, strict=True)
         ]
-        answers.append(EngineAnswer(words, tuple(figures), of))
-    return tuple(answers)
+        yield EngineAnswer(words, tuple(figures), of)
 
 
 def _slope(speed: Sliding, block: float, floor: float) -> float:

@@ -10,8 +10,7 @@ is made here.
 
 from __future__ import annotations
 
-from .page import report
+from .page import SUFFIXES, check_target, report, write_report
 from .scene import SideDrawing
-from .writing import SUFFIXES, check_target, write_report
 
 __all__ = ["SUFFIXES", "SideDrawing", "check_target", "report", "write_report"]

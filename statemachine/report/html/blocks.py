@@ -14,8 +14,6 @@ from ...page import (
     HeatMap,
     Interactive,
     Items,
-    Printed,
-    Question,
     Section,
     Table,
     TableCell,
@@ -23,7 +21,6 @@ from ...page import (
     Traces,
     Verdict,
 )
-from ..quiz import answer_of, lettered
 from ..robot_pictures import inline
 from .markup import Html, joined, kept, tag
 
@@ -55,17 +52,10 @@ def _block(block: Block, draw: Draw, level: int) -> Html:
             return tag("ol" if ordered else "ul", *items)
         case Code(lines):
             return tag("pre", tag("code", "\n".join(lines)))
-        case Printed(by_engine):
-            return joined(
-                joined((tag("p", tag("b", engine)), tag("pre", text)))
-                for engine, text in by_engine.items()
-            )
         case Table():
             return table(block)
         case Verdict(text, holds):
             return tag("p", f"{'✓' if holds else '✗'} {text}", class_="verdict")
-        case Question():
-            return _question(block)
         case Section():
             return _section(block, draw, level)
         case Interactive():
@@ -94,20 +84,6 @@ def _section(block: Section, draw: Draw, level: int) -> Html:
     labelled = f"{name}-heading" if name else None
     heading = tag(f"h{level}", block.heading, id=labelled)
     return tag("section", heading, inside, id=name, aria_labelledby=labelled)
-
-
-def _question(block: Question) -> Html:
-    return joined(
-        (
-            tag("p", block.text),
-            tag("ul", *(tag("li", choice) for choice in lettered(block))),
-            tag(
-                "details",
-                tag("summary", "What the run says"),
-                tag("p", f"{answer_of(block)}. {block.because}"),
-            ),
-        )
-    )
 
 
 def headline(found: Headline) -> Html:

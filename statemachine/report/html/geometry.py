@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...drawing import Drawing, Part
+from ...drawing import Drawing, Part, lathe
 from ...interface import Array
 from ...runs import Trace
 
@@ -152,15 +152,10 @@ def _bone(end: Array, thick: float) -> tuple[Any, Any]:
     along = end / length
     aside = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
     aside /= np.linalg.norm(aside)
-    across = np.cross(along, aside)
     wide = min(0.5 * thick, 0.25 * length)
-    ring = [0.2 * end + wide * side for side in (aside, across, -aside, -across)]
-    points = np.array([np.zeros(3), *ring, end], dtype=np.float32)
-    faces = []
-    for k in range(4):
-        here, after = 1 + k, 1 + (k + 1) % 4
-        faces += [(0, after, here), (here, after, 5)]
-    return points, np.array(faces, dtype=np.int32)
+    shape = lathe([0.0, wide, 0.0], [0.0, 0.2 * length, length], around=4)
+    turned = shape.vertices @ np.array([aside, np.cross(along, aside), along])
+    return turned.astype(np.float32), shape.faces
 
 
 def _rotation(quat: Array) -> Array:

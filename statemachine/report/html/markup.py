@@ -5,7 +5,8 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from importlib import resources
 from typing import Any
 
 _VOID = frozenset({"br", "hr", "img", "input", "meta", "col", "path", "line", "rect", "circle"})
@@ -74,6 +75,17 @@ _DRAWN = frozenset({"path", "line", "rect", "circle"})
 def joined(parts: Iterable[object], between: str = "") -> Html:
     """Parts one after the other."""
     return Html(escaped(between).join(escaped(part) for part in parts))
+
+
+def filled(name: str, slots: Mapping[str, Html]) -> Html:
+    """A template of this folder with markup in its slots."""
+    text = template(name)
+    return Html(re.sub(r"\{\{(\w+)\}\}", lambda slot: slots[slot[1]], text))
+
+
+def template(name: str) -> str:
+    """The text of a file of this folder."""
+    return resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8")
 
 
 def data_of(value: Any) -> Html:

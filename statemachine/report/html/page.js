@@ -6,7 +6,7 @@ const root = document.documentElement;
 root.classList.add('script');
 
 const times = numbers(found.time, Float64Array);
-const between = bytes(found.between);
+const compared = numbers(found.compared, Float64Array);
 const frames = times.length;
 const quantities = found.quantities.map((q) => ({
   ...q,
@@ -54,8 +54,8 @@ const build_readout = () => {
   }
 };
 const fill_readout = () => {
-  $('now').textContent = between[row]
-    ? `${moment(times[row])} (${found.other}: between two of its rows)` : moment(times[row]);
+  $('now').textContent = Math.abs(compared[row] - times[row]) > 1e-6
+    ? `${moment(times[row])} (figures of ${moment(compared[row])})` : moment(times[row]);
   quantities.forEach((q, n) => {
     const { line, own } = cells[n];
     [q.one, q.two].forEach((side, k) => { own[k].textContent = side ? value(q, side[row]) : ''; });
@@ -268,8 +268,7 @@ const begin_scene = () => {
     canvas.hidden = true;
     const why = error.message === 'no WebGL' ? 'This browser has no WebGL 2'
       : `The picture cannot be drawn (${error.message})`;
-    $('no-scene').textContent = `${why}: the drawing stands still, the figures still follow `
-      + 'the slider.';
+    $('no-scene').textContent = `${why}; the figures follow the slider.`;
     $('no-scene').hidden = false;
     return;
   }

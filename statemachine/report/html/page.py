@@ -5,52 +5,41 @@ from __future__ import annotations
 import base64
 import hashlib
 import itertools
-import re
+import os
 from collections.abc import Sequence
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from ... import __version__
+from ...errors import BadInputError
 from ...page import Block, Interactive, Items, Page, Section, Text
+from ...runs.whole import check_place, replace_text
 from ..over_time import BothRuns, QuantityChart
 from .blocks import drawn, headline
-from .budget import Budget
 from .charts import quantity_row
-from .markup import Html, data_of, escaped, joined, kept, tag
+from .markup import Html, data_of, escaped, filled, joined, kept, tag, template
 from .scene import SideDrawing
 from .stage import StagePart, staged
 
+SUFFIXES = (".html", ".htm")
 _SCRIPTS = ("gl.js", "scene.js", "page.js")
-LIMIT = 2_000_000  # bytes of a page
 _NO_LOOK = SideDrawing(None, "no model was given")
 
 
 def report(page: Page, looks: Sequence[SideDrawing] = (_NO_LOOK, _NO_LOOK)) -> str:
-    """A page as HTML of at most 2 MB: what would be more is drawn with less detail.
+    """A page as HTML.
 
     Args:
         page: What is said. Without `BothRuns` among its blocks it has no slider and no script.
         looks: What each of both runs is drawn as; the same object twice if both are of one model.
     """
-    text = ""
-    for share in (1.0, 0.5, 0.25, 0.1):
-        text = _report(page, looks, Budget(share))
-        if len(text.encode("utf-8", errors="replace")) <= LIMIT:
-            break
-    return text
-
-
-def _report(page: Page, looks: Sequence[SideDrawing], budget: Budget) -> str:
-    """The page, with a budget of details."""
     runs = next((block for block in page.blocks if isinstance(block, BothRuns)), None)
-    stage = None if runs is None else staged(runs, looks, budget)
+    stage = None if runs is None else staged(runs, looks)
 
     def draw(block: Interactive) -> Html:
-        if stage is not None and block is stage.of:
+        if stage is not None and block is runs:
             return stage.html
-        if stage is not None and isinstance(block, QuantityChart):
-            return quantity_row(block, stage.own.get(block.curve.name), budget.points(stage.charts))
-        return Html("")
+        return quantity_row(block) if isinstance(block, QuantityChart) else Html("")
 
     opening = list(itertools.takewhile(_opens, page.blocks))
     rest: list[Block] = [*page.blocks[len(opening) :]]
@@ -95,23 +84,44 @@ def _header(page: Page, opening: Sequence[Block], draw: Any, runs: BothRuns | No
 def _assembled(title: str, body: Html, stage: StagePart | None) -> str:
     script, data = "", Html("{}")
     if stage is not None:
-        script = "\n".join(_file(name) for name in _SCRIPTS)
+        script = "\n".join(template(name) for name in _SCRIPTS)
         script, data = f"(() => {{\n'use strict';\n{script}\n}})();", data_of(stage.data)
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
         f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
         "img-src data:; base-uri 'none'; form-action 'none'"
     )
-    filled = {
+    slots = {
         "policy": Html(policy),
         "title": escaped(title),
-        "style": Html(_file("page.css")),
+        "style": Html(template("page.css")),
         "body": body,
         "data": data,
         "script": Html(script),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: filled[found[1]], _file("page.html"))
+    return filled("page.html", slots)
 
 
-def _file(name: str) -> str:
-    return resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8")
+def check_target(path: str | os.PathLike[str]) -> Path:
+    """Where a report is to be written, checked before anything is run.
+
+    Raises:
+        BadInputError: It is no name of a page, or see `check_place`.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        raise BadInputError(f"a report is a file .html; got {target.name!r}")
+    check_place(target)
+    return target
+
+
+def write_report(path: str | os.PathLike[str], text: str) -> Path:
+    """Write a report; it is there whole or not at all.
+
+    Raises:
+        BadInputError: See `check_target`.
+        OSError: It cannot be written.
+    """
+    target = check_target(path)
+    replace_text(target, text)
+    return target

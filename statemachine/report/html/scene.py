@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +12,8 @@ import numpy as np
 from ...compare import labels_of
 from ...drawing import Drawing
 from ...drawing.camera import Camera
-from ...interface import Array
+from ...interface import Array, Ints
 from ...runs import Trace
-from .budget import Budget
 from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised
 from .timeline import Frames
 
@@ -24,7 +22,9 @@ OPENING = 0.6  # of the camera from top to bottom [rad]; the script has it too
 _WAY = 2000  # points of the way of a site
 _DASH = 0.0015  # m between these
 _CLOSE = 0.05  # of the scene: a gap below it is looked at from near
-ASPECT = 1.45  # width of the picture through its height
+_TRIANGLES = 24_000  # of all shapes
+_CONTACTS = 9_000  # of one side, at all moments together
+_ASPECT = 1.45  # width of the picture through its height
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,28 +47,20 @@ class Scene:
     Attributes:
         data: For the script; None if the traces tell no poses.
         notes: What a reader should know of the picture, in sentences.
-        poses: For each side (n, nbody, 3) positions at the moments shown.
-        tips: For each side (n, 3), or None.
-        camera: Where the script begins to look from.
         strongest: The largest contact force that is drawn [N].
     """
 
     data: dict[str, Any] | None
     notes: tuple[str, ...]
-    poses: tuple[Array, Array] | None = None
-    tips: tuple[Array, Array] | None = None
-    camera: Camera | None = None
     strongest: float = 0.0
 
 
 def scene_of(
     one: Trace,
     two: Trace,
-    shown: tuple[Trace, Trace],
     frames: Frames,
     looks: Sequence[SideDrawing],
     tip: str,
-    budget: Budget,
     start: int = 0,
 ) -> Scene:
     """Both runs at the moments that are shown.
@@ -76,11 +68,9 @@ def scene_of(
     Args:
         one: A trace.
         two: The other.
-        shown: Both at the moments that are shown.
-        frames: These moments.
+        frames: The moments that are shown.
         looks: What each side is drawn as; the same object twice if both are of one model.
         tip: The site whose way is drawn; "" for none.
-        budget: How much detail there may be.
         start: The moment that the page opens at, among the frames.
     """
     traces = (one, two)
@@ -88,7 +78,7 @@ def scene_of(
         return Scene(None, ("The traces tell no poses of the bodies: there is nothing to draw.",))
     notes, drawings = _drawings(traces, looks)
     shared = drawings[0] is drawings[1]
-    most = budget.triangles // (1 if shared else 2)
+    most = _TRIANGLES // (1 if shared else 2)
     meshes = [mesh_of(drawing, most) for drawing in drawings[: 1 if shared else 2]]
     for mesh in meshes:
         if mesh.simplified:
@@ -103,7 +93,8 @@ def scene_of(
     if frames.left_out:
         notes.append(f"{frames.left_out} of the compared moments are not shown, for their number.")
     extent = max(drawing.extent for drawing in drawings)
-    poses = shown[0]["xpos"], shown[1]["xpos"]
+    places = ((one, frames.one, np.zeros(len(frames))), (two, frames.two, frames.share))
+    poses = [_between(trace["xpos"], rows, share) for trace, rows, share in places]
     finite = np.concatenate([pos[np.isfinite(pos).all(axis=2)] for pos in poses])
     if not len(finite):
         return Scene(None, ("No pose of a body is a finite number: there is nothing to draw.",))
@@ -111,20 +102,21 @@ def scene_of(
     low = np.maximum(finite.min(axis=0), middle - _FAR * extent)
     high = np.minimum(finite.max(axis=0), middle + _FAR * extent)
     span = np.maximum(high - low, 1e-6)
-    tips = _tips(shown, tip)
+    tips = _tips(places, tip)
     camera = _camera(poses, tips, extent)
     sides = []
     strongest = 0.0
-    few = max(2, budget.contacts // len(frames))
-    for k, (trace, moments) in enumerate(zip(traces, shown, strict=True)):
-        contacts, most_of_side = _contacts(moments, few)
+    few = max(2, _CONTACTS // len(frames))
+    for k, (trace, rows, share) in enumerate(places):
+        contacts, most_of_side = _contacts(trace, rows, few)
+        quat = _turned_between(trace["xquat"], rows, share)
         strongest = max(strongest, most_of_side)
         sides.append(
             {
                 "mesh": 0 if shared else k,
                 "bodies": len(trace.header.bodies),
-                "pos": packed(quantised(_held(moments["xpos"]), low, span), "u2"),
-                "quat": packed(np.round(np.clip(moments["xquat"], -1, 1) * 32767), "i2"),
+                "pos": packed(quantised(_held(poses[k]), low, span), "u2"),
+                "quat": packed(np.round(quat * 32767), "i2"),
                 "tip": packed(tips[k], "f4") if tips else "",
                 "contacts": contacts,
                 **_way(trace, tip, float(frames.time[-1]), frames.time),
@@ -149,7 +141,7 @@ def scene_of(
         "meshes": [mesh_as_data(mesh) for mesh in meshes],
         "sides": sides,
     }
-    return Scene(data, tuple(notes), poses, tips, camera, strongest)
+    return Scene(data, tuple(notes), strongest)
 
 
 def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> dict[str, Any]:
@@ -198,10 +190,27 @@ def _held(pos: Array) -> Array:
     return pos
 
 
-def _tips(shown: Sequence[Trace], tip: str) -> tuple[Array, Array] | None:
-    if not tip or any("site_xpos" not in t or tip not in t.header.sites for t in shown):
+def _between(values: Array, rows: Ints, share: Array) -> Array:
+    """Rows of values, each gone a share of the way to the next."""
+    share = share.reshape(-1, *[1] * (values.ndim - 1))
+    after = values[np.minimum(rows + 1, len(values) - 1)]
+    return np.where(share > 0, (1 - share) * values[rows] + share * after, values[rows])
+
+
+def _turned_between(quat: Array, rows: Ints, share: Array) -> Array:
+    """The same of orientations, the shorter way, of unit length."""
+    after = quat[np.minimum(rows + 1, len(quat) - 1)]
+    same = (quat[rows] * after).sum(axis=-1, keepdims=True) >= 0
+    weight = share[:, None, None]
+    mixed = np.nan_to_num((1 - weight) * quat[rows] + weight * np.where(same, after, -after))
+    length = np.linalg.norm(mixed, axis=-1, keepdims=True)
+    return np.where(length > 0, mixed / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])
+
+
+def _tips(places: Sequence[tuple[Trace, Ints, Array]], tip: str) -> tuple[Array, Array] | None:
+    if any(not tip or "site_xpos" not in t or tip not in t.header.sites for t, _, _ in places):
         return None
-    one, two = (trace.site(tip)[0] for trace in shown)
+    one, two = (_between(trace.site(tip)[0], rows, share) for trace, rows, share in places)
     return (one, two) if np.isfinite([one, two]).all() else None
 
 
@@ -225,18 +234,19 @@ def _way(trace: Trace, tip: str, until: float, shown: Array) -> dict[str, str]:
     return {"way": packed(way, "f4"), "behind": packed(behind, "u2")}
 
 
-def _contacts(trace: Trace, most: int) -> tuple[dict[str, str], float]:
-    """Where contacts are at each moment, the strongest first, and the force on the second [N].
+def _contacts(trace: Trace, rows: Ints, most: int) -> tuple[dict[str, str], float]:
+    """Where contacts are in each row, the strongest first, and the force on the second [N].
 
     Returns:
         These, and the largest of the forces.
     """
     if "contact_row" not in trace:
         return {"count": "", "at": ""}, 0.0
-    ends = np.searchsorted(trace["contact_row"], np.arange(len(trace) + 1))
+    begins = np.searchsorted(trace["contact_row"], rows)
+    ends = np.searchsorted(trace["contact_row"], rows, side="right")
     strength = np.linalg.norm(np.nan_to_num(trace["contact_force"]), axis=1)
     picked, counts = [np.empty(0, np.int64)], []
-    for a, b in itertools.pairwise(ends.tolist()):
+    for a, b in zip(begins.tolist(), ends.tolist(), strict=True):
         strongest = a + np.argsort(-strength[a:b], kind="stable")[: min(most, 255)]
         picked.append(strongest)
         counts.append(len(strongest))
@@ -300,7 +310,7 @@ def _camera(poses: Sequence[Array], tips: tuple[Array, Array] | None, extent: fl
     # Origins of bodies do not tell how thick these are.
     apart = np.abs(seen - middle) + 0.14 * extent
     slope = np.tan(OPENING / 2)
-    needs = np.maximum(apart[:, 0] / (ASPECT * slope), apart[:, 1] / slope)
+    needs = np.maximum(apart[:, 0] / (_ASPECT * slope), apart[:, 1] / slope)
     distance = float((needs - (seen[:, 2] - middle[2])).max())
     x, y, z = (middle @ axes).tolist()
     return Camera((x, y, z), distance, *angles)

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...compare import Series
+from ...interface import Ints
 from ...measures.text import figure, on, reading, short_time
-from ..over_time import BothRuns, QuantityChart
-from .between import own_series, shown_series, shown_traces
-from .budget import Budget
-from .charts import time_axis
+from ..over_time import BothRuns, QuantityChart, spans
 from .geometry import packed
-from .markup import Html, joined, kept, tag
-from .scene import SideDrawing, scene_of
-from .sketch import sketch
+from .markup import Html, escaped, filled, joined, kept, tag
+from .scene import Scene, SideDrawing, scene_of
 from .timeline import Frames, frames_of
+
+_TICKS = 6  # of the axis of time
+ARROWS = (
+    "Arrows: contact forces, each as long as the root of its force; the longest of the run is "
+    "{force} N."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,163 +30,59 @@ class StagePart:
     """What a page shows of both runs.
 
     Attributes:
-        of: What it is made of.
         html: The scene, the slider and the lanes under it.
         data: For the script.
-        own: Each side's curves at its own rows, by name.
         notes: What a reader should know of the picture, in sentences.
     """
 
-    of: BothRuns
     html: Html
     data: dict[str, Any]
-    own: Mapping[str, tuple[Series, Series]]
     notes: tuple[str, ...]
 
-    @property
-    def charts(self) -> int:
-        """How many charts follow the slider."""
-        return len(self.of.charts)
 
-
-def staged(runs: BothRuns, looks: Sequence[SideDrawing], budget: Budget) -> StagePart:
+def staged(runs: BothRuns, looks: Sequence[SideDrawing]) -> StagePart:
     """Both runs, drawn.
 
     Args:
         runs: The runs.
         looks: What each is drawn as.
-        budget: How much detail there may be.
     """
-    one, two, tip = runs.one, runs.two, runs.site
-    frames = frames_of(one, two, runs.moments, budget.frames(one, two))
+    frames = frames_of(runs.one, runs.two, runs.moments)
     start = int(np.argmin(np.abs(frames.time - runs.start)))
-    shown = shown_traces(one, two, frames)
-    scene = scene_of(one, two, shown, frames, looks, tip, budget, start)
-    at_frames = shown_series(shown, tip, [chart.curve for chart in runs.charts])
+    scene = scene_of(runs.one, runs.two, frames, looks, runs.site, start)
+    compared = runs.charts[0].curve.time if runs.charts else frames.time
+    rows = np.clip(np.searchsorted(compared, frames.time + 1e-9, side="right") - 1, 0, None)
     data = {
         "time": packed(frames.time, "f8"),
-        "between": packed(frames.share > 0, "u1"),
-        "other": runs.labels[1],
+        "compared": packed(compared[rows], "f8"),
         "until": runs.until,
         "start": start,
-        "quantities": [
-            _quantity_data(curve, chart)
-            for curve, chart in zip(at_frames, runs.charts, strict=True)
-        ],
+        "quantities": [_quantity_data(chart, rows) for chart in runs.charts],
         "lead": list(runs.lead),
         "scene": scene.data,
     }
-    still = sketch(scene, one, two, frames, start, runs.labels)
-    html = _stage(runs, frames, start, still, scene.strongest)
-    return StagePart(runs, html, data, own_series(one, two, tip), scene.notes)
+    return StagePart(_stage(runs, frames, start, scene), data, scene.notes)
 
 
-def _stage(runs: BothRuns, frames: Frames, start: int, still: Html, strongest: float) -> Html:
-    """The scene, what the figures are at its moment, the slider and the lanes under it.
-
-    Args:
-        runs: The runs.
-        frames: What the slider goes over.
-        start: The moment to open at, among the frames.
-        still: The drawing that needs no script.
-        strongest: The largest force of an arrow [N]; 0 if there are no contacts.
-    """
-    labels, tip = runs.labels, runs.site
+def _stage(runs: BothRuns, frames: Frames, start: int, scene: Scene) -> Html:
+    """The scene, what the figures are at its moment, the slider and the lanes under it."""
     now = float(frames.time[start])
-    toggles = [
-        ("solid", f"{labels[0]}, solid", "one"),
-        ("ghost", f"{labels[1]}, ghost", "two"),
-        ("marks", "contacts, with their forces", ""),
-        ("trails", f"way of {tip_name(tip)}", ""),
-    ]
-    checks = [
-        tag(
-            "label",
-            tag("input", type="checkbox", id=name, checked=True),
-            tag("i", class_=f"key {look}") if look else None,
-            f" {label}",
-        )
-        for name, label, look in toggles
-    ]
-    buttons = [
-        ("all", "Whole", "Whole arm"),
-        ("near", "Close", f"Close to {tip_name(tip)}"),
-        ("in", "+", "Nearer"),
-        ("out", "−", "Farther"),
-    ]
-    canvas = tag(
-        "div",
-        tag("canvas", id="scene", tabindex="0", role="img", hidden=True,
-            aria_label="Both runs in three dimensions. Arrow keys turn the view, plus and minus "
-                       "move nearer and farther, 0 shows the whole again."),
-        tag("div", still, id="still"),
-        tag("div", *(tag("button", text, type="button", id=f"view-{name}", aria_label=label,
-                         title=label)
-                     for name, text, label in buttons), class_="views", hidden=True, id="views"),
-        tag("p", id="no-scene", class_="no-scene", hidden=True),
-        class_="canvas",
-    )  # fmt: skip
-    transport = tag(
-        "div",
-        tag("button", "Play", id="play", type="button", hidden=True),
-        tag("output", short_time(now), id="clock", for_="slider"),
-        tag(
-            "label",
-            "speed ",
-            tag(
-                "select",
-                *(tag("option", text, value=value, selected=value == "0.25")
-                  for value, text in (("1", "1×"), ("0.25", "¼×"), ("0.05", "1/20×"))),
-                id="speed",
-            ),
-            class_="speed",
-            hidden=True,
-            id="speeds",
-        ),
-        class_="transport",
-    )  # fmt: skip
-    looks = tag(
-        "div",
-        tag("div", *checks, class_="checks", id="checks", hidden=True),
-        tag(
-            "p",
-            kept(
-                "Arrows: contact forces, each as long as the root of its force; the longest of "
-                f"the run is {figure(strongest)} N."
-            )
-            if strongest
-            else "",
-            class_="foot",
-            id="arrows",
-            hidden=True,
-        ),
-        class_="looks",
-    )
-    slider = tag(
-        "input",
-        type="range",
-        id="slider",
-        min=0,
-        max=max(0, len(frames) - 1),
-        step=1,
-        value=start,
-        aria_label="Moment of the run",
-        aria_valuetext=short_time(now),
-        hidden=True,
-    )
-    share = now / runs.until if runs.until else 0.0
-    return tag(
-        "section",
-        tag("h2", "Both runs, moment by moment", id="stage-heading"),
-        tag("p", kept(f"{runs.until:g} s {on(labels[0])}, as a solid arm, and {on(labels[1])}, "
-                      "as a ghost over it."), class_="says"),
-        tag("div", tag("div", canvas, transport, looks, class_="left"), _readout(runs),
-            class_="pair"),
-        tag("div", _lanes(runs, slider), class_="lanes"),
-        id="stage",
-        aria_labelledby="stage-heading",
-        style=f"--start:{share:.6f}",
-    )  # fmt: skip
+    names = {"one": runs.labels[0], "two": runs.labels[1], "tip": tip_name(runs.site)}
+    names |= {"short_one": runs.short[0], "short_two": runs.short[1], "now": short_time(now)}
+    slots = {name: escaped(text) for name, text in names.items()}
+    slots |= {
+        "on_one": escaped(kept(f"{runs.until:g} s {on(runs.labels[0])}")),
+        "on_two": escaped(on(runs.labels[1])),
+        "arrows": escaped(kept(ARROWS.format(force=figure(scene.strongest))))
+        if scene.strongest
+        else Html(""),
+        "last": escaped(len(frames) - 1),
+        "start": escaped(start),
+        "share": escaped(f"{now / runs.until if runs.until else 0.0:.6f}"),
+        "still": joined(tag("p", note) for note in scene.notes) if scene.data is None else Html(""),
+        "lanes": _lanes(runs),
+    }
+    return filled("stage.html", slots)
 
 
 def tip_name(tip: str) -> str:
@@ -192,31 +90,10 @@ def tip_name(tip: str) -> str:
     return "gripperframe (tool frame)" if tip == "gripperframe" else tip or "a site"
 
 
-def _readout(runs: BothRuns) -> Html:
-    """The table that the script keeps at the cursor's moment."""
-    return tag(
-        "div",
-        tag(
-            "table",
-            tag("caption", "At ", tag("span", "…", id="now"), class_="now"),
-            tag("thead", tag("tr", tag("th", "quantity", scope="col", class_="word"),
-                             tag("th", tag("i", class_="key one"), runs.short[0],
-                                 scope="col"),
-                             tag("th", tag("i", class_="key two"), runs.short[1],
-                                 scope="col"),
-                             tag("th", "apart", scope="col"))),
-            tag("tbody", id="readout"),
-        ),
-        class_="readout",
-        id="readout-box",
-        hidden=True,
-    )  # fmt: skip
-
-
-def _lanes(runs: BothRuns, slider: Html) -> Html:
+def _lanes(runs: BothRuns) -> Html:
     """For each quantity when it is beyond its tolerance, under the slider and as wide."""
     until = runs.until or 1.0
-    rows = [_lane("time", slider, "slide")]
+    rows = []
     for side, look in enumerate(("one", "two")):
         marks = [
             tag("i", class_=f"mark {look}", title=event.text,
@@ -230,28 +107,32 @@ def _lanes(runs: BothRuns, slider: Html) -> Html:
             rows.append(_lane(name, joined(marks), "touches"))
     beyond = [(chart.title, _beyond(chart)) for chart in runs.charts]
     beyond = sorted(((name, s) for name, s in beyond if s), key=lambda pair: pair[1][0][0])
-    for name, spans in beyond:
+    for name, times in beyond:
         bars = [
             tag(
                 "i",
                 class_="beyond",
                 style=f"left:{100 * a / until:.2f}%;width:{100 * max(b - a, 0.0) / until:.2f}%",
             )
-            for a, b in spans
+            for a, b in times
         ]
         rows.append(_lane(name, joined(bars), "quantity"))
     within = len(runs.charts) - len(beyond)
-    said = "Bars: beyond tolerance." if beyond else "No quantity leaves its tolerance."
-    if beyond and within:
-        said += f" {within} more never {'are' if within > 1 else 'is'}."
-    rows.append(_lane("", time_axis(until), "axis"))
+    said = f"Bars: beyond tolerance. Quantities that never are: {within} of {len(runs.charts)}."
+    ticks = np.linspace(0.0, until, _TICKS)
+    times = [
+        tag("span", f"{tick:.3g}", style=f"left:{100 * tick / until:.2f}%") for tick in ticks[:-1]
+    ]
+    last = tag("span", f"{until:.3g}", tag("small", "s"), style="left:100%")
+    axis = tag("div", *times, last, class_="times", aria_hidden="true")
+    rows.append(_lane("", axis, "axis"))
     spoken = "; ".join(
-        f"{name} from {short_time(spans[0][0])}, {sum(b - a for a, b in spans):.3g} s in all"
-        for name, spans in beyond
+        f"{name} from {short_time(times[0][0])}, {sum(b - a for a, b in times):.3g} s in all"
+        for name, times in beyond
     )
     return joined(
         (
-            tag("div", *rows, class_="rows"),
+            *rows,
             tag("p", said, class_="hint"),
             tag("p", f"Beyond tolerance: {spoken}.", class_="unseen") if spoken else "",
         )
@@ -271,28 +152,23 @@ def _beyond(chart: QuantityChart) -> list[list[float]]:
     """From when to when a quantity is beyond its tolerance [s]."""
     time = chart.curve.time
     beyond = chart.curve.difference > chart.found.tolerance
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], beyond, [False]]).astype(int)))
     until = float(time[-1])
-    step = until / max(1, len(time) - 1)
-    spans = [
-        [float(time[a]), float(min(time[b - 1] + step, until))]
-        for a, b in edges.reshape(-1, 2).tolist()
-    ]
-    return _few(spans)
+    return _few(spans(beyond, time, until / max(1, len(time) - 1), until))
 
 
-def _quantity_data(curve: Series, chart: QuantityChart) -> dict[str, Any]:
-    """What the script shows of a quantity at each moment shown, and when it is beyond."""
+def _quantity_data(chart: QuantityChart, rows: Ints) -> dict[str, Any]:
+    """What the script shows of a quantity at each moment shown: figures that were compared."""
+    curve = chart.curve
     scale, unit = reading(curve.unit)
     data: dict[str, Any] = {
         "name": chart.title,
         "unit": unit.replace(" ", "\u00a0"),
         "tolerance": chart.found.tolerance * scale,
-        "apart": packed(curve.difference * scale, "f4"),
+        "apart": packed(curve.difference[rows] * scale, "f4"),
     }
     if curve.one.ndim == 1 and curve.one.size:
-        data["one"] = packed(curve.one * scale, "f4")
-        data["two"] = packed(curve.two * scale, "f4")
+        data["one"] = packed(curve.one[rows] * scale, "f4")
+        data["two"] = packed(curve.two[rows] * scale, "f4")
     return data
 
 

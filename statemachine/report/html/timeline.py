@@ -11,6 +11,7 @@ from ...measures import common_moments
 from ...runs import Trace
 
 _SMOOTH = 1 / 60  # seconds between two pictures that look like motion
+_BYTES = 450_000  # of the poses of both sides; each takes 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +37,16 @@ class Frames:
         return len(self.time)
 
 
-def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = (), most: int = 1200) -> Frames:
+def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = ()) -> Frames:
     """Moments to be shown: those that were compared, unless they are too few to look like motion.
 
     Args:
         one: A trace.
         two: The other.
         must: Moments that have to be among them [s].
-        most: How many others there may be.
     """
+    bodies = len(one.header.bodies) + len(two.header.bodies)
+    most = max(60, min(1200, _BYTES // (14 * bodies)))
     common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     n = len(common.time)
     spacing = float(common.time[-1]) / max(1, n - 1)

@@ -1,0 +1,233 @@
+"""What two files differ in as compiled models: the list that `..why` explains a gap with."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...backends import load
+from ...description.records import Robot
+from ...description.tree import GroupTree
+from ...engines.records import ModelDifference
+from ...measures.text import few
+from ..matching import Matched, match_models
+from ..why.causes import differences_of, sensors_of
+from .ledger import Key, Ledger, Telling, Value
+
+_CALLED = {"com": "centre of mass", "moments": "inertia"}  # of a part that is cut otherwise
+_SETTINGS = ("option", "flag")
+# What a difference is a matter of, where no reading enters it; and what readings tell of at all.
+_SUBJECTS: dict[str, dict[str, str]] = {
+    "body": {
+        **{word: word for word in ("mass", "centre of mass", "inertia")},
+        **dict.fromkeys(("place", "zero"), "places"),
+        **dict.fromkeys(("parent", "joints"), "structure"),
+    },
+    "joint": {
+        **{word: word for word in ("armature", "damping", "dry friction", "spring")},
+        **dict.fromkeys(("axis", "anchor"), "places"),
+        "range": "limits",
+        "rest of the spring": "spring",
+        "force limit": "effort",
+        "extra joint": "structure",
+    },
+    "geom": {
+        **dict.fromkeys(("shape", "hull", "heights", "extra shape", "place"), "shapes"),
+        **dict.fromkeys(
+            ("friction", "friction dimensions", "softness", "priority", "margin"), "contact"
+        ),
+        **dict.fromkeys(("filter", "adhesion", "moving surface"), "contact"),
+    },
+    "site": {"place": "tool frame"},
+    "actuator": dict.fromkeys(
+        (
+            *("gains", "law", "gear", "force range", "range of ctrl", "transmission"),
+            "extra actuator",
+        ),
+        "drive",
+    ),
+    "equality": dict.fromkeys(("extra equality", "what it keeps"), "structure"),
+}
+_UNTOLD = ("filter", "adhesion", "moving surface")  # of which a URDF's reading knows nothing
+_UNTOLD_FIGURES = {"dampingpoly", "stiffnesspoly", "springyield", "gap"}
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """Two files, compiled.
+
+    Attributes:
+        differences: By key; those of options and flags figure by figure.
+        matched: What of one is what of the other; None where nothing was compiled.
+        complete: Whether both files say all that a compiled model has, as an MJCF does.
+    """
+
+    differences: Mapping[Key, Sequence[ModelDifference]]
+    matched: Matched | None
+    complete: bool
+
+
+def compiled(
+    files: Sequence[str | os.PathLike[str]],
+    names: Mapping[str, str],
+    tree: GroupTree,
+    *,
+    complete: bool,
+) -> Compiled:
+    """What two files differ in.
+
+    Args:
+        files: The two, as `load` takes them.
+        names: Joints, links and frames of the first that go by other names in the second.
+        tree: The reading of the first, by these names.
+        complete: Whether both say all that a compiled model has.
+
+    Raises:
+        StateMachineError: One of them does not compile, or they cannot be matched.
+    """
+    one, two = (load(file, defaults="engine") for file in files)
+    here = {*one.joint_names, *one.body_names, *one.site_names, *one.actuator_names}
+    matched = match_models(one, two, {a: b for a, b in names.items() if a in here})
+    differences: dict[Key, list[ModelDifference]] = {}
+    for difference in differences_of(one, two, matched):
+        for figure in _by_figure(difference):
+            where = names.get(figure.where, figure.where)
+            if figure.kind == "body" and where in tree.at:
+                where = tree.groups[tree.at[where][0]].name
+            setting = figure.kind in _SETTINGS
+            kind = "option" if setting else figure.kind
+            usual = figure.values[0][0] if setting else figure.subject
+            words = {_CALLED.get(name, usual) for name, _, _ in figure.values} or {usual}
+            for word in sorted(words):
+                differences.setdefault((kind, where, word), []).append(figure)
+    return Compiled(differences, matched, complete)
+
+
+def _by_figure(difference: ModelDifference) -> Iterable[ModelDifference]:
+    """Settings one by one; a part that is cut otherwise by mass, centre of mass and inertia."""
+    if difference.kind in _SETTINGS:
+        return [replace(difference, values=(value,)) for value in difference.values]
+    return [difference]
+
+
+def enter_rest(book: Ledger, sides: Compiled, robots: Sequence[Robot], reach: float) -> list[str]:
+    """Enter what no reading told of; and what could not be compared.
+
+    Args:
+        book: Where the readings were entered.
+        sides: What the files differ in as compiled models.
+        robots: The two readings.
+        reach: How far the robot reaches [m], which distances are set against.
+    """
+    skipped = []
+    if sides.matched is None:
+        return skipped
+    drives = {drive.name: drive.joint for robot in robots for drive in robot.actuators or ()}
+    everything = [(key, d) for key, group in sides.differences.items() for d in group]
+    alone = {d.where for _, d in everything if d.subject == "extra joint"}
+    for key, difference in everything:
+        if difference.kind == "model":
+            skipped.append(f"{difference.title}: compared as a whole only, and it differs")
+        if drives.get(difference.where) in alone and difference.subject == "extra actuator":
+            continue  # it goes with the joint
+        if key not in book.entered and (sides.complete or not _is_told(difference)):
+            _enter(book, key, difference, reach)
+    _enter_order(book, sides.matched)
+    _enter_keyframes(book, sides.matched)
+    _enter_sensors(book, sides.matched)
+    return skipped
+
+
+def _is_told(difference: ModelDifference) -> bool:
+    """Whether a reading without it has said that it is the same, or that it says nothing."""
+    names = {name.partition("[")[0] for name, _, _ in difference.values}
+    if difference.subject in _UNTOLD or (names and names <= _UNTOLD_FIGURES):
+        return False
+    told = _SUBJECTS.get(difference.kind, {})
+    return difference.kind in _SETTINGS or difference.subject in told
+
+
+def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) -> None:
+    """The figures of a difference, as the compiled models name them."""
+    setting = difference.kind in _SETTINGS
+    usual = "settings" if setting else "further"
+    subject = _SUBJECTS.get(difference.kind, {}).get(difference.subject, usual)
+    for name, *values in difference.values or (("", "as it is", "another"),):
+        if name.endswith("limited") and len(difference.values) > 1:
+            continue  # the range says so
+        metres = difference.unit == "m" and "[rad]" not in name
+        more: Telling = {"keys": [key]} if metres else {"keys": [key], "share": 0.5}
+        scale = reach if metres else math.pi if "[rad]" in name else 0.0
+        book.enter(
+            *(subject, difference.where, name, [_value(value) for value in values]),
+            difference.unit,
+            scale=scale,
+            slack=4,
+            against=reach,
+            **more,
+        )
+
+
+def _value(value: Any) -> Value:
+    if isinstance(value, bool) or value is None:
+        return {True: "yes", False: "no", None: "nothing"}[value]
+    if isinstance(value, tuple):
+        return tuple(map(float, value))
+    return float(value) if isinstance(value, int | float) else str(value)
+
+
+def _enter_order(book: Ledger, matched: Matched) -> None:
+    """Whether who writes ctrl by number meets other actuators."""
+    if matched.reordered:
+        names = [few(list(model.actuator_names), 6) for model in (matched.one, matched.two)]
+        book.differ("further", "ctrl", "order", names, share=0.5)
+
+
+def _enter_keyframes(book: Ledger, matched: Matched) -> None:
+    """Keyframes by name, those without one by number."""
+    frames = [
+        {frame.name or f"number {k}": frame for k, frame in enumerate(model.keyframes)}
+        for model in (matched.one, matched.two)
+    ]
+    for name in frames[0] | frames[1]:
+        where, a, b = f"keyframe {name}", frames[0].get(name), frames[1].get(name)
+        if a is None or b is None:
+            words = ["there" if frame else "nothing" for frame in (a, b)]
+            book.differ("further", where, "", words, share=0.5)
+            continue
+        book.enter("further", where, "time", [a.time, b.time], "s", share=0.5)
+        for figure, ours, theirs in (
+            ("qpos", matched.qpos(a.qpos, b.qpos), b.qpos),
+            ("qvel", matched.qvel(a.qvel, b.qvel), b.qvel),
+            ("ctrl", matched.ctrl(a.ctrl, b.ctrl), b.ctrl),
+        ):
+            off = float(np.abs(ours - theirs).max(initial=0.0))
+            if off > 1e-9:
+                book.differ(
+                    "further", where, f"{figure}, farthest entry", [0.0, off], "", off, share=0.5
+                )
+
+
+def _enter_sensors(book: Ledger, matched: Matched) -> None:
+    """What only a controller that reads them meets: it changes no motion by itself."""
+    only: tuple[list[str], list[str]] = [], []
+    more: Telling = {
+        "share": 0.0,
+        "effect": "only a controller that reads it moves otherwise",
+        "matters": False,
+    }
+    for difference in sensors_of(matched):
+        for name, one, two in difference.values:
+            if difference.subject == "extra sensor":
+                only[one is None].append(difference.where)
+                continue
+            where = f"sensor {difference.where}" if difference.where else "sensordata"
+            book.enter("further", where, name, [_value(one), _value(two)], **more)
+    if any(only):
+        sides = [few(names, 6) or "nothing" for names in only]
+        book.differ("further", "sensors", "that only one has", sides, **more)

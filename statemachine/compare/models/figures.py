@@ -1,0 +1,241 @@
+"""What a pair of joints is set to and driven by, and the settings of a simulation, as tables.
+
+A row of a table is a figure: what of a reading it is, its unit, and what the compiled models call
+it. What a difference of it is a share of, and what it does, follows from what the joint carries.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
+
+import numpy as np
+
+from ...description.match import Pair
+from ...description.records import Actuator, Follows, RobotJoint, Setting
+from ...description.tree import GroupTree
+from ...measures.text import few, milliseconds, rounded
+from .ledger import Ledger, Telling
+
+# Of each figure its subject and what of it it is, the field of a `RobotJoint` or an `Actuator`, its
+# unit of a hinge and of a slide, and what the compiled models call it.
+_DAMPING = ("N·m·s", "N·s/m")
+_STIFFNESS = ("N·m/rad", "N/m")
+_FORCE = ("N·m", "N")
+_PLAIN = ("", "")
+_JOINT = (
+    ("speed", "", "velocity", ("rad/s", "m/s"), "speed"),
+    ("effort", "", "effort", _FORCE, "force limit"),
+    ("spring", "stiffness", "stiffness", _STIFFNESS, "spring"),
+    ("spring", "slack at", "rest", ("rad", "m"), "rest of the spring"),
+    ("armature", "", "armature", ("kg m²", "kg"), "armature"),
+    ("damping", "", "damping", _DAMPING, "damping"),
+    ("dry friction", "", "friction", _FORCE, "dry friction"),
+)
+_ANY_JOINT = ("armature", "damping", "friction")  # the rest only a hinge or a slide has
+_GAINS = (
+    ("drive", "kp", "kp", _STIFFNESS, ("gains", "law", "extra actuator")),
+    ("drive", "kv", "kv", _DAMPING, ("gains", "law", "extra actuator")),
+)
+_DRIVE = (
+    *_GAINS,
+    ("drive", "gain", "gain", _PLAIN, ("gains", "law")),
+    ("drive", "gear", "gear", _PLAIN, ("gear",)),
+    ("drive", "ctrlrange", "controls", ("rad", "m"), ("range of ctrl",)),
+    ("drive", "forcerange", "forces", _PLAIN, ("force range",)),
+)
+_MATTER_MOST = ("gravity", "timestep")  # of the settings
+_UNITS = {"timestep": "s", "gravity": "m/s²", "wind": "m/s"}
+
+
+class _Driven:
+    """A joint as one reading has it, with what it carries and what drives it."""
+
+    def __init__(self, tree: GroupTree, number: int, joint: RobotJoint) -> None:
+        self.joint, self.slides = joint, joint.kind == "slide"
+        self.inertia, self.load = tree.inertia(number), tree.load(number)
+        effort, damping = joint.effort or 0.0, joint.damping
+        effort = effort if math.isfinite(effort) else 0.0
+        slows = milliseconds(self.inertia / damping, 3) if damping and self.inertia > 0 else "never"
+        # What a difference is a share of, 0: of the larger value; and what it does.
+        self.against = {
+            "armature": self.inertia if self.inertia > 0 else 0.0,
+            **dict.fromkeys(("damping", "friction"), effort),
+            "rest": 1.0,
+        }
+        self.effects = {
+            "armature": "{share:.1%} of M_ii" if self.inertia > 0 else "",
+            "friction": "{share:.2%} of the effort" if effort else "",
+            "damping": slows,
+            "effort": f"its load: {self.force(self.load)}" if self.load > 0 else "",
+        }
+        drives = tree.robot.actuators
+        self.nothing = None if drives is None else "nothing"
+        self.drives = [drive for drive in drives or () if drive.joint == joint.name]
+
+    def effect_of_drive(self, field: str, drive: Actuator) -> str:
+        """Of kp the sag under the load that a joint may have; of kv the damping ratio."""
+        kp = drive.kp or 0.0
+        if field == "kp" and kp > 0:
+            return f"sags {rounded(self.load / kp, 'm' if self.slides else 'rad', 2)}"
+        if field == "kv" and kp > 0 < self.inertia:
+            damping = (drive.kv or 0.0) + (self.joint.damping or 0.0)
+            return f"damping ratio {damping / (2 * math.sqrt(kp * self.inertia)):.2g}"
+        if field in ("kp", "kv") or (field == "controls" and drive.kind == "position"):
+            return ""
+        return f"at most {self.force(self.joint.effort)}"
+
+    def force(self, value: float | None) -> str:
+        """A force of the joint in words."""
+        if value is None or math.isinf(value):
+            return "nothing" if value is None else "unlimited"
+        return rounded(value, _FORCE[self.slides])
+
+
+def of_joints(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree) -> None:
+    """Everything but where the joint is."""
+    a, b = pair.one.joint, pair.two.joint
+    if a is None or b is None or a.kind != b.kind:
+        return
+    sides = _Driven(one, pair.one.number, a), _Driven(two, pair.two.number, b)
+    scalar = a.kind in ("hinge", "slide")
+    if scalar:
+        _limits(book, a, b)
+        words = ["nothing" if j.follows is None else _follows(j.follows) for j in (a, b)]
+        ties = [("equality", j.follows.label) for j in (a, b) if j.follows]
+        keys = [(*tie, word) for tie in ties for word in ("extra equality", "what it keeps")]
+        if words[0] != words[1]:
+            book.differ("structure", a.name, "follows", words, keys=keys)
+    for subject, figure, field, units, called in _JOINT:
+        slack = field == "rest" and not (a.stiffness and b.stiffness)
+        if slack or not (scalar or field in _ANY_JOINT):
+            continue
+        values = getattr(a, field), getattr(b, field)
+        effect = _joined([side.effects.get(field, "") for side in sides])
+        if field == "effort" and None not in values and 0 < min(values) < max(values) < math.inf:
+            effect = f"{max(values) / min(values):.3g} times"
+        book.enter(
+            *(subject, a.name, figure, values, units[sides[0].slides]),
+            scale=float(field == "rest"),
+            against=max(side.against.get(field, 0.0) for side in sides),
+            effect=effect,
+            matters=field != "velocity" or None not in values,  # an MJCF has no word for it
+            keys=[("joint", a.name, called)],
+        )
+    _drives(book, *sides)
+
+
+def _joined(effects: Sequence[str]) -> str:
+    """Those of both sides, one if they are the same."""
+    return " / ".join(filter(None, dict.fromkeys(effects)))
+
+
+def _follows(rule: Follows) -> str:
+    return f"{rule.joint}, {rule.factor:g} times, {rule.offset:+g}"
+
+
+def _limits(book: Ledger, a: RobotJoint, b: RobotJoint) -> None:
+    """Their share is that of the wider range."""
+    unit, keys = "m" if a.kind == "slide" else "rad", [("joint", a.name, "range")]
+    if a.limits is None or b.limits is None:
+        ranges = [j.limits or "none" for j in (a, b)] if a.limits or b.limits else [None] * 2
+        effect = f"the {'right' if a.limits else 'left'} has no stop"
+        book.enter("limits", a.name, "range", ranges, unit, effect=effect, keys=keys)
+        return
+    span = max(high - low for low, high in (a.limits, b.limits))
+    for figure, low, high in zip(("lower", "upper"), a.limits, b.limits, strict=True):
+        further = "left" if (low > high) == (figure == "upper") else "right"
+        effect = f"the {further} goes {rounded(abs(low - high), unit)} further"
+        more: Telling = {"effect": effect, "keys": keys}
+        book.enter("limits", a.name, figure, (low, high), unit, scale=span, against=span, **more)
+
+
+def _drives(book: Ledger, left: _Driven, right: _Driven) -> None:
+    """What drives a joint. A gain's share is that of the larger one."""
+    name, sides = left.joint.name, (left, right)
+    for x, y in zip_longest(left.drives, right.drives):
+        called = (x or y).name
+        words = ("gains", "law") if x and y else ("extra actuator",)
+        kinds = [d.kind if d else side.nothing for d, side in zip((x, y), sides, strict=True)]
+        silent = "" if x and y else f"the {'right' if x else 'left'} names none"
+        keys = [("actuator", called, word) for word in words]
+        book.enter("drive", name, "drive", kinds, effect=silent, keys=keys)
+        if x and y and x.kind != y.kind:
+            continue
+        for subject, figure, field, units, words in _DRIVE if x and y else _GAINS:
+            values = [getattr(drive, field, None) for drive in (x, y)]
+            if field in ("controls", "forces"):
+                values = [value or "none" for value in values]
+            effects = [s.effect_of_drive(field, d) for s, d in zip(sides, (x, y), strict=True) if d]
+            servo = field == "controls" and (x or y).kind == "position"
+            unit = units[left.slides] if field != "controls" or servo else ""
+            effect = _joined(effects) if len({*effects}) == len(effects) else ""
+            keys = [("actuator", called, word) for word in words]
+            book.enter(subject, name, figure, values, unit, effect=effect, keys=keys)
+
+
+def of_loose_drives(book: Ledger, one: GroupTree, two: GroupTree) -> None:
+    """Actuators that drive something else than a joint: tendons, sites, bodies."""
+    loose = [
+        {drive.name for drive in tree.robot.actuators or () if not drive.joint}
+        for tree in (one, two)
+    ]
+    for name in sorted(loose[0] ^ loose[1]):
+        sides = ["drives" if name in names else "nothing" for names in loose]
+        book.differ("drive", name, "drive", sides, keys=[("actuator", name, "extra actuator")])
+
+
+def of_settings(book: Ledger, one: GroupTree, two: GroupTree) -> Iterator[str]:
+    """Settings of the simulation; where a format has none, what the other would change."""
+    robots = one.robot, two.robot
+    settings = [robot.settings for robot in robots]
+    if settings == [None, None]:
+        return
+    if None in settings:
+        silent, said = robots if settings[0] is None else robots[::-1]
+        for name, value in (said.settings or {}).items():
+            usual = said.defaults.get(name)
+            if value != usual:
+                values = [value if robot is said else None for robot in robots]
+                effect = f"{said.reader.split()[0]} would take {_said(usual)}"
+                _setting(book, name, values, _share(name, value, usual), effect)
+        yield (
+            f"a {silent.format} says nothing of timestep, gravity and solver: the engine that "
+            "loads it decides (--backends shows what it takes)"
+        )
+        return
+    ours, theirs = (mapping or {} for mapping in settings)
+    for name in ours:
+        if name in theirs:
+            values = [ours[name], theirs[name]]
+            _setting(book, name, values, _share(name, *values))
+    for which, mine, other in (("left", ours, theirs), ("right", theirs, ours)):
+        alone = sorted(mine.keys() - other.keys())
+        if alone:
+            yield f"only the engine of the {which} has the settings {few(alone, 8)}"
+
+
+def _setting(
+    book: Ledger, name: str, values: list[Setting], share: float, effect: str = ""
+) -> None:
+    keys = [("option", "", name)]
+    book.enter(
+        "settings", "", name, values, _UNITS.get(name, ""), share=share, effect=effect, keys=keys
+    )
+
+
+def _said(value: Setting) -> str:
+    if isinstance(value, tuple):
+        return " ".join(f"{entry:g}" for entry in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _share(name: str, one: Setting, two: Setting) -> float:
+    """Of gravity and the timestep, how much of it; of the solver's settings at most a fifth."""
+    if one is None or two is None or isinstance(one, str) or isinstance(two, str):
+        return 0.5
+    a, b = np.atleast_1d(np.asarray(one)), np.atleast_1d(np.asarray(two))
+    most = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
+    share = float(np.linalg.norm(a - b)) / most if most else 0.0
+    return share if name in _MATTER_MOST else min(share, 0.2)

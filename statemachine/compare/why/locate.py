@@ -1,0 +1,113 @@
+"""Where the rest of a gap comes from: what goes when something is left out on both sides.
+
+What is left out makes another motion, whose gap may be smaller for that reason alone. So it
+counts only where it takes away more than half of what was left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .settings import FEATURES
+from .trials import Measure, Trials
+
+_NOTHING = 1e-6  # of the gap: what is less is left alone
+_LEAST = 0.5  # of what was left: what takes less away does not count
+_STILL = 0.1  # of the left's own motion: less is no motion any more
+
+
+@dataclass(frozen=True)
+class Located:
+    """A part of a gap, and where it comes from.
+
+    Attributes:
+        name: What was left out, or chosen.
+        without: What a run without it is, in words; "" of a setting.
+        values: What the two sides have where it is a setting of one of them; else None.
+        share: The part of the gap that went.
+        gap: What was left of it, in the unit of the gap.
+        moved: How far the left's own motion is then from its motion as it comes; above zero
+            the gap is that of another motion.
+        is_still: Whether nothing moves any more, so that there can be no gap.
+        is_setting: Whether it is a setting of one side, chosen while nothing was left out.
+    """
+
+    name: str
+    without: str
+    values: tuple[str, str] | None
+    share: float
+    gap: float
+    moved: float
+    is_still: bool
+    is_setting: bool
+
+
+def _choice(side: int | None, integrator: str) -> tuple[str, str]:
+    """What the sides have where one of them has another integrator than its file's."""
+    return ("its own", integrator) if side else (integrator, "its own")
+
+
+def locate(
+    trials: Trials,
+    brought: frozenset[str],
+    quantity: str,
+    measure: Measure,
+    gap: float,
+    left: float,
+    bound: float,
+) -> tuple[Located, ...]:
+    """Leave features out on both sides, each on top of those that count.
+
+    The integrator comes first, of the side that has several, and is tried again once something is
+    left out: what differs by it may be hidden by what was left.
+
+    Args:
+        trials: The runs.
+        brought: The causes that are brought to the same.
+        quantity: What the gap is measured in.
+        measure: Which figure of it.
+        gap: As the sides come, above zero.
+        left: With the causes brought to the same.
+        bound: What rounding and chaos make of it: no more is looked for.
+    """
+    rows: list[Located] = []
+    without, integrator = frozenset[str](), ""
+    extent = trials.extent(quantity)
+
+    def tried(names: frozenset[str], chosen: str) -> float | None:
+        gaps = trials.gaps(brought, names, chosen)
+        return getattr(gaps[quantity], measure) if gaps else None
+
+    def select() -> None:
+        nonlocal integrator, left
+        if integrator or left <= max(_NOTHING * gap, bound):
+            return
+        gaps = {name: tried(without, name) for name in trials.integrators}
+        stood = {name: rest for name, rest in gaps.items() if rest is not None}
+        best = min(stood, key=stood.__getitem__, default="")
+        if best and stood[best] < _LEAST * left:
+            integrator = best
+            keep("integrator", "", _choice(trials.selects, best), stood[best])
+
+    def keep(name: str, words: str, values: tuple[str, str] | None, rest: float) -> None:
+        nonlocal left
+        moved = trials.moved(quantity, without, integrator)
+        still = bool(without) and trials.extent(quantity, without) < _STILL * extent
+        share = (left - rest) / gap
+        rows.append(
+            Located(name, words, values, share, rest, moved, still, bool(values) and not without)
+        )
+        left = rest
+
+    select()
+    able = [feature for feature in FEATURES if trials.can_be_without(feature)]
+    for feature in able:
+        if left <= max(_NOTHING * gap, bound):
+            break
+        more = without | {feature.name}
+        rest = tried(more, integrator)
+        if rest is not None and rest < _LEAST * left:
+            without = more
+            keep(feature.name, feature.without, None, rest)
+            select()
+    return tuple(rows)

@@ -1,0 +1,194 @@
+"""What an engine as it comes sets in its own way, and what can be left out on any engine.
+
+The settings of an engine as it comes are causes of a gap, beside what differs between files: each
+can be brought to the model's own by a dial of the engine's room. What no setting holds, such as the
+law of contact, is only located: it is left out on both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...engines.records import Dials, ModelDifference, Setting
+from ...interface import Model
+from ...measures.text import milliseconds, rounded, significant
+
+# In the order of the tables: the world before the robot.
+TITLES: Mapping[str, str] = {
+    "gravity": "gravity",
+    "timestep": "timestep",
+    "inertia": "inertias",
+    "damping": "damping",
+    "servo": "servo law",
+    "armature": "armature",
+    "frictionloss": "dry friction",
+    "limits": "joint limits",
+    "surfaces": "surfaces",
+}
+# An engine's explicit damping does not stand without its motors, and what the engine lacks, or has
+# in another way, an adapter can give it only together with the model's servo law.
+NEEDS: Mapping[str, str] = {
+    "servo": "damping",
+    "armature": "servo",
+    "frictionloss": "servo",
+    "limits": "servo",
+}
+_FINER = 4
+
+
+@dataclass(frozen=True)
+class Feature:
+    """Something that both engines compute, each in its own way, and that can be left out.
+
+    Attributes:
+        name: What it is called in a result.
+        title: In words; without: what a run without it is, in words.
+        option: That of `Model.replace`; value: what leaves the feature out.
+    """
+
+    name: str
+    title: str
+    without: str
+    option: str
+    value: Any
+
+
+# What acts now and then comes first. Gravity and the servos are not among them: they drive the
+# motion, and with it goes whatever there is between two sides.
+FEATURES = (
+    Feature("contact", "contact", "nothing touches", "contacts", False),
+    Feature("limits", "joint limits", "no joint limits", "limits", False),
+    Feature("frictionloss", "dry friction", "no dry friction", "frictionloss", 0.0),
+    Feature("damping", "damping", "no damping", "damping", 0.0),
+    Feature("armature", "armature", "no armature", "armature", 0.0),
+    Feature("timestep", "timestep", f"steps {_FINER} times finer", "substeps", _FINER),
+)
+
+
+class OwnSettings:
+    """The settings of a Model with `defaults="engine"`, each as it comes or as the model has it.
+
+    Attributes:
+        names: Of the settings, as in `TITLES`.
+    """
+
+    def __init__(self, dials: Dials, other: Model, actuated: bool) -> None:
+        """Of an engine as it comes.
+
+        Args:
+            dials: Those of its room.
+            other: The Model of the other side, whose gravity and timestep are the model's.
+            actuated: Whether its motors follow ctrl.
+        """
+        self._dials, self._other, self._actuated = dials, other, actuated
+        model = dials.model
+        emulated = dials.emulated
+        alike = {
+            "gravity": np.array_equal(model.gravity, other.gravity),
+            "timestep": (model.timestep, model.substeps) == (other.timestep, other.substeps),
+            "armature": not emulated.dof_armature.any(),
+            "frictionloss": not emulated.dof_frictionloss.any(),
+            "limits": not emulated.jnt_limited.any(),
+        }
+        self.names = tuple(name for name in TITLES if not alike.get(name))
+
+    def differences(self, side: int) -> list[ModelDifference]:
+        """The settings as differences; `side` is that of the engine as it comes, 0 or 1."""
+        rows = []
+        for name in self.names:
+            own, model = self._own_word(name), self._model_word(name)
+            values = ((TITLES[name], *((model, own) if side else (own, model))),)
+            rows.append(ModelDifference(TITLES[name], "engine", "", values))
+        return rows
+
+    def build(
+        self, model: Model, emulated: Model, names: frozenset[str], without: frozenset[str]
+    ) -> Model:
+        """The engine with some settings at the model's.
+
+        Args:
+            model: The file as the engine comes.
+            emulated: The same file behind the contract.
+            names: Of the settings.
+            without: Names of features to leave out.
+
+        Raises:
+            UnsupportedError, EngineError: As the room of the engine does.
+        """
+        other = self._other
+        values = {
+            "gravity": other.gravity,
+            "timestep": (other.timestep, other.substeps),
+            "armature": emulated.dof_armature,
+            "damping": emulated.dof_damping,
+            "frictionloss": emulated.dof_frictionloss,
+        }
+        settings: dict[str, Setting] = dict.fromkeys(names, "model")
+        settings |= dict.fromkeys(without, "off")
+        return self._dials.of(model, emulated).build(settings, values)
+
+    def can_leave_out(self, feature: Feature) -> bool:
+        """Whether the engine itself can do without a feature."""
+        return feature.name in ("limits", "contact", "damping")
+
+    @property
+    def emulated(self) -> Model:
+        """The file behind the contract."""
+        return self._dials.emulated
+
+    def _own_word(self, name: str) -> str:
+        """What the engine has of a setting, in a few words."""
+        dials = self._dials
+        if name in ("gravity", "timestep"):
+            return _word(name, dials.model)
+        if name == "servo":
+            return "its motors" if self._actuated else "motors hold"
+        if name == "surfaces":
+            return f"friction {_span(dials.frictions)}, hard"
+        return dials.words[name]
+
+    def _model_word(self, name: str) -> str:
+        """What the model has of it."""
+        return _word(name, self._other if name in ("gravity", "timestep") else self.emulated)
+
+
+def leave_out(model: Model, features: frozenset[str]) -> Model:
+    """A Model without some features, by `Model.replace`."""
+    options = {}
+    for feature in FEATURES:
+        if feature.name in features:
+            finer = feature.option == "substeps"
+            options[feature.option] = _FINER * model.substeps if finer else feature.value
+    return model.replace(**options) if options else model
+
+
+def _word(name: str, model: Model) -> str:
+    if name == "gravity":
+        return rounded(float(np.linalg.norm(model.gravity)), "m/s²")
+    if name == "timestep":
+        text = milliseconds(model.timestep, 3)
+        return f"{text} / {model.substeps}" if model.substeps > 1 else text
+    if name in ("armature", "damping", "frictionloss"):
+        return _span(getattr(model, f"dof_{name}"))
+    if name == "servo":
+        gains = model.actuator_kp
+        known = gains[np.isfinite(gains)]
+        return f"kp {_span(known)}" if known.size else "no servos"
+    if name == "limits":
+        return f"of {int(model.jnt_limited.sum())} joints"
+    if name == "surfaces" and model.compiled is not None:
+        return f"friction {_span(model.compiled.geom_friction[:, 0])}"
+    return "of the file"
+
+
+def _span(values: Any) -> str:
+    """The numbers of an array that are not zero: one, or the least and the largest."""
+    numbers = np.unique(np.asarray(values)[np.asarray(values) != 0])
+    if not numbers.size:
+        return "none"
+    least = significant(numbers[0])
+    return f"{least} to {significant(numbers[-1])}" if numbers.size > 1 else least

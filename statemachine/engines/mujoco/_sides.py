@@ -1,0 +1,365 @@
+"""Two compiled models side by side: their rigid parts, their elements in pairs, how both are told.
+
+What moves as one is compared in one frame: fixed bodies are no difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...description.records import Inertial
+from ...description.tree import together
+from ...installed import require
+from ...interface import Array
+from ...rotations import HERE, Placement, matrix_from_quat
+from ..records import BodyPair, Counterparts, Edit, ModelDifference
+from . import _fields as fields
+
+SLIDE, HINGE = 2, 3  # mjtJoint
+NEAR = 1e-10  # [m], and of entries of matrices: less is rounding
+NOBODY = -2  # in the place of an id that has no counterpart; -1 is that of nothing
+_TOGETHER = 3  # entries: a longer array is told by those that differ
+_ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves it
+_COUNTED = {"equality": "eq"}  # in the names of counts and of views
+
+Pairs = Sequence[tuple[int, int]]
+Values = Iterable[tuple[Any, ...]]
+
+
+def same(one: Any, two: Any, slack: float = _ROUNDING) -> bool:
+    """Whether two values are equal, but for rounding."""
+    a, b = np.asarray(one), np.asarray(two)
+    if a.shape != b.shape:
+        return False
+    if a.dtype.kind != "f" and b.dtype.kind != "f":
+        return bool(np.array_equal(a, b))
+    a, b = a.astype(float), b.astype(float)
+    with np.errstate(invalid="ignore"):
+        gap = np.where(a == b, 0.0, np.abs(a - b))
+    return bool((gap <= slack * np.maximum(np.abs(a), np.abs(b)) + 1e-15).all())
+
+
+def plain(value: Any) -> Any:
+    """A number or a tuple, for a result."""
+    return tuple(np.asarray(value).tolist()) if np.ndim(value) else np.asarray(value).item()
+
+
+def differing(
+    names: Sequence[str], one: Sequence[Any], two: Sequence[Any]
+) -> tuple[tuple[str, Any, Any], ...]:
+    """The figures of these that differ, by name; of a long array each entry that does."""
+    found: list[tuple[str, Any, Any]] = []
+    for name, a, b in zip(names, one, two, strict=True):
+        word, size = name.partition("_")[2] or name, np.size(a)
+        if size <= _TOGETHER or np.shape(a) != np.shape(b):
+            found += [] if same(a, b) else [(word, plain(a), plain(b))]
+        else:
+            places = [k for k in range(size) if not same(a[k], b[k])]
+            found += [(f"{word}[{k}]", plain(a[k]), plain(b[k])) for k in places]
+    return tuple(found)
+
+
+def copies(names: Iterable[str], raw: Any, a: int, b: int) -> tuple[Edit, ...]:
+    """Edits that give an element of another model what one of this has in some arrays."""
+    return tuple((name, (b,), np.array(getattr(raw, name)[a])) for name in names)
+
+
+def zeros(names: Iterable[str], raw: Any, k: int) -> tuple[Edit, ...]:
+    """Edits that set what an element has in some arrays to zero."""
+    return tuple((name, (k,), 0 * getattr(raw, name)[k]) for name in names)
+
+
+def name_of(raw: Any, kind: str, index: int) -> str:
+    """The name of an element; without one, its kind, number and owner."""
+    name = getattr(raw, _COUNTED.get(kind, kind))(index).name
+    if name:
+        return name
+    if kind == "joint":  # by the body that it carries, which may have several
+        carries = int(raw.jnt_bodyid[index])
+        body = raw.body(carries).name or f"body {carries}"
+        first = int(raw.body_jntadr[carries])
+        several = raw.body_jntnum[carries] > 1
+        return f"joint {index - first + 1} of {body}" if several else f"the joint of {body}"
+    owner = raw.body(int(getattr(raw, f"{kind}_bodyid")[index])).name if kind in _OWNED else ""
+    return f"{kind} {index}" + (f" on {owner}" if owner else "")
+
+
+_OWNED = ("geom", "site")
+
+
+def placed(pos: Array, quat: Array) -> Placement:
+    """A pose of the compiled model as a Placement."""
+    return Placement(np.array(pos), matrix_from_quat(np.asarray(quat)))
+
+
+def apart(one: Placement, two: Placement) -> tuple[float, float]:
+    """How far two poses are from each other: [m], and the largest entry of the matrices."""
+    return one.distance(two), float(np.abs(one.mat - two.mat).max())
+
+
+def quat_of(mat: Array) -> Array:
+    """The quaternion (4,), wxyz, of a rotation matrix."""
+    quat = np.empty(4)
+    require("mujoco").mju_mat2Quat(quat, np.ascontiguousarray(mat).reshape(9))
+    return quat
+
+
+def inertial_of(raw: Any, body: int) -> Inertial:
+    """What a body weighs, in its own frame."""
+    axes = matrix_from_quat(raw.body_iquat[body])
+    tensor = axes @ np.diag(raw.body_inertia[body]) @ axes.T
+    return Inertial(float(raw.body_mass[body]), np.array(raw.body_ipos[body]), tensor)
+
+
+class Solids:
+    """The rigid parts of a compiled model, each by the body that is its head.
+
+    Args:
+        raw: An mjModel.
+        led: Bodies that have a counterpart in another model. A mocap body that has none is
+            taken for a part of the world, if a body fixed to it would stand for it.
+    """
+
+    def __init__(self, raw: Any, led: set[int]) -> None:
+        self.raw = raw
+        self._heads = np.array(raw.body_weldid)
+        still = [
+            body for body in np.flatnonzero(raw.body_mocapid >= 0).tolist() if self._stays(body)
+        ]
+        self._heads[np.isin(self._heads, [body for body in still if body not in led])] = 0
+        self._places: dict[int, Placement] = {}
+
+    def _stays(self, body: int) -> bool:
+        """Whether no keyframe has a mocap body elsewhere, and nothing moves on it."""
+        raw, number = self.raw, self.raw.body_mocapid[body]
+        places = raw.key_mpos.reshape(raw.nkey, -1, 3)[:, number]
+        turns = raw.key_mquat.reshape(raw.nkey, -1, 4)[:, number]
+        stays = (places == raw.body_pos[body]).all() and (turns == raw.body_quat[body]).all()
+        return bool(stays and not raw.body_dofnum[raw.body_rootid == body].any())
+
+    def head(self, body: int) -> int:
+        """The first body of the rigid part that a body is in."""
+        return int(self._heads[body])
+
+    def members(self, head: int) -> list[int]:
+        """All bodies of a rigid part."""
+        return np.flatnonzero(self._heads == head).tolist()
+
+    def place(self, body: int) -> Placement:
+        """The frame of a body in that of its rigid part."""
+        if body == self.head(body):
+            return HERE
+        if body not in self._places:
+            self._places[body] = self.hangs(body)
+        return self._places[body]
+
+    def hangs(self, body: int) -> Placement:
+        """The frame of a body in that of the part that carries it, joints at qpos0."""
+        own = placed(self.raw.body_pos[body], self.raw.body_quat[body])
+        return self.place(int(self.raw.body_parentid[body])) @ own
+
+    def on(self, kind: str, index: int) -> Placement:
+        """The frame of a geom or a site in that of its rigid part."""
+        body, pos, quat = (getattr(self.raw, f"{kind}_{of}")[index] for of in _FRAME)
+        return self.place(int(body)) @ placed(pos, quat)
+
+    def massive(self, head: int) -> list[int]:
+        """The bodies of a rigid part that have a mass or an inertia."""
+        mass, inertia = self.raw.body_mass, self.raw.body_inertia
+        return [body for body in self.members(head) if mass[body] or inertia[body].any()]
+
+    def inertial(self, *bodies: int) -> Inertial:
+        """Bodies of a rigid part together, in its frame."""
+        return together([inertial_of(self.raw, b).seen_from(self.place(b)) for b in bodies])
+
+
+_FRAME = ("bodyid", "pos", "quat")
+
+
+class Sides:
+    """Two compiled models, and what of one is what of the other.
+
+    Attributes:
+        one, two: The mjModels.
+        pairs: What of one is what of the other.
+        solids: Their rigid parts.
+        ids: By kind of element the ids of the second model by those of the first; of geoms once
+            there are `Geoms`.
+    """
+
+    def __init__(self, one: Any, two: Any, pairs: Counterparts) -> None:
+        self.one, self.two, self.pairs = one, two, pairs
+        self.solids = (
+            Solids(one, {pair.one for pair in pairs.solids}),
+            Solids(two, {pair.two for pair in pairs.solids}),
+        )
+        self._by_one = {pair.one: pair for pair in pairs.solids}
+        self.ids: dict[str, dict[int, int]] = {
+            "joint": dict(pairs.joints),
+            "site": dict(pairs.sites),
+            "body": dict(self._bodies()),
+            "tendon": dict(self.by_name("tendon")),
+        }
+
+    def part(self, body: int) -> BodyPair | None:
+        """The rigid part of a body of the first model, with its counterpart."""
+        return self._by_one.get(self.solids[0].head(body))
+
+    def there(self, side: int, kind: str | None, index: int) -> int:
+        """What an id of either side is in the second model; -1 of nothing."""
+        if side or kind is None or index < 0:
+            return index
+        return self.ids[kind].get(index, NOBODY)
+
+    def _bodies(self) -> Iterator[tuple[int, int]]:
+        """Rigid parts, and the bodies fixed to them: by name, then in their order."""
+        for pair in self.pairs.solids:
+            yield pair.one, pair.two
+            ours, theirs = (
+                solids.members(head)[1:]
+                for solids, head in zip(self.solids, (pair.one, pair.two), strict=True)
+            )
+            names = {self.two.body(b).name: b for b in theirs if self.two.body(b).name}
+            named = [(a, b) for a in ours if (b := names.get(self.one.body(a).name)) is not None]
+            yield from named
+            left = [b for b in theirs if b not in dict(named).values()]
+            yield from zip([a for a in ours if a not in dict(named)], left, strict=False)
+
+    def by_name(self, kind: str) -> Iterator[tuple[int, int]]:
+        """Elements of one name, and those without in their order."""
+        one, two = ([view(k).name for k in range(n)] for view, n in self._views(kind))
+        for k, name in enumerate(one):
+            if name and name in two:
+                yield k, two.index(name)
+            elif not name and k < len(two) and not two[k]:
+                yield k, k
+
+    def _views(self, kind: str) -> list[tuple[Callable[[int], Any], int]]:
+        """How an element of each model is looked at, and how many there are."""
+        word = _COUNTED.get(kind, kind)
+        return [(getattr(raw, word), getattr(raw, f"n{word}")) for raw in (self.one, self.two)]
+
+    def tell(
+        self,
+        subject: str,
+        kind: str,
+        element: int,
+        values: Values = (),
+        unit: str = "",
+        edits: Iterable[Edit] = (),
+        back: Iterable[Edit] = (),
+        refused: str = "",
+    ) -> ModelDifference:
+        """A difference of an element of the first model; the rest as of ModelDifference."""
+        name = name_of(self.one, kind, element)
+        return ModelDifference(
+            subject, kind, name, tuple(values), unit, tuple(edits), tuple(back), refused
+        )
+
+    def rows(
+        self,
+        kind: str,
+        rows: Sequence[fields.FieldRow],
+        pairs: Pairs,
+        name: str = "",
+        back: bool = False,
+    ) -> Iterator[ModelDifference]:
+        """Rows of elements.
+
+        Args:
+            kind: Of the elements.
+            rows: What is compared.
+            pairs: Ids, or other places in these arrays.
+            name: What they are called; else each by its own name.
+            back: Whether it is the first that can be brought to the second.
+        """
+        for a, b in pairs:
+            for row in rows:
+                values = differing(row.fields, *self._entries(row.fields, a, b))
+                acts = not row.when or any(
+                    np.any(entry)
+                    for entries in self._entries(row.when.split(), a, b)
+                    for entry in entries
+                )
+                if values and acts:
+                    edits = () if back else copies(row.fields, self.one, a, b)
+                    edits_one = copies(row.fields, self.two, b, a) if back else ()
+                    where = name or name_of(self.one, kind, a)
+                    yield ModelDifference(
+                        row.subject, kind, where, values, row.unit, edits, edits_one
+                    )
+
+    def _entries(self, names: Sequence[str], a: int, b: int) -> list[list[Any]]:
+        """What two elements have in some arrays; a range without its flag is unlimited."""
+        return [
+            [
+                getattr(raw, name)[k]
+                if name not in fields.LIMITED or getattr(raw, fields.LIMITED[name])[k]
+                else np.array([-np.inf, np.inf])
+                for name in names
+            ]
+            for raw, k in ((self.one, a), (self.two, b))
+        ]
+
+    def extras(
+        self, kind: str, pairs: Pairs, without: Callable[[Any, int], tuple[Edit, ...]]
+    ) -> Iterator[ModelDifference]:
+        """Elements that only one model has; `without` tells what takes the effect of one away."""
+        for side, (_, count) in enumerate(self._views(kind)):
+            for k in sorted({*range(count)} - {pair[side] for pair in pairs}):
+                if edits := without((self.one, self.two)[side], k):
+                    yield self.alone(side, kind, k, edits)
+
+    def alone(
+        self,
+        side: int,
+        kind: str,
+        k: int,
+        edits: tuple[Edit, ...],
+        called: str = "",
+        what: str = "there",
+    ) -> ModelDifference:
+        """What only one of two has; without it, it is as the other.
+
+        Args:
+            side: Whose it is: 0 of the first, 1 of the second.
+            kind: Of the element.
+            k: Its id.
+            edits: What takes its effect away.
+            called: What it is called instead of its kind.
+            what: What stands for it as a value.
+        """
+        subject, name = f"extra {called or kind}", name_of((self.one, self.two)[side], kind, k)
+        if side:
+            return ModelDifference(subject, kind, name, ((kind, None, what),), edits=edits)
+        return ModelDifference(subject, kind, name, ((kind, what, None),), edits_one=edits)
+
+    def elsewhere(
+        self, kind: str, a: int, b: int, wanted: Placement, theirs: Placement, exact: bool
+    ) -> ModelDifference:
+        """A body, a geom or a site that is to be elsewhere on its part.
+
+        Args:
+            kind: Of the element.
+            a: Its id in the first model.
+            b: Its id in the second.
+            wanted: Where it is to be, on its rigid part.
+            theirs: Where it is.
+            exact: Whether it gets the numbers of the first model.
+        """
+        far, turn = apart(wanted, theirs)
+        values: list[tuple[str, Any, Any]] = []
+        if far > NEAR:
+            values.append(("place", plain(wanted.pos), plain(theirs.pos)))
+        if turn > NEAR:
+            values.append(("turned by [rad]", 0.0, wanted.angle(theirs)))
+        names = f"{kind}_pos", f"{kind}_quat"
+        if exact:
+            return self.tell("place", kind, a, values, "m", copies(names, self.one, a, b))
+        on = self.two.body_parentid if kind == "body" else getattr(self.two, f"{kind}_bodyid")
+        inner = self.solids[1].place(int(on[b])).inverse @ wanted
+        edits = ((names[0], (b,), inner.pos), (names[1], (b,), quat_of(inner.mat)))
+        return self.tell("place", kind, a, values, "m", edits)

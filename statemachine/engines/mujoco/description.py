@@ -1,0 +1,284 @@
+"""What MuJoCo makes of a file, and what an MJCF says, as a description.
+
+Defaults, includes and units are settled in a compiled model: an MJCF is what MuJoCo makes of it, so
+its own compiler reads it. A URDF that was given to MuJoCo can be described from here too, to see
+what the import kept.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...backends import load
+from ...description.records import (
+    Actuator,
+    CollisionShape,
+    Follows,
+    Link,
+    NamedFrame,
+    Range,
+    Robot,
+    RobotJoint,
+    moved,
+)
+from ...errors import ModelError
+from ...installed import require
+from ...rotations import HERE
+from . import _shapes as shapes
+from ._sides import HINGE, inertial_of, name_of, placed
+from .differences import settings_of
+
+_FORMATS = {".mjb": "MJB", ".urdf": "URDF"}
+_JOINTS = ("free", "ball", "slide", "hinge")  # mjtJoint, in its order
+
+
+def read_file(path: Path, name: str) -> Robot:
+    """What an MJCF says itself; one some of whose meshes are missing is read without them.
+
+    Args:
+        path: The file.
+        name: What the description goes by.
+
+    Raises:
+        MissingEngineError: It is not installed here.
+        ModelError: It cannot read the file.
+    """
+    suffix = path.suffix.lower()
+    try:
+        return loaded(path, name, _FORMATS.get(suffix, "MJCF"))
+    except ModelError:
+        robot = _without_missing_meshes(path, name) if suffix not in _FORMATS else None
+        if robot is None:
+            raise
+        return robot
+
+
+def loaded(path: Path, name: str, form: str) -> Robot:
+    """What its compiler makes of a file, with its own defaults; `form` is what it is called."""
+    model = load(path, backend="mujoco", defaults="engine")
+    return description_of(model.raw, name, f"mujoco {model.engine_version}", form)
+
+
+def _without_missing_meshes(path: Path, name: str) -> Robot | None:
+    """An MJCF compiled without them; None where no mesh is missing, or nothing compiles."""
+    mujoco = require("mujoco")
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        folder = Path(spec.modelfiledir or path.parent) / spec.meshdir
+        missing = {m.name: m for m in spec.meshes if m.file and not (folder / m.file).is_file()}
+        if not missing:
+            return None
+        lost: dict[str, list[CollisionShape]] = {}
+        for geom in list(spec.geoms):
+            if geom.meshname in missing:
+                if geom.contype or geom.conaffinity:
+                    shape = CollisionShape(
+                        *("mesh", placed(geom.pos, geom.quat)),
+                        name=geom.name,
+                        friction=tuple(map(float, geom.friction)),
+                    )
+                    lost.setdefault(geom.parent.name, []).append(shape)
+                spec.delete(geom)
+        for mesh in missing.values():
+            spec.delete(mesh)
+        raw = spec.compile()
+    except (ValueError, mujoco.FatalError):
+        return None
+    robot = description_of(raw, name, f"mujoco {mujoco.__version__}", "MJCF")
+    files = sorted(mesh.file for mesh in missing.values())
+    more = f" and {len(files) - 5} more" if len(files) > 5 else ""
+    note = (
+        f"the meshes {', '.join(files[:5])}{more} are not there: their sizes are not known, and "
+        "what they weigh is not counted where a body has no inertia of its own"
+    )
+    links = tuple(
+        replace(link, shapes=(*link.shapes, *lost.get(link.name, ()))) for link in robot.links
+    )
+    return replace(robot, links=links, notes=(*robot.notes, note))
+
+
+def description_of(raw: Any, name: str, reader: str, form: str) -> Robot:
+    """The description in a compiled model.
+
+    Args:
+        raw: An mjModel.
+        name: Of the file.
+        reader: What compiled it.
+        form: The format of the file.
+    """
+    # What the engine takes where a file says nothing.
+    empty = require("mujoco").MjModel.from_xml_string(
+        "<mujoco><worldbody><geom type='sphere' size='1'/></worldbody></mujoco>"
+    )
+    actuators = tuple(_actuator(raw, i) for i in range(raw.nactuator))
+    links: list[Link] = []
+    names: list[str] = []  # of the last link of each body
+    for body in range(raw.nbody):
+        above = names[raw.body_parentid[body]] if body else ""
+        links += _links(raw, body, above, actuators)
+        names.append(links[-1].name)
+    frames = tuple(
+        NamedFrame(
+            raw.site(i).name or f"site {i}",
+            names[raw.site_bodyid[i]],
+            placed(raw.site_pos[i], raw.site_quat[i]),
+        )
+        for i in range(raw.nsite)
+    )
+    return Robot(
+        name=name,
+        reader=reader,
+        format=form,
+        links=tuple(links),
+        frames=frames,
+        actuators=actuators,
+        settings=settings_of(raw),
+        defaults=settings_of(empty),
+        touch=shapes.touch_of(empty, 0),
+        rooted=True,
+        notes=tuple(_notes(raw, links, actuators)),
+    )
+
+
+def _links(raw: Any, body: int, above: str, actuators: tuple[Actuator, ...]) -> list[Link]:
+    """A body as a link; one with several joints as a chain, of which it is the last."""
+    place = placed(raw.body_pos[body], raw.body_quat[body])
+    name, links = raw.body(body).name or f"body {body}", list[Link]()
+    first, count = int(raw.body_jntadr[body]), int(raw.body_jntnum[body])
+    for joint in range(first, first + count):
+        moves = _joint(raw, joint, actuators)
+        start = place @ moved(moves, -float(raw.qpos0[raw.jnt_qposadr[joint]]))
+        last = joint == first + count - 1
+        label = name if last else f"{name}, above {raw.joint(joint + 1).name or joint + 1}"
+        links.append(Link(label, above, start, moves, None, body=body))
+        above, place = label, HERE
+    own = links.pop() if links else Link(name, above, place, None, None, body=body)
+    inertial = inertial_of(raw, body) if body else None
+    geoms = np.flatnonzero(
+        (raw.geom_bodyid == body) & (raw.geom_contype | raw.geom_conaffinity > 0)
+    )
+    touching = tuple(shapes.of(raw, geom) for geom in geoms.tolist())
+    return [*links, replace(own, inertial=inertial, shapes=touching)]
+
+
+def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
+    dof, kind = int(raw.jnt_dofadr[joint]), _JOINTS[int(raw.jnt_type[joint])]
+    spring = int(raw.jnt_qposadr[joint])
+    scalar = kind in ("slide", "hinge")
+    return RobotJoint(
+        name=name_of(raw, "joint", joint),
+        kind=kind,
+        axis=np.array(raw.jnt_axis[joint]),
+        anchor=np.array(raw.jnt_pos[joint]),
+        limits=_limited(raw.jnt_range[joint], raw.jnt_limited[joint]),
+        velocity=None,
+        effort=_effort(raw, joint, actuators) if scalar else None,
+        armature=float(raw.dof_armature[dof]),
+        damping=float(raw.dof_damping[dof]),
+        friction=float(raw.dof_frictionloss[dof]),
+        stiffness=float(raw.jnt_stiffness[joint]),
+        rest=float(raw.qpos_spring[spring]) if scalar else None,
+        follows=_follows(raw, joint),
+        number=joint,
+    )
+
+
+def _follows(raw: Any, joint: int) -> Follows | None:
+    """Of an equality between two joints, if it is linear."""
+    for i in range(raw.neq):
+        if raw.eq_type[i] == 2 and raw.eq_obj1id[i] == joint and raw.eq_obj2id[i] >= 0:
+            offset, factor, *rest = map(float, raw.eq_data[i, :5])
+            if raw.eq_active0[i] and not any(rest):
+                other = raw.joint(int(raw.eq_obj2id[i])).name
+                return Follows(other, factor, offset, name_of(raw, "equality", i))
+    return None
+
+
+def _notes(raw: Any, links: list[Link], actuators: tuple[Actuator, ...]) -> list[str]:
+    """What no other format has a word for."""
+    linear = sum(link.joint is not None and link.joint.follows is not None for link in links)
+    counted = {
+        "further equality constraints": raw.neq - linear,
+        "tendons": raw.ntendon,
+        "contact pairs of its own": raw.npair,
+        "pairs without contact": raw.nexclude,
+        "bodies freed of weight (gravcomp)": np.count_nonzero(raw.body_gravcomp),
+    }
+    said = [f"{count} {what}" for what, count in counted.items() if count]
+    notes = [f"it has {', '.join(said)}"] if said else []
+    return notes + [text for i, drive in enumerate(actuators) if (text := _beyond(raw, i, drive))]
+
+
+def _beyond(raw: Any, i: int, drive: Actuator) -> str:
+    """A servo that may be commanded to where its joint cannot go."""
+    joint = int(raw.actuator_trnid[i, 0])
+    kp, bias = raw.actuator_gainprm[i, 0], raw.actuator_biasprm[i, 1]
+    servo = raw.actuator_trntype[i] == 0 and kp and bias == -kp and drive.gear == 1
+    ends = drive.controls
+    if not servo or ends is None or not raw.jnt_limited[joint] or raw.jnt_type[joint] != HINGE:
+        return ""
+    low, high = raw.jnt_range[joint]
+    passed = max(low - ends[0], ends[1] - high)
+    if passed <= 1e-5 * (high - low):
+        return ""
+    return (
+        f"the ctrlrange of {raw.actuator(i).name!r} passes the range of its joint by "
+        f"{math.degrees(passed):.3g}°"
+    )
+
+
+def _limited(values: Any, limited: Any) -> Range | None:
+    return (float(values[0]), float(values[1])) if limited else None
+
+
+def _effort(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> float | None:
+    """The largest force of what drives a joint; None where nothing does."""
+    drives = [
+        _most(raw, i, drive) * abs(drive.gear)
+        for i, drive in enumerate(actuators)
+        if raw.actuator_trntype[i] in (0, 1) and raw.actuator_trnid[i, 0] == joint
+    ]
+    most = [sum(drives)] if drives else []
+    if raw.jnt_actfrclimited[joint]:
+        most.append(float(np.abs(raw.jnt_actfrcrange[joint]).max()))
+    return min(most, default=None)
+
+
+def _most(raw: Any, i: int, drive: Actuator) -> float:
+    """The largest force of an actuator itself."""
+    if drive.forces:
+        return max(map(abs, drive.forces))
+    if drive.controls and not raw.actuator_biastype[i] and not raw.actuator_gaintype[i]:
+        return abs(float(raw.actuator_gainprm[i, 0])) * max(map(abs, drive.controls))
+    return math.inf
+
+
+def _actuator(raw: Any, i: int) -> Actuator:
+    gain, bias = raw.actuator_gainprm[i], raw.actuator_biasprm[i]
+    form = int(raw.actuator_biastype[i])  # mjtBias: none, affine, …
+    kind = "general"
+    if not raw.actuator_dyntype[i] and not raw.actuator_gaintype[i]:
+        if form == 0:
+            kind = "motor"
+        elif form == 1 and not bias[0] and bias[1] == -gain[0]:
+            kind = "position"
+        elif form == 1 and not bias[:2].any() and bias[2] == -gain[0]:
+            kind = "velocity"
+    on_joint, position = raw.actuator_trntype[i] in (0, 1), kind == "position"
+    control = raw.actuator_ctrladr[i]  # the first of several
+    return Actuator(
+        name=raw.actuator(i).name or f"actuator {i}",
+        joint=raw.joint(int(raw.actuator_trnid[i, 0])).name if on_joint else "",
+        kind=kind,
+        kp=float(gain[0]) if position else None,
+        kv=float(-bias[2]) if position else None,
+        gain=None if position else float(gain[0]),
+        gear=float(raw.actuator_gear[raw.actuator_outadr[i], 0]),
+        forces=_limited(raw.actuator_forcerange[i], raw.actuator_forcelimited[i]),
+        controls=_limited(raw.actuator_ctrlrange[control], raw.actuator_ctrllimited[control]),
+    )

@@ -1,0 +1,96 @@
+"""What a certificate says: the grade of the reading first, then how far apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..installed import WITNESS
+from ..measures.text import degrees, listed, millimetres, vector
+from ..page import Items, Page, Table
+from ..witness import OWN_READING
+from . import template
+from .fingertip import Certificate, Offset
+from .template import differences
+
+_SHOWN = 12  # rows of a table of tips
+
+
+def page(results: Mapping[str, Certificate]) -> Page:
+    """Frames first, then the differences."""
+    first = next(iter(results.values()))
+    one = len(first.tips) == 1
+    same_site = all(result.site == first.site for result in results.values())
+    apart = {"default pose": lambda a, b: f"{math.dist(a.default_pose, b.default_pose):.1e} m"}
+    blocks = {
+        "prepared": Items(first.prepared),
+        "tips": _table(results) if one else [_tips(*each) for each in results.items()],
+        "differences": differences(results, apart) if same_site else [],
+    }
+    return template.page("certificate", results, {n: _slots(r) for n, r in results.items()}, blocks)
+
+
+def _slots(result: Certificate) -> dict[str, Any]:
+    frames = result.frames
+    return {
+        "version": result.provenance.versions[WITNESS],
+        "one": len(result.tips) == 1,
+        "site": result.site,
+        "tips_count": len(result.tips),
+        "file": result.witness_file,
+        "poses": result.poses,
+        "seed": result.provenance.seed,
+        "own_reading": result.grade == OWN_READING,
+        "reason": result.reason,
+        "rewritten": bool(result.prepared),
+        "left_out": listed(result.left_out),
+        "refused": frames is not None and not frames.same,
+        "frames": _offset(frames),
+        "witness_frame": result.witness_frame,
+        "agrees": result.agrees,
+        "same_place": result.agrees and result.grade != OWN_READING,
+        "within": f"{result.tolerance:g}",
+        "grade": result.grade,
+    }
+
+
+def _table(results: Mapping[str, Certificate]) -> Table:
+    every = results.values()
+    return Table(
+        ("", *results),
+        [
+            ("grade", *(r.grade for r in every)),
+            ("frames apart", *(_offset(r.frames) for r in every)),
+            ("default pose [m]", *(vector(r.default_pose) for r in every)),
+            ("position, worst [m]", *(_figure(r.position_worst) for r in every)),
+            ("position, median [m]", *(_figure(r.position_median) for r in every)),
+            ("rotation matrix, worst", *(_figure(r.rotation_worst) for r in every)),
+            ("rotation matrix, median", *(_figure(r.rotation_median) for r in every)),
+        ],
+        title="Engine against witness",
+    )
+
+
+def _tips(name: str, result: Certificate) -> Table:
+    """The worst gaps; those that are not shown are no larger."""
+    rows = [
+        (tip.site, _figure(tip.position_worst), _figure(tip.rotation_worst), _offset(tip.frames))
+        for tip in result.tips[:_SHOWN]
+    ]
+    head = ("tip", "position, worst [m]", "rotation matrix, worst", "frames apart")
+    worst = f"the worst of {len(result.tips)}"
+    title = f"{name} against the witness, {worst} ({result.grade})"
+    return Table(head, rows, title=title, wide=frozenset({3}))
+
+
+def _offset(offset: Offset | None) -> str:
+    if offset is None:
+        return "no common body: not comparable"
+    if offset.same:
+        return "0 mm, 0°"
+    return f"{millimetres(offset.distance)}, {degrees(offset.angle)}"
+
+
+def _figure(value: float | None) -> str:
+    return "refused" if value is None else f"{value:.1e}"

@@ -1,0 +1,149 @@
+"""The page of a lesson, from the template beside its code: `hold.md` is that of `hold.py`.
+
+A template is Markdown with named slots. Its paragraphs become the blocks of a page:
+
+    # Six numbers in                  the title of the page
+    ## Which arrays does it change?   a heading
+    {costs}                           alone: a block that the lesson made, or several
+    ? {right}: How far is it?         a question: below it "a) …", "b) …" and "> " with the reason
+    ✓ {same}: Both are the same.      a verdict, and whether it holds
+    <!-- if moved -->                 what follows stands only where the slot `moved` is true, up to
+    <!-- else -->, <!-- end -->       these; "if not moved" is the contrary
+
+A slot takes a number with its unit or a name, and a paragraph is filled in for each engine. It
+stands there once for all engines of which it says the same, under their names if not for all.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from typing import Any
+
+from ..installed import ENGINES
+from ..measures.text import milliseconds
+from ..page import Block, Heading, Page, Question, Table, Text, Verdict
+
+_CONDITION = re.compile(r"<!-- (?:if (?P<no>not )?(?P<name>\w+)|(?P<other>else)|end) -->")
+_PARTS = re.compile(r"^(?:[a-h]\)|>) ", re.MULTILINE)  # of a question: its choices, its reason
+_MARKED = re.compile(r"([?✓]) (\w+): (.*)", re.DOTALL)
+
+
+def page(
+    name: str,
+    results: Mapping[str, Any],
+    slots: Mapping[str, dict[str, Any]],
+    blocks: Mapping[str, Block | Sequence[Block]],
+    prose: bool = True,
+) -> Page:
+    """Fill in a template.
+
+    Args:
+        name: Of the template.
+        results: What was found, by engine.
+        slots: What its slots take, by engine; that of the engine's name is true, too.
+        blocks: What stands alone, by name.
+        prose: Whether to keep texts and questions, which are about the arm.
+    """
+    template = resources.files(__package__ or "").joinpath(f"{name}.md").read_text("utf-8")
+    alone = {key: f"{{{key}}}" for key in blocks}
+    texts = {
+        engine: filled(template, dict.fromkeys(ENGINES, False) | {engine: True} | values | alone)
+        for engine, values in slots.items()
+    }
+    title, page_blocks = "", list[Block]()
+    for number in sorted(set().union(*texts.values())):
+        engines: dict[str, list[str]] = {}
+        for engine, paragraphs in texts.items():
+            if number in paragraphs:
+                engines.setdefault(paragraphs[number], []).append(engine)
+        for text, names in engines.items():
+            prefix = f"{', '.join(names)}: " if len(names) < len(texts) else ""
+            if text.startswith("# "):
+                title = text.removeprefix("# ")
+            elif text[1:-1] in blocks:
+                block = blocks[text[1:-1]]
+                page_blocks += block if isinstance(block, Sequence) else [block]
+            elif not text.startswith("? ") or next(iter(texts)) in names:
+                page_blocks.append(_block(text, prefix, always="{printed}" not in template))
+    if not prose:
+        page_blocks = [each for each in page_blocks if not isinstance(each, (Text, Question))]
+    return Page(title, origin(results), page_blocks)
+
+
+def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
+    """The paragraphs of a template for one engine, by their number, each on one line."""
+    conditions: list[bool] = []
+    paragraphs: dict[int, str] = {}
+    number = 0
+    for line in template.splitlines():
+        condition = _CONDITION.fullmatch(line)
+        if condition is None and not line:
+            number += 1
+        elif condition is None and all(conditions):
+            line = line.format_map(slots)  # noqa: PLW2901
+            between = "\n" if _PARTS.match(line) else " "
+            paragraphs[number] = f"{paragraphs.get(number, '')}{between}{line}".strip()
+        elif condition and condition["name"]:
+            holds = all(conditions) and bool(slots[condition["name"]])
+            conditions.append(holds is not bool(condition["no"]))
+        elif condition:
+            last = conditions.pop()
+            conditions += [not last] if condition["other"] else []
+    return paragraphs
+
+
+def _block(text: str, prefix: str, always: bool) -> Block:
+    """The block that a paragraph is."""
+    marked = _MARKED.fullmatch(text)
+    if text.startswith("## "):
+        return Heading(text.removeprefix("## "))
+    if marked is None:
+        return Text(prefix + text)
+    sign, value, said = marked.groups()
+    if sign == "✓":
+        return Verdict(prefix + said, value == "True")
+    asked, *choices, because = (part.strip() for part in _PARTS.split(said))
+    return Question(asked, choices, None if value == "None" else int(value), because, always)
+
+
+def origin(results: Mapping[str, Any]) -> str:
+    """What a page was computed with: model and engine versions."""
+    first = next(iter(results.values())).provenance
+    engines = ", ".join(
+        f"{name} {result.provenance.versions[result.provenance.backend]}"
+        for name, result in results.items()
+    )
+    return f"{first.model_file} on {engines}, {milliseconds(first.timestep)} a step"
+
+
+def where(results: Mapping[str, Any], engine: str) -> str:
+    """The prefix "mujoco: " where several engines are shown, else nothing."""
+    return f"{engine}: " if len(results) > 1 else ""
+
+
+def differences(
+    results: Mapping[str, Any], rows: Mapping[str, Callable[[Any, Any], str]]
+) -> list[Table]:
+    """The last table of a page with several engines: each against the first.
+
+    Args:
+        results: By backend.
+        rows: By what is compared, the words for it from the first's result and another's.
+    """
+    (name, first), *others = results.items()
+    if not others or not rows:
+        return []
+    return [
+        Table(
+            ("", *(f"{other} against {name}" for other, _ in others)),
+            [(row, *(words(first, result) for _, result in others)) for row, words in rows.items()],
+            title="Where they differ, and by how much",
+        )
+    ]
+
+
+def emulated(result: Any, *promises: str) -> str:
+    """Which promises that a page speaks of are kept by this interface, and not by the engine."""
+    return ", ".join(each for each in promises if each in result.provenance.emulated)

@@ -1,0 +1,126 @@
+"""Children that do work: a fresh Python, how many at once, and how much memory is left for them."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from ..errors import BadInputError
+
+if sys.platform != "win32":
+    import resource
+
+# The environment of several processes that run at once, each on one processor.
+ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_WATCH = 1.0  # seconds between two looks at whether the parent is still there
+
+
+def fresh_python(module: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
+    """Command and environment that run a module in a fresh Python, which finds what this one does.
+
+    Args:
+        module: A module of this package, by its full name.
+        *arguments: What it reads in `sys.argv`.
+    """
+    package = Path(__file__).resolve().parents[2]
+    paths = [os.fspath(package), *(path or os.getcwd() for path in sys.path)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
+    return [sys.executable, "-P", "-m", module, *arguments], environment
+
+
+def end_with_parent() -> None:
+    """From now on this process ends, within a second, with the one that started it."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH)
+        os._exit(1)
+
+    if os.name != "nt":
+        threading.Thread(target=watch, daemon=True).start()
+
+
+def checked_jobs(jobs: int | None, processors: int = 1) -> int:
+    """How many at once: as asked for, or one for so many processors.
+
+    Raises:
+        BadInputError: It is less than 1.
+    """
+    if jobs is None:
+        return max(1, (os.cpu_count() or 1) // processors)
+    if jobs < 1:
+        raise BadInputError(f"jobs must be at least 1; got {jobs}")
+    return jobs
+
+
+def free_memory() -> int | None:
+    """Bytes that processes may still take before the kernel ends one; None where unknown.
+
+    What Linux calls available, what is left to the control groups (containers) of this process,
+    and what its own limit of addresses (`ulimit -v`) leaves it.
+    """
+    if sys.platform == "win32":
+        return None
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            lines = dict(line.split(":", 1) for line in file)
+        free = int(lines["MemAvailable"].split()[0]) << 10
+    except (OSError, KeyError):  # nor on macOS
+        return None
+    return max(min([free, *_left_to_groups(), *_left_of_addresses()]), 0)
+
+
+def _left_of_addresses() -> Iterator[int]:
+    """Bytes that this process may still map, where it has a limit of its own."""
+    if sys.platform == "win32":
+        return
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        yield limit - pages * resource.getpagesize()
+
+
+# Of a control group: where it is mounted, its limit, what it uses, and what of that the kernel
+# gives up first; of the first and the second version.
+_VERSIONS = {
+    "memory": ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+    "": ("", "memory.max", "memory.current", "inactive_file"),
+}
+
+
+def _left_to_groups() -> Iterator[int]:
+    """Bytes that each control group with a limit, of those that this process is in, has left."""
+    lines: list[str] = []
+    if sys.platform == "win32":
+        return
+    with suppress(OSError):
+        lines = Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+    for line in lines:
+        _, controllers, group = line.split(":", 2)
+        if controllers not in _VERSIONS:
+            continue
+        mount, limit, used, kept = _VERSIONS[controllers]
+        root = Path("/sys/fs/cgroup") / mount
+        place = root / group.strip("/")
+        for folder in (place, *place.parents[: len(place.parts) - len(root.parts)]):
+            with suppress(OSError, ValueError):  # no such file, or no limit: "max"
+                most, now = (
+                    int((folder / name).read_text(encoding="ascii")) for name in (limit, used)
+                )
+                stat = (folder / "memory.stat").read_text(encoding="ascii").split()
+                yield most - now + int(stat[stat.index(kept) + 1])
+
+
+def resident_memory() -> int:
+    """Bytes of memory that this process holds; 0 where it is not told."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, AttributeError):  # not Linux
+        return 0

@@ -1,0 +1,83 @@
+"""Several pieces of work at once; a signal to end leaves nothing running."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from types import FrameType
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+def in_parallel(
+    work: Mapping[str, Callable[[], T]],
+    jobs: int,
+    ended: Callable[[str, T], None],
+    stop: Callable[[], object],
+    progress: Callable[[int], None] = lambda _: None,
+) -> None:
+    """Do all of it, in threads that wait for processes.
+
+    Args:
+        work: What to call, by name, in the order in which it is begun.
+        jobs: How many are called at once.
+        ended: Called here with the name and the result of each as it ends.
+        stop: Called once at the end, or when something is raised: what still runs must end then.
+        progress: Told every moment how many are still waited for.
+    """
+    with ThreadPoolExecutor(jobs) as pool:
+        try:
+            waiting = {pool.submit(call): name for name, call in work.items()}
+            while waiting:
+                for future in wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done:
+                    ended(waiting.pop(future), future.result())
+                progress(len(waiting))
+        finally:
+            stop()
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+class _Ended(BaseException):
+    """A signal to end came; `args` has its number."""
+
+
+@contextmanager
+def unwinding() -> Iterator[None]:
+    """SIGTERM, SIGHUP and SIGINT let what is inside clean up, and then end the process as ever.
+
+    A second one does not disturb the cleaning up. One that is ignored (nohup) stays so. Only in
+    the main thread, where Python takes signals.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        for each in before:
+            signal.signal(each, signal.SIG_IGN)
+        raise KeyboardInterrupt if number == signal.SIGINT else _Ended(number)
+
+    names = ("SIGTERM", "SIGHUP", "SIGINT")
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    before = {
+        number: handler
+        for number in numbers
+        if (handler := signal.getsignal(number)) not in (signal.SIG_IGN, None)
+    }
+    ended = 0
+    try:
+        for number in before:
+            signal.signal(number, end)
+        yield
+    except _Ended as error:
+        (ended,) = error.args
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if ended:
+        signal.raise_signal(ended)
+        raise SystemExit(128 + ended)  # where somebody else takes the signal, and goes on

@@ -1,0 +1,98 @@
+"""A child that is told things by one pipe and answers by another."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import tempfile
+import weakref
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+from .sandbox import signal_name
+
+_ENDS_IN = 3.0  # seconds in which a process ends by itself when it is left alone
+
+
+class PipedChild:
+    """A process, and the pipes to it; it is to end at the end of its input.
+
+    No Ctrl-C of the terminal's reaches it. In the child of a fork its pipes are closed: the
+    process that started it alone decides when it ends.
+
+    Attributes:
+        to, out: Its standard input and output.
+        pid: Its number in the system.
+    """
+
+    def __init__(
+        self, command: Sequence[str], environment: Mapping[str, str], **options: Any
+    ) -> None:
+        """Start it; `options` are of `subprocess.Popen`."""
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115  (as long as it lives)
+        self._process = subprocess.Popen(
+            command,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._said,
+            start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+            **options,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self.to, self.out, self.pid = self._process.stdin, self._process.stdout, self._process.pid
+        _LIVING.add(self)
+
+    def how_it_ended(self, seconds: float = _ENDS_IN) -> str:
+        """In a few words, of one that has ended, or does so in this time; "" of one that lives."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+        code = self._process.returncode
+        if code is None:
+            return ""
+        if code < 0:
+            return f"ended by {signal_name(-code)}"
+        self._said.seek(0)
+        return last_line(self._said.read(), code)
+
+    def leave(self) -> None:
+        """Close the pipes: at their end it ends."""
+        for pipe in (self.to, self.out):
+            with suppress(OSError):
+                pipe.close()
+
+    def kill(self) -> None:
+        """End it at once."""
+        with suppress(OSError):
+            self._process.kill()
+
+    def close(self) -> None:
+        """Wait for its end, which is not to be long. Idempotent."""
+        self.leave()
+        try:
+            self._process.wait(_ENDS_IN)
+        except BaseException:  # a second Ctrl-C, too
+            self.kill()
+            self._process.wait()
+        self._said.close()
+
+
+def last_line(said: bytes, code: int) -> str:
+    """The last thing that a process said, which may be its error; or its exit code."""
+    lines = said.decode(errors="replace").strip().splitlines()
+    return lines[-1] if lines else f"exit code {code}"
+
+
+_LIVING: weakref.WeakSet[PipedChild] = weakref.WeakSet()
+
+
+def _let_go() -> None:
+    for process in _LIVING:
+        process.leave()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_let_go)

@@ -1,0 +1,317 @@
+"""Run a command that may loop, crash, flood or leave processes behind, and come back from it.
+
+On POSIX it gets a session and limits of its own; on Linux processes that left the session are
+found too, and it ends when we do. With `writable`, and where Linux permits it to any user, it
+is shut in (see `_launcher`). On Windows only the process itself is ended.
+
+Where it is not shut in it has the rights of whoever runs it, and this guards against what goes
+wrong, not against an attacker. Where it is, it still reads what its user can read, and a fault
+of the kernel's lets it out.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import math
+import os
+import secrets
+import signal
+import site
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Literal
+
+GB = 1024**3
+# Address space, of which engines reserve far more than they use.
+MEMORY_MOST = 4 * GB
+_FILE_MOST = GB // 2
+_FLOOD = GB // 4  # bytes of output that only a loop without end writes
+_TOKEN = "STATEMACHINE_SANDBOX"
+_PATIENCE = 2.0  # seconds to end what a command left behind
+_LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
+# Where a process cannot limit its computing time, it is watched from outside.
+WATCHED = sys.platform == "win32"
+
+
+@dataclass(frozen=True)
+class ProcessOutcome:
+    """How a command ended.
+
+    Attributes:
+        end: Whether it ended by itself ("code"), by a signal that was not ours ("signal"), since
+            it got no more memory ("memory"), or by a limit: of computing ("cpu"), of the clock
+            ("clock"; also when it was stopped), of what it writes ("flood").
+        code: Its exit code, or the number of the signal that ended it; 0 where we did.
+        started: Whether it got as far as `started` told, or was to.
+        stdout, stderr: What it wrote, each up to `output_most` bytes.
+        wall: How long it ran on the clock [s].
+        cpu: How long it computed [s]; 0 where the system does not tell.
+        how: The same in words that follow "it": "ended the process with code 1".
+    """
+
+    end: Literal["code", "signal", "memory", "cpu", "clock", "flood"]
+    code: int
+    started: bool
+    stdout: str
+    stderr: str
+    wall: float
+    cpu: float
+    how: str
+
+
+def run(
+    command: Sequence[str],
+    *,
+    cpu: float,
+    wall: float,
+    started: Callable[[], bool] = lambda: True,
+    start: float = 60.0,
+    start_cpu: float = 0.0,
+    cwd: str | os.PathLike[str] | None = None,
+    env: Mapping[str, str] | None = None,
+    writable: str | os.PathLike[str] | None = None,
+    output_most: int = 1_000_000,
+    memory_most: int = MEMORY_MOST,
+    stop: threading.Event | None = None,
+) -> ProcessOutcome:
+    """Run a command to its end, or to that of its time; nothing of it is left afterwards.
+
+    Args:
+        command: Program and arguments.
+        cpu: Seconds that it may compute, on all processors together.
+        wall: Seconds on the clock that it may take; at their end, on POSIX, it gets SIGPROF, so
+            that a handler may tell where it is.
+        started: Tells when it is ready, and `wall` begins.
+        start: Seconds on the clock that it may take until then.
+        start_cpu: Seconds of computing until then that are not counted: for a command that
+            limits itself from there (`limit_cpu`).
+        cwd: Where it runs; None for here.
+        env: Its environment; None for ours.
+        writable: The folder in which it has its home and its temporary files; where the system
+            permits it, it can write nowhere else, and has no network and no other process in
+            sight. None for none of this.
+        output_most: Bytes of stdout, and of stderr, to keep.
+        memory_most: Bytes of address space of each process, where the system can limit it.
+        stop: Set by another thread, it ends the command as the time limit does.
+
+    Raises:
+        FileNotFoundError: `cwd` is not there, or on Windows the program.
+    """
+    token, stopped = secrets.token_hex(16), stop or threading.Event()
+    place, home = "", dict[str, str]()
+    if writable is not None:
+        place = str(Path(writable).resolve())
+        home.update(dict.fromkeys(("HOME", "USERPROFILE", "TMPDIR", "TEMP", "TMP"), place))
+        home["PYTHONUSERBASE"] = site.getuserbase()  # what is installed in ours is found
+    limits = (os.getpid(), memory_most, math.ceil(cpu + start_cpu), _FILE_MOST, place)
+    launched = [sys.executable, "-I", "-S", _LAUNCHER, *map(str, limits)]
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        began = time.monotonic()
+        process = subprocess.Popen(
+            [*(launched if os.name == "posix" else ()), *command],
+            cwd=cwd,
+            env={**(os.environ if env is None else env), **home, _TOKEN: token},
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=err,
+            start_new_session=True,  # without effect on Windows
+        )
+        before = 0.0
+
+        def ready() -> str:
+            return "ready" if started() else ""
+
+        def exceeded() -> str:
+            if WATCHED and cpu_of(process) - before > cpu:
+                return "cpu"
+            flooded = any(os.fstat(file.fileno()).st_size > _FLOOD for file in (out, err))
+            return "flood" if flooded else ""
+
+        try:
+            end = _wait(process, began + start, ready, stopped)
+            if is_ready := end == "ready":
+                before = cpu_of(process) if WATCHED else 0.0
+                end = _wait(process, time.monotonic() + wall, exceeded, stopped)
+            took = time.monotonic() - began
+            if is_ready and end == "clock":
+                _ask_where(process, token)
+        finally:  # an interrupt too
+            _end_all(process, token)
+            used = _reap(process)
+        texts = [_start_of(file, output_most) for file in (out, err)]
+    code = process.returncode if end == "code" else 0
+    if code < 0:
+        code = -code
+        end = "cpu" if _is_of_cpu(code, used, cpu) else "signal"
+    if end != "cpu" and code and _speaks_of_memory(texts[1]):
+        end = "memory"
+    words = {
+        "code": f"ended the process with code {code}",
+        "signal": f"crashed the process ({signal_name(code)})",
+        "memory": "asks for more memory than there is for it",
+        "cpu": f"took longer than {cpu:g} s of computing",
+        "clock": f"took longer than {wall if is_ready else start:g} s on the clock, and computed "
+        f"for {used:.1f} s",
+        "flood": f"prints more than {_FLOOD >> 20} MB, and was ended there",
+    }
+    return ProcessOutcome(end, code, is_ready or started(), *texts, took, used, words[end])  # pyright: ignore
+
+
+def signal_name(number: int) -> str:
+    """The name of the signal that ended a process."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
+
+
+def limit_cpu(seconds: float, trace: IO[str]) -> None:
+    """End this process after so much more computing; that, or `run`, has its line told.
+
+    Where it cannot, the line is noted each second, and `run` ends the process.
+
+    Args:
+        seconds: Of computing, on all processors together.
+        trace: Where the fault handler writes; it works while Python itself is not reached.
+    """
+    if sys.platform == "win32":
+        faulthandler.dump_traceback_later(1.0, repeat=True, file=trace)
+        return
+    import resource
+
+    faulthandler.register(signal.SIGPROF, file=trace, chain=True)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    last = math.ceil(time.process_time() + seconds) + 1  # where the signal was refused
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_CPU, (last, last))
+
+
+def _is_of_cpu(number: int, used: float, most: float) -> bool:
+    """Whether a signal that ended a process was one of a limit of `most` seconds."""
+    if sys.platform == "win32":
+        return False
+    return number in (signal.SIGPROF, signal.SIGXCPU) or (number == signal.SIGKILL and used >= most)
+
+
+def cpu_of(process: subprocess.Popen[bytes]) -> float:
+    """How long a process and those that it started have computed so far [s]."""
+    import psutil
+
+    total = 0.0
+    with suppress(psutil.Error):
+        first = psutil.Process(process.pid)
+        for each in (first, *first.children(recursive=True)):
+            with suppress(psutil.Error):
+                times = each.cpu_times()
+                total += times.user + times.system
+    return total
+
+
+def _wait(
+    process: subprocess.Popen[bytes],
+    deadline: float,
+    enough: Callable[[], str],
+    stop: threading.Event,
+) -> str:
+    """What ends the waiting: "code", "clock" (or `stop`), or what `enough` says."""
+    pause = 0.001
+    while True:
+        ended = _has_ended(process)
+        if word := enough():
+            return word
+        remaining = deadline - time.monotonic()
+        if ended or remaining <= 0 or stop.wait(min(pause, remaining)):
+            return "code" if ended else "clock"
+        pause = min(pause * 2, 0.02)
+
+
+def _ask_where(process: subprocess.Popen[bytes], token: str) -> None:
+    """Let it write down where it is, if it has a handler for that, and end."""
+    if sys.platform == "win32":
+        return
+    inside = [process.pid]
+    with suppress(OSError):  # any of them may end meanwhile
+        inside = [
+            int(entry.name)
+            for entry in _relatives(process.pid, token)
+            if _LAUNCHER.encode() not in (entry / "cmdline").read_bytes()
+        ] or inside
+    for pid in inside:
+        with suppress(OSError):
+            os.kill(pid, signal.SIGPROF)
+    _wait(process, time.monotonic() + _PATIENCE / 2, str, threading.Event())
+
+
+def _has_ended(process: subprocess.Popen[bytes]) -> bool:
+    """Whether it has. On POSIX it is not reaped yet then.
+
+    So that its number, and that of its group, is nobody else's when the group is killed.
+    """
+    if sys.platform == "win32" or not hasattr(os, "waitid"):
+        return process.poll() is not None
+    options = os.WEXITED | os.WNOHANG | os.WNOWAIT
+    return os.waitid(os.P_PID, process.pid, options) is not None
+
+
+def _reap(process: subprocess.Popen[bytes]) -> float:
+    """Wait for a process that was ended; how long it had computed [s]."""
+    if sys.platform == "win32" or process.returncode is not None:
+        process.wait()
+        return 0.0
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return usage.ru_utime + usage.ru_stime
+
+
+def _end_all(process: subprocess.Popen[bytes], token: str) -> None:
+    """Kill the command and all that it started."""
+    if sys.platform == "win32":
+        process.kill()
+        return
+    deadline = time.monotonic() + _PATIENCE
+    first = True
+    while True:
+        found = [int(each.name) for each in _relatives(process.pid, token)]
+        if process.returncode is None:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
+        for pid in found:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+        if time.monotonic() > deadline or not (found or first):
+            return
+        first = False  # what was being forked meanwhile shows in the next round
+        time.sleep(0.002)
+
+
+def _relatives(leader: int, token: str) -> set[Path]:
+    """Living processes of the session, or that carry the token, in /proc; without it, none."""
+    mark = f"{_TOKEN}={token}".encode()
+    found = set()
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):  # it ended meanwhile, or is another user's
+            # After the name in brackets, which may hold anything.
+            stat = (entry / "stat").read_bytes().rpartition(b")")[2].split()
+            state, session = stat[0], int(stat[3])
+            if state not in b"ZX" and (
+                session == leader or mark in (entry / "environ").read_bytes()
+            ):
+                found.add(entry)
+    return found
+
+
+def _speaks_of_memory(stderr: str) -> bool:
+    tail = stderr[-2000:]
+    return any(word in tail for word in ("MemoryError", "bad_alloc", "annot allocate memory"))
+
+
+def _start_of(file: Any, most: int) -> str:
+    file.seek(0)
+    return file.read(most).decode("utf-8", "replace")

@@ -1,0 +1,258 @@
+"""A figure of traces for a paper or a slide, one column wide and readable without colour."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..compare import ChaosFloor, Comparison, default_tip, series
+from ..interface import JointType
+from ..measures import COUNT
+from ..measures.text import few, milliseconds, reading, short_time
+from ..page import Traces
+from ..runs import Header, Trace
+from ..runs.whole import replace_bytes
+from .figures import SETTINGS, SIDES, check_suffix, draw_picture, saved
+from .finding import long_labels, parting
+from .floor import changed_by
+from .over_time import MOST, charts_of, spans
+
+FIGURE_SETTINGS = {
+    **SETTINGS,
+    "font.family": ["DejaVu Sans", "sans-serif"],
+    "font.size": 6.0,
+    "axes.linewidth": 0.5,
+    "axes.titlesize": 6.0,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 2.0,
+    **{f"{axis}tick.{what}": size for axis in "xy" for what, size in
+       (("major.size", 1.8), ("major.width", 0.5), ("major.pad", 1.2))},
+}  # fmt: skip
+_DOTS = 300  # a PNG has to an inch
+_WIDTH, _MM = 80.0, 1 / 25.4  # of the figure [mm]; inches to a millimetre
+_ROW, _TOUCH, _LINE = 17.0, 5.0, 3.0  # heights of a row of charts, of a touch, of text [mm]
+_LETTERS, _TITLE = 82, 30  # of a line of notes; of a title over half of the width
+_MOST_PAIRS = 8
+
+READ = (
+    "Left: both sides. Right: how far apart, on a log axis, and below it in grey what is exactly "
+    "0; the dotted line is the tolerance. Above it: the verdict and the largest difference."
+)
+FLOOR = "Grey area: the chaos floor, how far the first side gets from itself with {changed}."
+PART = "Grey line: they part at {at}, first {names}."
+FEWER = "{count} further quantities differ less, or are not finite."
+NOT_SHOWN = "{count} further joints are not shown."
+COMMAND = "the command"
+
+
+@dataclass(frozen=True, eq=False)
+class TouchSpans:
+    """When two bodies touch: spans of time, (from, to) [s], on each side."""
+
+    name: str
+    spans: Sequence[Sequence[Sequence[float]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """All of a figure.
+
+    Attributes:
+        title: The experiment.
+        lines: What made it, in short lines.
+        labels: Names of the sides, in the order of the styles.
+        rows: Charts, from top to bottom; one in a row is wide.
+        touches: In rows of one panel at the bottom.
+        seconds: End of the axis of time [s].
+        part: When they part [s], or None.
+        notes: What the reader must know, below.
+    """
+
+    title: str
+    lines: Sequence[str]
+    labels: Sequence[str]
+    rows: Sequence[Sequence[Traces]]
+    touches: Sequence[TouchSpans]
+    seconds: float
+    part: float | None
+    notes: Sequence[str]
+
+
+def of_comparison(
+    one: Trace, two: Trace, comparison: Comparison, floor: ChaosFloor | None = None
+) -> Plot:
+    """The figure of two traces: a row for each quantity, and who touches when."""
+    curves = series(one, two)
+    charts = charts_of(comparison, one, two, curves, floor)
+    first = parting(comparison)
+    names = few(
+        [a.name for a in comparison.agreements if first is not None and a.since == first], 1
+    )
+    more = len(curves) - len(charts)
+    notes = [
+        READ,
+        *([] if floor is None else [FLOOR.format(changed=changed_by(floor))]),
+        *([] if first is None else [PART.format(at=short_time(first), names=names)]),
+        *([FEWER.format(count=more)] if more else []),
+    ]
+    return Plot(
+        one.header.experiment,
+        _origin(one, two),
+        long_labels(comparison),
+        [[each for each in (chart.values(), chart.gap()) if each] for chart in charts],
+        _touches([one, two], comparison.until),
+        comparison.until,
+        first,
+        notes,
+    )
+
+
+def of_trace(trace: Trace) -> Plot:
+    """The figure of one trace: fingertip, joints and what they were told, energy, touches."""
+    header, time = trace.header, trace.time - trace.time[0]
+    charts = []
+    site = default_tip(header)
+    if site and "site_xpos" in trace:
+        where = trace.site(site)[0]
+        away = 1000 * np.linalg.norm(where - where[0], axis=1)
+        curves = {header.label: (time, away)}
+        charts.append(Traces(f"{site}, from its start [mm]", "", "", curves, sides=True))
+    told = {joint: k for k, joint in enumerate(header.actuator_jntid) if joint >= 0}
+    kinds = JointType.HINGE, JointType.SLIDE
+    joints = [k for k, kind in enumerate(header.jnt_type) if kind in kinds]
+    for joint in joints[:MOST]:
+        hinge = header.jnt_type[joint] == JointType.HINGE
+        scale, unit = reading("rad" if hinge else "m")
+        curves = {header.label: (time, scale * trace.qpos[:, header.jnt_qposadr[joint]])}
+        if joint in told:
+            curves[COMMAND] = (time, scale * trace.ctrl[:, told[joint]])
+        title = f"{header.joints[joint] or f'joint {joint}'} [{unit.strip()}]"
+        # What the robot itself would not notice is not blown up to the height of a chart.
+        least = 20 * scale * COUNT if hinge else 0.0
+        charts.append(Traces(title, "", "", curves, sides=True, least=least))
+    if "energy" in trace and np.isfinite(trace["energy"]).all():
+        energy = {header.label: (time, trace["energy"].sum(axis=1))}
+        charts.append(Traces("energy [J]", "", "", energy, sides=True))
+    more = len(joints) - MOST
+    return Plot(
+        header.experiment,
+        _origin(trace),
+        [header.label, COMMAND] if told else [header.label],
+        [charts[k : k + 2] for k in range(0, len(charts), 2)],
+        _touches([trace], float(time[-1])),
+        float(time[-1]),
+        None,
+        [NOT_SHOWN.format(count=more)] if more > 0 else [],
+    )
+
+
+def _touches(traces: Sequence[Trace], until: float) -> list[TouchSpans]:
+    """Spans of each pair of bodies; those that touch first come first."""
+    touching = [trace.touches() for trace in traces]
+    rows = []
+    for pair in dict.fromkeys(name for touch in touching for name in touch):
+        sides = [
+            spans(touch[pair], trace.time - trace.time[0], trace.header.timestep, until)
+            if pair in touch
+            else []
+            for touch, trace in zip(touching, traces, strict=True)
+        ]
+        if any(sides):
+            rows.append(TouchSpans(pair, sides))
+    rows.sort(key=lambda touch: min(span[0] for side in touch.spans for span in side))
+    return rows[:_MOST_PAIRS]
+
+
+def _origin(*traces: Trace) -> list[str]:
+    """The model, the steps and the version that computed it."""
+    headers: list[Header] = [trace.header for trace in traces]
+    models = {h.provenance.model_file: h.provenance.model_sha256[:8] for h in headers}
+    steps = dict.fromkeys(milliseconds(header.timestep) for header in headers)
+    seeds = dict.fromkeys(
+        f"seed {header.provenance.seed}" for header in headers if header.provenance.seed is not None
+    )
+    versions = dict.fromkeys(
+        f"statemachine {header.provenance.versions.get('statemachine', '')}" for header in headers
+    )
+    return [
+        ", ".join(f"{name} ({digest})" for name, digest in models.items()),
+        ", ".join([f"step {' and '.join(steps)}", *seeds, *versions]),
+    ]
+
+
+def drawn(plot: Plot, form: str) -> bytes:
+    """A figure as svg, png or pdf; the same figure gives the same bytes.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+    return saved(lambda: draw(plot), form, FIGURE_SETTINGS, _DOTS)
+
+
+def write_plot(plot: Plot, path: Path) -> int:
+    """Write a figure to a file .svg, .png or .pdf, whole or not at all; its bytes.
+
+    Raises:
+        BadInputError: Another suffix.
+        MissingEngineError: matplotlib is not installed.
+    """
+    return replace_bytes(path, drawn(plot, check_suffix(path)))
+
+
+def draw(plot: Plot) -> Any:
+    """The figure as matplotlib's, 80 mm wide."""
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    notes = "\n".join(textwrap.fill(note, _LETTERS) for note in plot.notes)
+    heights = [_ROW] * len(plot.rows) + [_TOUCH * (len(plot.touches) + 1)] * bool(plot.touches)
+    words = notes.count("\n") + len(plot.lines) + len(plot.labels) + 5
+    size = _WIDTH * _MM, (sum(heights) + _LINE * words) * _MM
+    figure = Figure(size, facecolor="white", layout="constrained")
+    figure.supxlabel(notes, x=0.01, ha="left", size=5.2)
+    figure.legend(
+        [Line2D([], [], **style) for style in SIDES[: len(plot.labels)]],
+        plot.labels,
+        title="\n".join((plot.title, *plot.lines)),
+        loc="outside upper left",
+        alignment="left",
+        frameon=False,
+    )
+    grid = figure.add_gridspec(max(1, len(heights)), 2, height_ratios=heights or None)
+    for k, row in enumerate(plot.rows):
+        for column, picture in enumerate(row):
+            axes = figure.add_subplot(grid[k, column if len(row) > 1 else slice(None)])
+            draw_picture(axes, picture)
+            title = textwrap.fill(picture.title, _TITLE * (3 - len(row)))
+            axes.set_title(title, weight="bold" if "DIFFERS" in title else "normal")
+    if plot.touches:
+        _draw_touches(figure.add_subplot(grid[-1, :]), plot)
+    for axes in figure.axes:
+        axes.set_xlim(0, max(plot.seconds, 1e-9))
+        axes.locator_params(axis="x", nbins=4)
+        if plot.part is not None:
+            axes.axvline(plot.part, color="#8a8a8a", linewidth=0.6, zorder=0)
+    if figure.axes:
+        figure.axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _draw_touches(axes: Any, plot: Plot) -> None:
+    """Bars while two bodies touch: above of the first side, below, hatched, of the second."""
+    axes.set_title("who touches when")
+    least = plot.seconds / 300  # a touch of one step is seen too
+    for row, touch in enumerate(plot.touches):
+        for side, times in enumerate(touch.spans):
+            colour, base = SIDES[side]["color"], row + (0.42, 0.7)[side]
+            bars = [(begin, max(end - begin, least)) for begin, end in times]
+            look = {"hatch": "////////", "facecolor": "white"} if side else {"facecolor": colour}
+            axes.broken_barh(bars, (base, 0.26), edgecolor=colour, linewidth=0.4, **look)
+        axes.text(0.0, row + 0.38, touch.name, size=5.2)
+    axes.set_ylim(len(plot.touches), 0)
+    axes.set_yticks([])
+    axes.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,87 @@
+"""The JSON of every command: its keys, and the types of what stands under them, all the way down.
+
+The figures are tested where they are made. After a change that was meant, write the table anew:
+`python -m tests.test_json_shapes`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from statemachine.lessons import LESSONS
+
+from .conftest import ROOT, need_engine
+
+TABLE = Path(__file__).with_suffix(".json")
+OPTIONS = {
+    "speed": "--steps 200",
+    "worlds": "--most 4",
+    "gravity": "--longer 0",
+    "replay": "--steps 100",
+}
+ITSELF = "--backends mujoco mujoco --seconds 0.2"
+COMMANDS = [
+    *(f"lesson {name} {OPTIONS.get(name, '')}".strip() for name in LESSONS),
+    "doctor",
+    "conventions quaternion gravity --backend mujoco",
+    "conventions --calls --backend mujoco",
+    "audit --steps 2 --backend mujoco",
+    "fingertip --poses 5",
+    f"compare hold {ITSELF}",
+    f"compare hold {ITSELF} --why",
+    f"compare hold {ITSELF} --one-step",
+    f"compare hold {ITSELF} --converge",
+    "compare hold so101/scene so101/scene damping=1 --seconds 0.2",
+    "compare hold so101/scene so101/scene damping=1 --seconds 0.2 --why",
+    "compare --models so101 so101/scene",
+    "trace show {ROOT}/statemachine/runs/recorded/droop.pybullet.npz",
+    "check {ROOT}/teaching/solutions/step_loop.py",
+    "check --mutants {ROOT}/exercises/test_arm.py --only xyzw",
+    "sweep droop --vary damping=0.5,0.6 --seconds 0.1 --backend mujoco --out swept",
+]
+
+
+def _said(command: str, folder: str | Path) -> Any:
+    done = subprocess.run(
+        [sys.executable, "-m", "statemachine", *shlex.split(command.format(ROOT=ROOT)), "--json"],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert done.returncode in (0, 1), done.stderr
+    return json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+
+
+def shape(value: Any) -> Any:
+    """Keys with the shapes under them, a list of the shapes of a list, the name of a type."""
+    if isinstance(value, dict):
+        return {name: shape(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        shapes = {json.dumps(shape(inner), sort_keys=True) for inner in value}
+        return [json.loads(text) for text in sorted(shapes)]
+    kinds = {bool: "true or false", int: "number", float: "number", str: "text"}
+    return kinds.get(type(value), "null")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_json_of_a_command_has_its_keys_and_types(command: str, tmp_path: Path) -> None:
+    need_engine("pinocchio")  # without, what a witness says is null
+    assert shape(_said(command, tmp_path)) == json.loads(TABLE.read_text("utf-8"))[command]
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as home:
+        found = {command: shape(_said(command, home)) for command in COMMANDS}
+    TABLE.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n", "utf-8")
