@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import gc
 import functools
 import io
 import sys
@@ -141,6 +142,7 @@ def test_every_call_is_recorded(engine: str) -> None:
     code = WHOLE.format(engine=engine)
     run_plainly(code)  # so that what happens once in a process has happened
     recorded = counts(record(code, engine))
+    gc.collect()  # so that no Data of these runs ends in the next one
     seen: Counter[str] = Counter()
     namespace: dict[str, Any] = {"__name__": "__main__"}
     with (
