@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 import contextlib
-import gc
 import functools
+import gc
 import io
 import sys
 from collections import Counter
