@@ -100,8 +100,8 @@ def run_plainly(code: str) -> str:
 
 def owners(engine: str) -> list[Any]:
     """Whatever has functions that are replaced."""
-    found: list[Any] = [mujoco, mujoco.MjModel, mujoco.MjData, mujoco.MjSpec]
-    return found + ([installed.require("pybullet")] if engine == "pybullet" else [])
+    more = [installed.require("pybullet")] if engine == "pybullet" else []
+    return [mujoco, mujoco.MjModel, mujoco.MjData, mujoco.MjSpec, *more]
 
 
 def methods(owner: type) -> dict[int, str]:
@@ -141,9 +141,8 @@ def test_every_call_is_recorded(engine: str) -> None:
     """Against Python's own account of the same code, run without the recorder."""
     code = WHOLE.format(engine=engine)
     run_plainly(code)  # so that what happens once in a process has happened
-    recorded = counts(record(code, engine))
+    recorded, seen = counts(record(code, engine)), Counter[str]()
     gc.collect()  # so that no Data of these runs ends in the next one
-    seen: Counter[str] = Counter()
     namespace: dict[str, Any] = {"__name__": "__main__"}
     with (
         contextlib.redirect_stdout(io.StringIO()),
