@@ -24,7 +24,7 @@ help:
 lesson: $(VENV)/run.stamp
 	@# In a terminal it asks and waits; q ends it at any prompt.
 	@# Both engines; one that cannot be had here is named in one line and left out.
-	@$(BIN)/statemachine lesson --further
+	@$(BIN)/statemachine lesson
 	@echo "To make statemachine a command of your shell: source $(BIN)/activate"
 
 # worksteal: a process that has run its tests takes some of another's.

@@ -14,12 +14,17 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 from . import __version__
-from .commands import COMMANDS
-from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, complain
+from .commands import COMMANDS, FIRST
+from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, check_rules, complain
 from .errors import EngineWarning, MissingEngineError, StateMachineError, did_you_mean
 from .installed import raise_if_interrupted
 from .report.terminal import spelled
 
+_MORE = f"""\
+more commands:
+{{commands}}
+
+`{PROGRAM}` alone lists the lessons; `{PROGRAM} COMMAND --help` shows the options of one."""
 _SAID: set[str] = set()
 
 
@@ -149,6 +154,7 @@ def _run(options: argparse.Namespace) -> int:
         from .backends.binary import TRUST
 
         os.environ[TRUST] = "1"  # which workers inherit
+    check_rules(options)
     return options.run(options)
 
 
@@ -169,15 +175,18 @@ def _let_go_of_output() -> None:
 
 def _parser(wanted: Collection[str]) -> argparse.ArgumentParser:
     """A parser that knows all commands, and the options of some."""
+    more = [name for name in COMMANDS if name not in FIRST]
     parser = _Parser(
         prog=PROGRAM,
         description="A physics simulator is a state machine that you advance.",
-        epilog=f"`{PROGRAM}` alone lists the lessons.",
+        epilog=_MORE.format(commands="\n".join(f"  {n:<12} {COMMANDS[n]}" for n in more)),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
-    commands = parser.add_subparsers(metavar="command")
+    commands = parser.add_subparsers(metavar="command", title="commands")
     for name, says in COMMANDS.items():
-        command = commands.add_parser(name, help=says)
+        shown: dict[str, Any] = {"help": says} if name in FIRST else {}
+        command = commands.add_parser(name, **shown)
         if name in wanted:
             importlib.import_module(f".commands.{name}", __package__).add(command)
     return parser

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import importlib
 import json
 import math
 import os
@@ -194,9 +196,10 @@ def test_fingertip_against_another_arm(
 def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
     done = cli()
     assert done.returncode == 0
-    places = [done.stdout.index(f"statemachine lesson {name}") for name in LESSONS]
+    places = [done.stdout.index(f"\n  {name} ") for name in LESSONS]
     assert places == sorted(places)
     assert max(map(len, done.stdout.splitlines())) <= 80
+    assert done.stdout.count("\n") < 24  # beside the prompt of a small terminal
 
 
 @pytest.mark.parametrize(
@@ -437,3 +440,14 @@ def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path
     (line,) = done.stderr.splitlines()
     assert line.startswith("statemachine: PyBullet: friction of ")
     assert ".py" not in line
+
+
+@pytest.mark.parametrize("command", ["compare", "sweep"])
+def test_help_shows_few_options_and_help_all_every_one(cli: Cli, command: str) -> None:
+    few, every = cli(command, "--help").stdout, cli(command, "--help-all").stdout
+    assert few.count("\n  --") <= 11 < every.count("\n  --")
+    known = argparse.ArgumentParser()
+    importlib.import_module(f"statemachine.commands.{command}").add(known)
+    rules = known.get_default("rules")
+    named = {name for row in rules for words in (row[0], row[2]) for name in words.split()}
+    assert named <= {action.dest for action in known._actions}

@@ -322,7 +322,7 @@ def test_robots_that_share_nothing_are_refused(files: Path) -> None:
         ("hold arm.xml turned.xml ball.xml", "compare takes two"),
         ("hold arm.xml", "one side only: name the other"),
         ("hold arm.xml turned.xml --why --jobs 0", "jobs must be at least 1; got 0"),
-        ("hold arm.xml turned.xml --jobs 2", "--jobs belongs to --why"),
+        ("hold arm.xml turned.xml --jobs 2", "--jobs goes with --why"),
     ],
 )
 def test_what_is_mistyped_is_one_line(

@@ -745,6 +745,7 @@ def test_a_lesson_that_says_no_is_the_exit_code_of_the_path(
         return Page("t", "o", [Verdict("v", lesson.name != "hold")]), {"mujoco": lesson.name}
 
     monkeypatch.setattr(lesson_command, "_compute", compute)
+    monkeypatch.setattr(lesson_command, "_last_page", lambda *_: 0)
     assert main(["lesson"]) == 1
     assert ran == [lesson.name for lesson in PATH]
     ran.clear()
@@ -769,7 +770,7 @@ def test_nothing_follows_where_the_reader_stopped(
         raise quiz.Stopped
 
     monkeypatch.setattr("builtins.input", stop)
-    assert main(["lesson", "--further"]) == 0
+    assert main(["lesson"]) == 0
     said = capsys.readouterr().out
     assert "Go on later with: statemachine lesson --from objects" in said
     assert "Where to go next" not in said
@@ -782,18 +783,13 @@ def test_what_follows_the_path_is_shown_a_screenful_at_a_time(
     prompts: list[str] = []
     monkeypatch.setattr("builtins.input", lambda prompt: prompts.append(prompt) or "")
     monkeypatch.setattr(shutil, "get_terminal_size", lambda: os.terminal_size((80, 24)))
-    assert main(["lesson", "--further", "--from", "10"]) == 0
+    assert main(["lesson", "--from", "10"]) == 0
     said = capsys.readouterr().out
     assert said.index("The fingertip, and an independent witness") < said.index("Where to go next")
     after = prompts[1:]  # the lesson's own question comes first
     assert "fingertip" in after[0]
     assert after[1:] == ["Enter for more (q to stop) "] * len(after[1:])
     assert len(after) > 1
-    assert "lesson --further\n" in (ROOT / "Makefile").read_text()
-
-
-def test_a_path_goes_no_further_where_a_lesson_is_named(cli: Cli) -> None:
-    assert "goes with the whole path" in cli("lesson", "--further", "time").stderr
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")

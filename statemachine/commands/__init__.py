@@ -10,13 +10,14 @@ from __future__ import annotations
 COMMANDS = {
     "lesson": "the guided path, or one lesson alone",
     "check": "judge an exercise by what it does",
-    "conventions": "what each engine takes for granted, asked of the engines",
-    "audit": "what exactly the state is, found by saving, restoring and comparing bytes",
-    "fingertip": "the engine's fingertip against an independent witness",
     "compare": "where two engines part, by how much, and why",
-    "robots": "any folder of models: what each does on every engine, in a table",
-    "sweep": "an experiment at many settings, on every engine, as a dataset",
-    "trace": "record a run, play it on another engine, look into it, draw it",
-    "view": "a running simulation in the browser, with sliders",
     "doctor": "what this machine has, and what to do",
+    "view": "a running simulation in the browser, with sliders",
+    "trace": "record a run, play it on another engine, look into it, draw it",
+    "sweep": "an experiment at many settings, on every engine, as a dataset",
+    "robots": "any folder of models: what each does on every engine",
+    "fingertip": "the engine's fingertip against an independent witness",
+    "conventions": "what each engine takes for granted, asked of the engines",
+    "audit": "what exactly the state is, found by saving and restoring it",
 }
+FIRST = ("lesson", "check", "compare", "doctor")  # the others are under "more"

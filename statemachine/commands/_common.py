@@ -55,6 +55,57 @@ def refuse_given(options: argparse.Namespace, names: Iterable[str], text: str) -
     )
 
 
+# Of options: their names, whether they need one of the others or exclude them all, the others'
+# names, and what is said where that is not the usual.
+Rule = tuple[str, ...]
+NEEDS, EXCLUDES = "{flag} goes with {others}", "{flag} goes without {others}"
+
+
+def add_rules(parser: argparse.ArgumentParser, *rules: Rule) -> None:
+    """What options need of each other, which `check_rules` refuses before a command runs."""
+    usual = {action.dest: action.default for action in parser._actions}
+    parser.set_defaults(rules=rules, usual=usual)
+
+
+def check_rules(options: argparse.Namespace) -> None:
+    """Raise BadInputError for the first rule of a command that is broken."""
+    given = [
+        name
+        for name, usual in getattr(options, "usual", {}).items()
+        if getattr(options, name, usual) not in (usual, [])
+    ]
+    for names, needs_or_excludes, others, *text in getattr(options, "rules", ()):
+        present = [other for other in others.split() if other in given]
+        if bool(present) == (needs_or_excludes == EXCLUDES):
+            shown = " or ".join(map(flag_of, present or others.split()))
+            for name in (name for name in names.split() if name in given):
+                template = text[0] if text else needs_or_excludes
+                raise BadInputError(template.format(flag=flag_of(name), others=shown))
+
+
+class _HelpAll(argparse.Action):
+    """--help-all: the help of every option; `const` has what --help leaves out."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        for action, text in (self.const or {}).items():
+            action.help = text
+        parser.print_help()
+        parser.exit()
+
+
+def shorten_help(parser: argparse.ArgumentParser, *first: str) -> None:
+    """Let --help show the options that are needed first, and --help-all all of them."""
+    later = {
+        action: action.help
+        for action in parser._actions
+        if action.dest not in ("help", *first) and action.help != argparse.SUPPRESS
+    }
+    for action in later:
+        action.help = argparse.SUPPRESS
+    says = f"every option: {len(later)} more"
+    parser.add_argument("--help-all", action=_HelpAll, nargs=0, const=later, help=says)
+
+
 def flag_of(name: str) -> str:
     """An option as it is typed."""
     return f"--{name.replace('_', '-')}"

@@ -19,23 +19,9 @@ OPTIONS: tuple[Row, ...] = (
 
 
 def check(options: argparse.Namespace) -> None:
-    """Whether what was asked for makes sense.
-
-    Raises:
-        BadInputError: It does not.
-    """
+    """Raise BadInputError for an uncertainty that is no size."""
     from ..compare.perturbed import parse_uncertainty
 
-    refuse(
-        (
-            options.uncertainty and options.no_chaos,
-            "--uncertainty and --no-chaos exclude each other",
-        ),
-        (
-            options.uncertainty and options.models,
-            "--uncertainty is of a run, and --models runs nothing",
-        ),
-    )
     parse_uncertainty(options.uncertainty)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import MissingEngineError, StateMachineError
 from ..installed import PAIR
-from ._common import PARTS, PROGRAM, Row, complain, refuse, refuse_given
+from ._common import PARTS, PROGRAM, Row, complain
 
 OPTIONS: tuple[Row, ...] = (
     (
@@ -25,11 +25,10 @@ def check(options: argparse.Namespace) -> None:
     """Whether the report can be written, before anything is run.
 
     Raises:
-        BadInputError: It cannot, or --no-why is without --html.
+        BadInputError: It cannot.
     """
     if options.html is None:
-        return refuse_given(options, ["no_why"], "{} goes with --html")
-    refuse((options.models, "--html is of a run, and --models runs nothing"))
+        return
     from ..report.figures import require_matplotlib
     from ..report.html import check_target
 

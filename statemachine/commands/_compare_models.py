@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from ._common import PARTS, PROGRAM, REPEATED, Row, pairs_of, refuse, refuse_given, show
+from ._common import PROGRAM, REPEATED, Row, pairs_of, refuse, show
 
-ALONE = ("frame", "all", "digits")  # options that go with --models
 OPTIONS: tuple[Row, ...] = (
     (
         "--models",
@@ -30,15 +29,6 @@ def run(options: argparse.Namespace) -> int:
     from ..report.progress import progress
 
     given = [split(text) for text in options.models]
-    run = ("model", "seconds", "timestep", "tolerance", "plot", "film", "every", "keyframe", *PARTS)
-    refuse(
-        *((True, f"--models compares descriptions; {word} is a run") for word in options.what),
-        (
-            options.why or options.quantity,
-            "--models compares files: --why and --quantity are of an experiment",
-        ),
-    )
-    refuse_given(options, run, "{} is of a run, and --models runs nothing")
     if options.backends:
         refuse(
             (

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, ModelFileError, UnknownNameError
+from ..errors import ModelFileError, UnknownNameError
 from ._common import Row, complain
-
-_OF_FILM = {"fps": 30.0, "slow": 1.0, "size": (640, 480), "renderer": "auto"}
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -21,13 +19,14 @@ def _size(text: str) -> tuple[int, int]:
 
 
 OF_FILM: tuple[Row, ...] = (
-    ("--fps", "N", "of the film (default 30)", {"type": float}),
-    ("--slow", "N", "of the film: N times slower", {"type": float}),
-    ("--size", "WxH", "of the film (640x480)", {"type": _size}),
+    ("--fps", "N", "of the film (default 30)", {"type": float, "default": 30.0}),
+    ("--slow", "N", "of the film: N times slower", {"type": float, "default": 1.0}),
+    ("--size", "WxH", "of the film (640x480)", {"type": _size, "default": (640, 480)}),
     (
         "--renderer",
         "NAME",
         "of the film: an engine that draws, or auto: the first that can here",
+        {"default": "auto"},
     ),
 )
 OPTIONS: tuple[Row, ...] = (
@@ -43,23 +42,7 @@ class Pictures:
 
     plot: Path | None
     film: Path | None
-    fps: float
-    slow: float
-    size: tuple[int, int]
     renderer: Any = None
-
-
-def complete(options: argparse.Namespace) -> None:
-    """What was not said of a film is as usual; what was said needs a film.
-
-    Raises:
-        BadInputError: An option of a film is given, and none is made.
-    """
-    for name, usual in _OF_FILM.items():
-        if getattr(options, name, None) is None:
-            setattr(options, name, usual)
-        elif options.film is None:
-            raise BadInputError(f"--{name} goes with --film")
 
 
 def checked(options: argparse.Namespace) -> Pictures:
@@ -92,7 +75,7 @@ def checked(options: argparse.Namespace) -> Pictures:
             renderer = renderer_here(None if options.renderer == "auto" else options.renderer)
         if options.renderer == "auto" and renderer.name != renderers()[0]:
             complain(f"no OpenGL here: the film is drawn by {renderer}", 0)
-    return Pictures(plot, film, options.fps, options.slow, options.size, renderer)
+    return Pictures(plot, film, renderer)
 
 
 def write(
@@ -108,7 +91,7 @@ def write(
 
     Args:
         pictures: From `checked`.
-        options: Their `model` and `menagerie` say what the film shows, if not the traces.
+        options: Those of a film; `model` and `menagerie` say what it shows, if not the traces.
         one: A trace.
         two: The other one; None for pictures of one trace.
         comparison: Of the two.
@@ -143,9 +126,9 @@ def write(
                 one,
                 two,
                 comparison,
-                size=pictures.size,
-                fps=pictures.fps,
-                slow=pictures.slow,
+                size=options.size,
+                fps=options.fps,
+                slow=options.slow,
                 models=models,
                 renderer=pictures.renderer,
                 progress=told,

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ._common import Row, flag_of, refuse_given, show
+from ._common import Row, show
 from ._compare_rerun import both_of, finer, refuse_recorded
 
 OPTIONS: tuple[Row, ...] = (
@@ -21,34 +21,6 @@ OPTIONS: tuple[Row, ...] = (
         "run with steps as given, halved and quartered: what vanishes is discretisation",
     ),
 )
-
-
-def asked(options: argparse.Namespace) -> bool:
-    """Whether one of the two is wanted.
-
-    Raises:
-        BadInputError: Both are, or something that does not go with it.
-    """
-    wanted = [name for name in ("one_step", "converge") if getattr(options, name)]
-    if not wanted:
-        return False
-    others = (
-        "one_step",
-        "converge",
-        "why",
-        "html",
-        "plot",
-        "film",
-        "models",
-        "uncertainty",
-        "tolerance",
-    )
-    refuse_given(
-        options,
-        [other for other in others if other != wanted[0]],
-        f"{flag_of(wanted[0])} goes without {{}}",
-    )
-    return True
 
 
 def run(options: argparse.Namespace, request: Any) -> int:

@@ -6,10 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
-from ._common import JOBS, Row, refuse, refuse_given, show
-
-_OF_SIDES = ("measure", "finer", "budget", "jobs")
-
+from ._common import JOBS, Row, refuse, show
 
 OPTIONS: tuple[Row, ...] = (
     ("--why", "", "which difference explains how much of the gap"),
@@ -27,16 +24,9 @@ OPTIONS: tuple[Row, ...] = (
 
 
 def check(options: argparse.Namespace) -> None:
-    """Refuse what has no meaning without --why, or with it.
-
-    Raises:
-        BadInputError: Something has none.
-    """
-    if not options.why:
-        refuse_given(options, _OF_SIDES, "{} belongs to --why")
+    """Raise BadInputError for a budget of no runs."""
     few = options.budget is not None and options.budget < 1
     refuse(
-        (options.quantity and not (options.why or options.html), "--quantity belongs to --why"),
         (few, f"--budget wants a number of runs, at least 1; got {options.budget}"),
     )
 

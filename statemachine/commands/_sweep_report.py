@@ -7,19 +7,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ._common import REPEATED, add_table, complain, file_name, flag_of, refuse
+from ._common import NEEDS, REPEATED, add_table, complain, file_name, refuse
 
-# Options of a report alone, and what they are where they are not given.
-_DEFAULTS: dict[str, Any] = {
-    "quantity": None,
-    "tolerance": [],
-    "fit": [],
-    "varied": None,
-    "floor_cells": None,
-    "no_runs": False,
-    "html": None,
-    "plot": None,
-}
+# Options of a report alone.
+RULE = ("quantity tolerance fit varied floor_cells no_runs html plot", NEEDS, "report")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -69,9 +60,6 @@ def check(options: argparse.Namespace) -> None:
     """
     runs = options.what is not None and options.out is not None
     there = options.report not in (None, True)
-    if options.report is None:
-        given = (name for name, usual in _DEFAULTS.items() if getattr(options, name) != usual)
-        refuse(*((True, f"{flag_of(name)} goes with --report") for name in given))
     refuse(
         (
             "" in (options.out, options.report),

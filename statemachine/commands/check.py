@@ -6,7 +6,18 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ._common import ENGINE, REPEATED, SAYS_NO, add_table, complain, file_name, json_of, show
+from ._common import (
+    ENGINE,
+    NEEDS,
+    REPEATED,
+    SAYS_NO,
+    add_rules,
+    add_table,
+    complain,
+    file_name,
+    json_of,
+    show,
+)
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -82,6 +93,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         json_of("judgement"),
     )
     parser.set_defaults(run=run, parser=parser)
+    add_rules(parser, ("only", NEEDS, "mutants"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -104,8 +116,6 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.mutants is not None:
         return _mutants(options)
-    if options.only:
-        options.parser.error("--only goes with --mutants")
     for target in (options.csv, options.gradescope):
         if target is not None:
             check_place(target)

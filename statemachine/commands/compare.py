@@ -17,12 +17,16 @@ from . import (
 from . import _compare_pictures as pictures
 from ._common import (
     DEFAULTS,
+    EXCLUDES,
+    NEEDS,
     PARTS,
     PROGRAM,
     REPEATED,
     SECONDS,
     SIDES,
     Row,
+    Rule,
+    add_rules,
     add_table,
     complain,
     json_of,
@@ -31,6 +35,7 @@ from ._common import (
     refuse,
     refuse_given,
     seed_of,
+    shorten_help,
     show,
 )
 
@@ -103,7 +108,29 @@ def add(parser: argparse.ArgumentParser) -> None:
     ):
         add_table(parser.add_argument_group(title), *rows)
     parser.set_defaults(run=run, words_in="what")
+    add_rules(parser, *RULES)
+    shorten_help(
+        parser,
+        *("what", "backends", "why", "html", "plot", "seconds", "tolerance", "one_step"),
+        *("models", "json"),
+    )
 
+
+_OF_RUN = (
+    "what why quantity html plot film model seconds timestep tolerance uncertainty every keyframe "
+    "actuators floor"
+)
+RULES: tuple[Rule, ...] = (
+    ("measure finer budget jobs", NEEDS, "why"),
+    ("quantity", NEEDS, "why html"),
+    ("no_why", NEEDS, "html"),
+    ("fps slow size renderer", NEEDS, "film"),
+    ("frame all digits", NEEDS, "models"),
+    ("uncertainty", EXCLUDES, "no_chaos"),
+    ("one_step converge", EXCLUDES, "why html plot film models uncertainty tolerance"),
+    ("one_step", EXCLUDES, "converge"),
+    (_OF_RUN, EXCLUDES, "models", "{flag} is of a run, and --models runs nothing"),
+)
 
 # As `scenarios.SCENARIOS`, which needs NumPy; a test compares them.
 EXPERIMENTS = {
@@ -209,11 +236,8 @@ def run(options: argparse.Namespace) -> int:
     _compare_html.check(options)
     _compare_floor.check(options)
     _compare_why.check(options)
-    steps = _compare_steps.asked(options)
-    pictures.complete(options)
     if options.models:
         return _compare_models.run(options)
-    refuse_given(options, _compare_models.ALONE, "{} goes with --models")
     refuse(
         (
             not options.what,
@@ -221,7 +245,7 @@ def run(options: argparse.Namespace) -> int:
             f"{PROGRAM} compare hold",
         )
     )
-    if steps:
+    if options.one_step or options.converge:
         return _compare_steps.run(options, request_of(options))
     if options.why and not options.html:
         return _run_why(options)

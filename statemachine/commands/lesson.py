@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,11 +42,6 @@ def add(parser: argparse.ArgumentParser) -> None:
             "LESSON",
             "of the whole path: where to begin, if not at the first",
             {"dest": "start", "type": by_number, "choices": [lesson.name for lesson in PATH]},
-        ),
-        (
-            "--further",
-            "",
-            "of the whole path: then the fingertip against a witness, and where to go next",
         ),
     )
     parser.set_defaults(run=run_path)
@@ -97,37 +93,25 @@ def _numbers(text: str) -> list[float]:
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 0,-0.6") from None
 
 
+_OVERVIEW = f"""\
+A physics simulator is a state machine that you advance.
+
+  {PROGRAM} lesson           the guided path: ten lessons, about 35 minutes
+
+Each lesson alone, as in `{PROGRAM} lesson state`:
+{{lessons}}
+
+Then your turn:
+  {PROGRAM} check exercises/step_loop.py   four functions to write, judged
+  {PROGRAM} compare hold --why             where two engines differ, and why
+  {PROGRAM} doctor                         what this machine has, what to do
+All commands: {PROGRAM} --help"""
+
+
 def overview(_options: argparse.Namespace) -> int:
     """List what there is."""
-    lines = [
-        "A physics simulator is a state machine that you advance.",
-        "",
-        f"  {PROGRAM} lesson           the guided path: ten lessons, about 35 minutes",
-        "",
-        "Its lessons, each to be had alone:",
-        *(f"  {PROGRAM} lesson {each.name:<9} {each.question}" for each in PATH),
-        "",
-        "And two more:",
-        *(f"  {PROGRAM} lesson {each.name:<9} {each.question}" for each in BESIDE),
-        "",
-        "Then your turn:",
-        "  python exercises/step_loop.py              four functions for you to write",
-        f"  {PROGRAM} check exercises/step_loop.py   what they do, judged",
-        f"  {PROGRAM} check --mutants exercises/test_arm.py   what your tests catch",
-        "",
-        "And beside them:",
-        f"  {PROGRAM} compare hold --why   where two engines part, and why",
-        f"  {PROGRAM} sweep --help     an experiment at many settings, on every engine",
-        f"  {PROGRAM} trace record hold    a run in a file, to open without an engine",
-        f"  {PROGRAM} view --ghost pybullet    live, in a browser, with sliders",
-        f"  {PROGRAM} fingertip        the engine against an independent witness",
-        f"  {PROGRAM} conventions      what each engine takes for granted",
-        f"  {PROGRAM} audit            what exactly is the state? found by trying",
-        f"  {PROGRAM} doctor           what this machine has, and what to do",
-        "",
-        f"Each takes --help. Start with: {PROGRAM} lesson",
-    ]
-    print("\n".join(lines))
+    lessons = [f"  {lesson.name:<11}{lesson.question}" for lesson in (*PATH, *BESIDE)]
+    print(_OVERVIEW.format(lessons="\n".join(lessons)))
     return 0
 
 
@@ -139,10 +123,6 @@ def run(options: argparse.Namespace) -> int:
             options.start is not None,
             f"--from begins the whole path, and {lesson.name} is one lesson of it: type "
             f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}",
-        ),
-        (
-            options.further,
-            f"--further goes with the whole path: {PROGRAM} lesson --further",
         ),
     )
     values = {option.key: getattr(options, option.key) for option in lesson.options}
@@ -171,8 +151,7 @@ def run(options: argparse.Namespace) -> int:
             print(reader.summary)
 
 
-_AFTER = f"Check yourself: {PROGRAM} lesson questions. Then: python exercises/step_loop.py"
-_FURTHER = f"""\
+_NEXT = f"""\
 Where to go next:
   {PROGRAM}                    everything that there is
   {PROGRAM} lesson gravity --backend all     on all engines, side by side
@@ -211,27 +190,24 @@ def _path(options: argparse.Namespace, reader: Any) -> int:
             code = code if page.holds else SAYS_NO
             if not options.json:
                 title = f"{number} of {len(PATH)}: {page.title}"
-                last = number == len(PATH) and not options.further
-                terminal.show(replace(page, title=title), _AFTER if last else "", reader)
+                terminal.show(replace(page, title=title), "", reader)
         except (Stopped, KeyboardInterrupt) as stop:
             if reader:
                 print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
             if isinstance(stop, KeyboardInterrupt):
                 raise
             return code
-    if options.further and code == 0 and not options.json:
-        try:
-            return _further(options, reader)
-        except Stopped:
-            return code
     if options.json:
         from ..report.as_json import dumps
 
         print(dumps(everything))
+    elif code == 0:
+        with suppress(Stopped):
+            return _last_page(options, reader)
     return code
 
 
-def _further(options: argparse.Namespace, reader: Any) -> int:
+def _last_page(options: argparse.Namespace, reader: Any) -> int:
     """The fingertip of all engines against the witness, and where to go next."""
     from ..lessons.certificate import page
     from ..lessons.fingertip import certify
@@ -249,7 +225,7 @@ def _further(options: argparse.Namespace, reader: Any) -> int:
         terminal.show(certificate, "", reader)
     except MissingEngineError as error:  # nobody can compute it here
         complain(error, MISSING)
-    (reader.read if reader else sys.stdout.write)(_FURTHER)
+    (reader.read if reader else sys.stdout.write)(_NEXT)
     return code
 
 

@@ -14,10 +14,12 @@ from ._common import (
     REPEATED,
     SAYS_NO,
     SECONDS,
+    add_rules,
     add_table,
     complain,
     json_of,
     menagerie,
+    shorten_help,
     show,
 )
 from .compare import experiments
@@ -92,6 +94,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     _sweep_report.add_options(parser)
     add_table(parser, DEFAULTS, *menagerie(), json_of("summary, or the report,"))
     parser.set_defaults(run=run)
+    add_rules(parser, _sweep_report.RULE)
+    shorten_help(
+        parser,
+        *("what", "vary", "out", "backend", "seeds", "seconds", "samples", "jobs", "report"),
+        *("html", "json"),
+    )
 
 
 def run(options: argparse.Namespace) -> int:

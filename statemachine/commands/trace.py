@@ -214,7 +214,6 @@ def run_pictures(options: argparse.Namespace) -> int:
     usual = f"{Path(options.file).stem}.{'svg' if name == 'plot' else 'webp'}"
     options.plot = options.film = None
     setattr(options, name, options.output or usual)
-    pictures.complete(options)
     trace = read(options.file)
     pictures.write(pictures.checked(options), options, trace)
     return 0

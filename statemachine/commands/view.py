@@ -14,13 +14,14 @@ from typing import Any
 from ..errors import BadInputError, TraceError
 from ._common import (
     ENGINE,
+    EXCLUDES,
     PROGRAM,
+    add_rules,
     add_table,
     complain,
     menagerie,
     one_line,
     refuse,
-    refuse_given,
 )
 
 _PORT = 8080
@@ -59,6 +60,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         *menagerie(),
     )
     parser.set_defaults(run=run)
+    text = "{flag} is for a simulation, and a trace is a recording"
+    add_rules(parser, ("ghost keyframe site", EXCLUDES, "traces", text))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -111,8 +114,6 @@ def _play(options: argparse.Namespace, port: int) -> int:
     from ..view.recording import TraceSession
 
     refuse((len(options.traces) > 2, f"view shows one trace or two; got {len(options.traces)}"))
-    text = "{} is for a simulation, and a trace is a recording"
-    refuse_given(options, ["ghost", "keyframe", "site"], text)
     recording = TraceSession([read(path) for path in options.traces])
     header = recording.header
     name, same = options.model or header.provenance.model_file.removesuffix(".xml"), True
