@@ -1,4 +1,4 @@
-"""What a cell of a sweep costs, and how many tasks loky and Dask hand out: `docs/scale.md`.
+"""What a cell of a sweep costs, and how many tasks loky and Dask hand out: `docs/sweeps.md`.
 
     python -m benchmarks.sweep_cost
 

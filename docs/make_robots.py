@@ -34,7 +34,7 @@ orphan: true
 
 # The models of some packages
 
-Made by `docs/make_robots.py`, for [any folder of models](robots.md), where the columns are
+Made by `docs/make_robots.py`, for [any folder of models](models.md), where the columns are
 explained; without experiments and costs, which are of a machine. A file that a package does not
 ship, as a mesh, makes MuJoCo refuse the model. Left out is `random_urdfs` of `pybullet_data`: a
 thousand single objects whose URDF gives `izz="0"`, which MuJoCo refuses.

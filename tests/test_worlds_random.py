@@ -123,7 +123,7 @@ def test_no_world_has_a_compiled_model_of_its_own(box: Any) -> None:
         assert batch.models is None
         expanded = (batch.expanded(name) for name in mujoco.batch.MODEL_FIELDS)
         size = sum(array.nbytes for array in expanded if array is not None)
-    page = (ROOT / "docs" / "randomised_worlds.md").read_text("utf-8")
+    page = (ROOT / "docs" / "worlds.md").read_text("utf-8")
     assert f"{size / n / 1e3:.1f} kB a world" in page
     assert f"{mujoco.mj_sizeModel(box.raw) / 1e6:.1f} MB" in page
 
