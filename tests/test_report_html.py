@@ -338,8 +338,8 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     late = FirstTouch(0.27, "finger on floor", 0.01, 55)  # they were apart before
     assert len(headline(comparison, [], explanation_of(hold, touch=late)).causes) == 1
     # Of another quantity than any that is compared: named as it is.
-    other = headline(comparison, [], explanation_of(hold, quantity="box in the hand"))
-    assert other.lead.startswith("The box in the hand is up to 2.58° apart")
+    other = headline(comparison, [], explanation_of(hold, quantity="box relative to gripperframe"))
+    assert other.lead.startswith("The box relative to gripperframe is up to 2.58° apart")
 
 
 def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:

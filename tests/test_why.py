@@ -179,7 +179,7 @@ def test_what_is_held_is_what_it_is_about() -> None:
     one = sm.load("so101/scene_box")
     two = edited(one, geom_friction=0.1 * one.raw.geom_friction)
     result = explain(one, two, BOX, uncertain=None)
-    assert result.quantity == "box in the hand"
+    assert result.quantity == "box relative to gripperframe"
     assert sum(shares(result).values()) == pytest.approx(1.0)
     traces = [record_scenario(BOX, model) for model in (one, two)]
     seen = []
@@ -188,7 +188,7 @@ def test_what_is_held_is_what_it_is_about() -> None:
         seen.append(np.einsum("nji,nj->ni", trace.site("gripperframe")[1], apart))
     apart = np.linalg.norm(seen[0] - seen[1], axis=1)
     assert result.gap == pytest.approx(apart.max(), rel=1e-9)
-    gap = result.first["box in the hand"]
+    gap = result.first["box relative to gripperframe"]
     assert gap.rms == pytest.approx(np.sqrt((apart**2).mean()))
     assert gap.at == traces[0].time[apart.argmax()] - traces[0].time[0]
 

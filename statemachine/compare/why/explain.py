@@ -181,8 +181,8 @@ def explain(
         seconds: Simulated time; None for the scenario's own.
         seed: Of what the scenario draws, and of the orders that are drawn.
         names: Joints, bodies, sites and actuators of `one` that go by other names in `two`.
-        quantity: What the gap is measured in; None for what is in the hand from the start, or else
-            the joints, where that differs, and for what differs most where it does not.
+        quantity: What the gap is measured in; None for a free body that is touched at the start,
+            relative to the tip, else the joints, or what differs most where these agree.
         measure: Which figure of it.
         finer: Every difference by its single entries, however many there are.
         budget: How many sets of causes may be run: all of them where there are no more, else as
@@ -327,7 +327,7 @@ def _quantity(
     """
     ruler = trials.ruler
     robot = frozenset(model.body_names[body] for body in moved_by_actuators(model))
-    preferred = ruler.held(touched_at_start(trials.traces[0], robot))
+    preferred = ruler.default_quantity(touched_at_start(trials.traces[0], robot))
     beyond = {
         name: getattr(gap, measure) / ruler.tolerance(name)
         for name, gap in first.items()

@@ -92,7 +92,7 @@ class Ruler:
         for name in self._names:
             self._kinds |= {name: "body", f"{name}, rotation": "body rotation"}
             if self._tip:
-                self._kinds[f"{name} in the hand"] = "body"
+                self._kinds[self._relative_to_tip(name)] = "body"
         self.units = {name: QUANTITIES[kind].unit for name, kind in self._kinds.items()}
         if not self.units:
             raise BadInputError(
@@ -127,7 +127,7 @@ class Ruler:
         return {name: found[name] for name in self.units}
 
     def _poses(self, qpos: Array, model: Model, side: int) -> Curves:
-        """Where the tip and the free bodies are, and these along the axes of the hand."""
+        """Where the tip and the free bodies are, and these in the axes of the tip."""
         tip, rows = self._tips[side], []
         with make_data(model) as data:
             for row in qpos:
@@ -144,13 +144,19 @@ class Ruler:
             found[self._tip] = site = values[:, 3 * count : 3 * count + 3]
             turned = np.ascontiguousarray(values[:, 3 * count + 3 :]).reshape(-1, 3, 3)
             for k, name in enumerate(self._names):
-                in_hand = np.einsum("nij,ni->nj", turned, where[:, k] - site)
-                found[f"{name} in the hand"] = in_hand
+                relative = np.einsum("nij,ni->nj", turned, where[:, k] - site)
+                found[self._relative_to_tip(name)] = relative
         return found
 
-    def held(self, touching: frozenset[str]) -> str:
-        """The quantity that an experiment is about: what is in the hand, else the joints."""
-        names = [f"{name} in the hand" for name in self._names if name in touching and self._tip]
+    def _relative_to_tip(self, body: str) -> str:
+        """The quantity that is a free body's place in the axes of the tip."""
+        return f"{body} relative to {self._tip}"
+
+    def default_quantity(self, touching: frozenset[str]) -> str:
+        """What is measured unless asked: a free body that is touched, relative to the tip; else joints."""
+        names = [
+            self._relative_to_tip(name) for name in self._names if name in touching and self._tip
+        ]
         return next(iter([*names, *self.units]))
 
     def tolerance(self, quantity: str) -> float:
