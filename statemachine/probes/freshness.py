@@ -55,8 +55,8 @@ class Age:
         never: Whether nothing was derived since the Data was made, reset or set.
         written: Entries of the inputs that are others now; known only while watching.
         retraced: Bodies that are where one step back has them, within `within` [m, and of
-            quaternions 1], where that is how the number of steps was found; strays: bodies
-            that are not of now and not there either.
+            quaternions 1], where that is how the number of steps was found; unmatched: bodies
+            whose poses match neither moment.
     """
 
     steps: int | None = None
@@ -64,7 +64,7 @@ class Age:
     never: bool = False
     written: tuple[str, ...] = ()
     retraced: tuple[str, ...] = ()
-    strays: tuple[str, ...] = ()
+    unmatched: tuple[str, ...] = ()
     within: float = 0.0
 
 
@@ -155,7 +155,7 @@ def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Age:
     return Age(
         steps=1,
         retraced=names(there),
-        strays=names(moved & ~there),
+        unmatched=names(moved & ~there),
         within=float(off[there].max()),
     )
 
@@ -265,9 +265,9 @@ def _how(model: Model, age: Age, poses: bool) -> Iterator[str]:
             f"Found by going back: qpos − h·qvel, h = {milliseconds(engine_step(model))}, gives "
             f"the poses of {few(age.retraced)}, {exact}."
         )
-        if age.strays:
+        if age.unmatched:
             yield (
-                f"Not so {few(age.strays)}: qpos or qvel was written since, or the engine "
+                f"{few(age.unmatched)} match neither moment: qpos or qvel was written since, or the engine "
                 "integrates otherwise."
             )
     elif not age.never and age.steps is None:

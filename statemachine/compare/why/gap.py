@@ -153,7 +153,7 @@ class Ruler:
         return f"{body} relative to {self._tip}"
 
     def default_quantity(self, touching: frozenset[str]) -> str:
-        """What is measured unless asked: a free body that is touched, relative to the tip; else joints."""
+        """What is measured unless asked: a touched body relative to the tip, else the joints."""
         names = [
             self._relative_to_tip(name) for name in self._names if name in touching and self._tip
         ]
