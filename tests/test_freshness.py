@@ -205,7 +205,7 @@ def test_a_step_is_found_behind_a_later_write(model: Model) -> None:
     assert found["xpos"].of == "1 step ago"
     text = " ".join(str(found).split())
     assert "gives the poses of shoulder, upper_arm, to" in text
-    assert "Not so lower_arm, wrist, gripper and 2 more" in text
+    assert "lower_arm, wrist, gripper and 2 more match neither moment" in text
 
 
 def test_a_write_is_no_step(box: Model, held: Data) -> None:

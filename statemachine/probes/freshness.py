@@ -267,8 +267,8 @@ def _how(model: Model, age: Age, poses: bool) -> Iterator[str]:
         )
         if age.unmatched:
             yield (
-                f"{few(age.unmatched)} match neither moment: qpos or qvel was written since, or the engine "
-                "integrates otherwise."
+                f"{few(age.unmatched)} match neither moment: qpos or qvel was written since, or "
+                "the engine integrates otherwise."
             )
     elif not age.never and age.steps is None:
         if poses:
