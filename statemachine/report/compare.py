@@ -88,7 +88,7 @@ def page(
     both = _over_time(comparison, one, two, curves, events, explanation, tip, floor)
     reasons: list[Block] = [Text(why_not)] if why_not else []
     if explanation is not None:
-        reasons = [*why.causes(explanation), *_three(explanation)]
+        reasons = [*why.causes(explanation), *why.three_parts(explanation)]
     kept = emulated(comparison)
     agree = why.steps(explanation) if explanation is not None else []
     made_by = [Text("This page was made by:"), Code([command])] if command else []
@@ -110,7 +110,7 @@ def page(
         *([Text(one.header.says)] if one.header.says else []),
         *told(run),
         *commanded(one, two, labels),
-        *in_words(comparison, events, explanation),
+        *in_words(comparison),
         *(() if comparison.ended else contact_words(comparison, touching)),
         *([Items(notes)] if notes else []),
         both,
@@ -157,13 +157,6 @@ def _over_time(
         charts,
         tuple(dict.fromkeys(lead))[:2] or (0,),
     )
-
-
-def _three(explanation: Explanation) -> list[Block]:
-    """The three parts of the gap, and what they mean; nothing where there is none to explain."""
-    if explanation.is_rounding:
-        return []
-    return [Text(f"{why.parts(explanation)}."), Text(why.THREE, small=True)]
 
 
 def _sorted(charts: Sequence[QuantityChart], total: int) -> list[Block]:
