@@ -136,23 +136,17 @@ def _over_time(
     floor: ChaosFloor | None,
 ) -> BothRuns:
     """The scene and a chart for each quantity that is a number throughout."""
-    found = {each.name: each for each in comparison.agreements}
     charts = charts_of(comparison, one, two, curves, floor)
     of, most = subject(comparison, explanation), leading(comparison)
     lead = [k for k, chart in enumerate(charts) if most and chart.curve.name == most.name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
-    moments = {each.at for each in found.values()}
-    moments |= {each.since for each in found.values() if each.since is not None}
     return BothRuns(
         comparison.one.experiment,
         one,
         two,
-        long_labels(comparison),
-        short_labels(comparison),
+        comparison,
         default_tip(one.header, two.header) if tip is None else tip,
-        comparison.until,
         0.0 if of is None else of.at,
-        tuple(sorted(moments)),
         tuple(events),
         charts,
         tuple(dict.fromkeys(lead))[:2] or (0,),
