@@ -36,8 +36,7 @@ ANSWERS = {
     "chaos": "Nothing can be concluded: chaos alone makes {floor}, and the gap is {gap}",
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
-    "located": "{cause}: {part} of the {gap} is localised there, not explained: it goes when "
-    "{without} on both sides",
+    "located": "{cause}: {part} of the {gap} is localised there, not explained",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
 }
 TOUCH = (
@@ -131,7 +130,7 @@ def answer(result: Explanation) -> str:
     kind = max(parts, key=parts.__getitem__)
     slots: dict[str, object] = {}
     if kind == "located" and place:
-        slots = {"cause": capital(place.name), "without": place.without}
+        slots = {"cause": capital(place.name)}
     elif kind == "cause" and first:
         left, right = _values(first)
         slots = {"cause": capital(first.name), "left": left, "right": right}
