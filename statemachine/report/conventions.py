@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import chain
 
 from ..engines.measured import Measurement
@@ -11,6 +10,7 @@ from ..page import Block, Code, Page, Section, Table, Text, Verdict
 from ..probes.conventions import Answered, Conventions
 from ..probes.phrasebook import CONCEPTS, Phrasebook
 from . import template
+from .template import versions_of
 
 _ZERO = 1e-12
 _NOT_ASKED = "not asked"
@@ -20,7 +20,7 @@ def page(result: Conventions) -> Page:
     """One table for each question, and why it matters."""
     answers = [(_table(answered), Text(answered.question.why)) for answered in result.questions]
     return template.page(
-        "conventions", engines=_engines(result.versions), answers=list(chain(*answers))
+        "conventions", engines=versions_of(result.versions), answers=list(chain(*answers))
     )
 
 
@@ -30,7 +30,7 @@ def calls_page(result: Phrasebook) -> Page:
     wrong = [f"{engine}, {call.concept}: {call.said}" for engine, call in calls if not call.works]
     return template.page(
         "conventions_calls",
-        engines=_engines(result.versions),
+        engines=versions_of(result.versions),
         concepts=[_concept(concept, result) for concept in CONCEPTS],
         wrong=[Verdict(text, False) for text in wrong],
         holds=not wrong,
@@ -50,10 +50,6 @@ def _concept(concept: str, result: Phrasebook) -> Section:
     return Section("", capital(concept), shown)
 
 
-def _engines(versions: Mapping[str, str]) -> str:
-    return ", ".join(f"{engine} {version}".strip() for engine, version in versions.items())
-
-
 def _table(answered: Answered) -> Table:
     """Answers by engine, with a column for the parts of the question if it has any."""
     rows = []
@@ -63,7 +59,7 @@ def _table(answered: Answered) -> Table:
             rows.append(("" if k else engine, finding.of, finding.answer, measured))
         rows += [] if findings is not None else [(engine, "", _NOT_ASKED, "")]
     shown = [0, 1, 2, 3] if any(row[1] for row in rows) else [0, 2, 3]
-    headers = ("", "", "answer", "measured")
+    headers = ("engine", "of", "answer", "measured")
     return Table(
         [headers[k] for k in shown],
         [[row[k] for k in shown] for row in rows],

@@ -22,7 +22,7 @@ TOUCH = {
     True: "Before the first touch, at {touch}, there is no gap.",
     False: "Before the first touch, at {touch}, there is nothing but discretisation.",
 }
-_HEADS = ("quantity", "the gap is", "at h", "h/2", "h/4", "left", "left's own", "right's own")
+_HEADS = ("quantity", "the gap is", "at h", "h/2", "h/4", "at 0", "left's own", "right's own")
 
 
 def page(result: TimestepConvergence, experiment: str, said: Sequence[str] = ()) -> Page:

@@ -98,8 +98,8 @@ def page(diagnosis: Diagnosis) -> Page:
         system=platform.system(),
         machine=platform.machine(),
         tables=[
-            Table(("", "", "found"), machine, "What this machine has", words),
-            Table(("", "found", "for", "extra"), optional, "Optional packages", words),
+            Table(("what", "state", "found"), machine, "What this machine has", words),
+            Table(("package", "found", "for", "extra"), optional, "Optional packages", words),
         ],
         steps=[Text(f"{f.name}: {f.next_step}") for f in findings if f.next_step],
         healthy=True if diagnosis.healthy else None,

@@ -10,7 +10,7 @@ from ..compare.models.ledger import SUBJECTS, Value
 from ..measures.text import after, capital, listed, reading, rounded, sentence, significant
 from ..page import Block, Items, Page, Table, Text
 from . import template
-from .template import if_true
+from .template import if_true, versions_of
 
 _ROWS = 8  # of a table, unless all are asked for
 _MOMENT = "of a part"  # kg m², which are of another size than those of a joint
@@ -91,7 +91,7 @@ def page(result: Compared, everything: bool = False) -> Page:
         "model_diff",
         **{f"{name}_name": _name(side) for name, side in sides.items()},
         **{name: _described(side) for name, side in sides.items()},
-        origin=", ".join(f"{name} {version}" for name, version in result.versions.items()),
+        origin=versions_of(result.versions),
         weight=weigh[0] if weigh[0] == weigh[1] else None,
         weights=listed(weigh) if weigh[0] != weigh[1] else None,
         none_differ=None if matter or result.skipped else True,
@@ -132,7 +132,7 @@ def _described(side: DescribedFile) -> str:
 def _subject(subject: str, found: list[Difference], everything: bool) -> Iterator[Block]:
     rows = list(_rows(subject, found, 1 if everything else 3))
     shown = rows if everything else rows[:_ROWS]
-    headers: list[str] = ["", "left", "right", "apart", _LAST.get(subject, "")]
+    headers: list[str] = ["figure", "left", "right", "apart", _LAST.get(subject, "")]
     keep = [k for k in range(5) if k < 3 or any(row[k] for row in shown)]
     title = SUBJECTS[subject]
     if not any(each.matters for each in found):
@@ -219,7 +219,7 @@ def _equal(agreements: Sequence[AgreedFigures]) -> list[Block]:
     """A row for each subject: how well both sides agree in it."""
     groups = groupby(agreements, key=lambda each: each.subject)
     rows = [_agreement(list(group)) for _, group in groups]
-    heads = ("", "figures", "apart, at most", "to digits")
+    heads = ("subject", "figures", "apart, at most", "to digits")
     return [Table(heads, rows, "What is equal", frozenset({0}))] if rows else []
 
 

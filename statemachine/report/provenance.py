@@ -33,7 +33,7 @@ def emulated(comparison: Comparison) -> list[Block]:
             "Promises of this library, and conventions of its states and forces: "
             f"{'; '.join(rest)}."
         )
-        heading = f"What else is kept around {side.engine}"
+        heading = f"What else this library adds to {side.engine}"
         blocks += template.blocks(
             "provenance",
             engine=side.engine,
@@ -72,7 +72,7 @@ def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
     ]
     labels = comparison.one.label, comparison.two.label
     told = [row for row in rows if any(row[1:])]
-    return Table(("", *labels), told, "What made the two runs", words=frozenset({0, 1, 2}))
+    return Table(("what", *labels), told, "What made the two runs", words=frozenset({0, 1, 2}))
 
 
 def _options(header: Header) -> str:

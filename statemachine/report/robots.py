@@ -216,7 +216,7 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
     }
     rows = [(fact, *map(cell, row.backends.values())) for fact, cell in facts.items()]
     rows = [cells for cells in rows if set(cells[1:]) != {NONE}]
-    table = Table(("", *row.backends), rows, words=frozenset(range(9)))
+    table = Table(("what", *row.backends), rows, words=frozenset(range(9)))
     return template.page(
         "robots_one",
         file=row.file,

@@ -6,7 +6,7 @@ from ..measures.text import count, listed
 from ..page import Page, Table
 from ..sweep import PreparedSweep, SweepSummary
 from . import template
-from .template import if_true
+from .template import if_true, versions_of
 
 
 def page(ready: PreparedSweep, summary: SweepSummary) -> Page:
@@ -18,7 +18,7 @@ def page(ready: PreparedSweep, summary: SweepSummary) -> Page:
     return template.page(
         "sweep",
         what=asked.what.rpartition("/")[2],
-        versions=", ".join(f"{name} {version}" for name, version in ready.versions.items()),
+        versions=versions_of(ready.versions),
         points=count(summary.points, "point"),
         varied=f" ({listed(asked.vary)})" if asked.vary else "",
         seeds=count(asked.seeds, "seed"),

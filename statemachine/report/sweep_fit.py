@@ -77,7 +77,7 @@ def _fit(found: SweepReport, each: BroughtTogether) -> list[Block]:
     right = each.varied == "right"
     return template.blocks(
         "sweep_fit",
-        line=line(found, each),
+        line=[Text(line(found, each))],
         table=[Table(("the fit", each.label), rows, words=frozenset({0, 1}))],
         left=found.sides[0] if right else None,
         right=found.sides[1],

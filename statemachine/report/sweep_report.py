@@ -11,7 +11,7 @@ from ..sweep.analysis_gaps import VERDICTS, GapMap, SettingGap
 from . import template
 from .sweep_fit import line, together
 from .sweep_pictures import axis, bars, map_picture, setting_word
-from .template import if_true
+from .template import if_true, versions_of
 
 _SHOWN = 5  # settings of the largest gaps
 _COLUMNS = 7  # of a map that 80 characters have room for
@@ -49,7 +49,6 @@ def page(found: SweepReport, command: str = "") -> Page:
             Section("sensitive", "What the gap is sensitive to", _sensitive(found)),
             Section("together", "What brings them together", together(found)),
         ]
-    versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
     failed = {f"failed with {kind}": number for kind, number in found.failed.items()}
     counts = {**failed, "have not run": found.missing}
     left_out = [f"{kind}: {number}" for kind, number in counts.items() if number]
@@ -59,7 +58,7 @@ def page(found: SweepReport, command: str = "") -> Page:
         what=found.what,
         left=found.sides[0],
         right=found.sides[1],
-        origin=f"{versions}; {found.folder}" + (f"; {command}" if command else ""),
+        origin="; ".join(filter(None, (versions_of(found.versions), str(found.folder), command))),
         settings=len(found.settings),
         varied=f" over {listed(found.parameters)}" if found.parameters else "",
         seeds=found.seeds,

@@ -13,7 +13,7 @@ A slot whose value is "" stands for a condition; see `if_true`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from string import Formatter
 from typing import Any
@@ -43,6 +43,11 @@ def blocks(name: str, /, **slots: Any) -> list[Block]:
 def if_true(holds: object) -> str | None:
     """The value of a slot at the head of a line that stands there only if something holds."""
     return "" if holds else None
+
+
+def versions_of(versions: Mapping[str, str]) -> str:
+    """Engines and packages with their versions, in a row."""
+    return ", ".join(f"{name} {version}".strip() for name, version in versions.items())
 
 
 def _paragraphs(name: str, slots: dict[str, Any]) -> list[str]:
