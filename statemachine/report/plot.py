@@ -14,7 +14,7 @@ from ..compare import ChaosFloor, Comparison, default_tip, series
 from ..interface import JointType
 from ..measures import COUNT
 from ..measures.text import few, milliseconds, reading, short_time
-from ..page import Text, Traces
+from ..page import Traces
 from ..runs import Header, Trace
 from ..runs.whole import replace_bytes
 from . import template
@@ -145,8 +145,7 @@ def of_trace(trace: Trace) -> Plot:
 def _notes(**slots: object) -> list[str]:
     """What the reader must know: the sentences of `plot.md` that have what they need."""
     none = dict.fromkeys(("two", "changed", "at", "names", "fewer", "not_shown"))
-    shown = template.blocks("plot", **(none | slots))
-    return [block.text for block in shown if isinstance(block, Text)]
+    return template.texts("plot", **(none | slots))
 
 
 def _touches(traces: Sequence[Trace], until: float) -> list[TouchSpans]:

@@ -40,6 +40,11 @@ def blocks(name: str, /, **slots: Any) -> list[Block]:
     return _blocks(_paragraphs(name, slots), slots)
 
 
+def texts(name: str, /, **slots: Any) -> list[str]:
+    """The paragraphs of a template that stand alone, as notes do; arguments as of `page`."""
+    return _paragraphs(name, slots)
+
+
 def if_true(holds: object) -> str | None:
     """The value of a slot at the head of a line that stands there only if something holds."""
     return "" if holds else None
