@@ -94,7 +94,7 @@ def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
     return paragraphs
 
 
-def own_block(text: str, prefix: str = "", always: bool = True) -> Block:
+def own_block(text: str, prefix: str, always: bool) -> Block:
     """The block that a paragraph is.
 
     Args:

@@ -77,5 +77,5 @@ def _blocks(paragraphs: Sequence[str], slots: dict[str, Any]) -> list[Block]:
         elif note != text:
             shown.append(Text(note, small=True))
         else:
-            shown.append(own_block(text))
+            shown.append(own_block(text, "", always=True))
     return shown
