@@ -56,17 +56,17 @@ LEFT_OUT = {
 }
 METHODS = {
     "nothing": None,
-    "one at a time": "They add up, to within {adds_up} of the gap: each takes away as much alone "
-    "as after all others, and explains the mean of the two.",
-    "all sets": "They interact. Each share is the mean of what a cause takes away over all orders "
-    "in which the causes can be brought to the same (Shapley value), over all sets of them.",
-    "drawn orders": "They interact. Each share is the mean of what a cause takes away over "
-    "{orders} drawn orders in which the causes are brought to the same (Shapley value), with its "
+    "one at a time": "The parts add up, to within {adds_up} of the gap: each cause takes away as "
+    "much alone as last, and “explains” is the mean of the two.",
+    "all sets": "The causes interact. “explains” is the mean of what a cause takes away over all "
+    "orders in which the right can be given the left's values (Shapley value, over all sets).",
+    "drawn orders": "The causes interact. “explains” is the mean of what a cause takes away over "
+    "{orders} drawn orders in which the right is given the left's values (Shapley value), with its "
     "standard error.",
 }
 NEXT = {
-    "refused": "What stays may come from what cannot be brought to the same: {causes}. Give both "
-    "sides the same there, and compare again.",
+    "refused": "What stays may come from what cannot be made the same: {causes}. Give both sides "
+    "the same there, and compare again.",
     "engines": "What stays is between the engines. Look at one step at a time (--one-step), which "
     "names the stage, and at the timestep (--converge).",
     "files": "What stays is in nothing that is compared. Look at the function that commands, and "
@@ -84,7 +84,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     """
     only = lacking(result.unmatched, ("the left", "the right"))
     title, *further = [*missing(result.missing), answer(result)]
-    lines = [*further, *said, *only, *result.notes, *proofs(result), result.says]
+    lines = [*map(sentence, (*further, *said, *only, *result.notes)), *proofs(result), result.says]
     rounding, stays = result.is_rounding, not (result.is_rounding or result.is_explained)
     refused = any(row.note for row in result.shares)
     return template.page(
@@ -97,7 +97,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         runs=result.runs,
         took=short_time(result.took),
         moments=result.moments,
-        first=[Text(sentence(line)) for line in lines if line],
+        first=[Text(line) for line in lines if line],
         causes=causes(result),
         changes=steps(result),
         next=_next(result) if stays else None,
