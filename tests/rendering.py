@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from statemachine.report import doctor
+from statemachine.engines import room
+from statemachine.installed import DEFAULT
 
 from .conftest import REQUIRED, ROOT
 
@@ -27,12 +28,12 @@ VIEWS = ((90, -5), (180, -10), (135, -30), (160, -80))
 
 def rendering_environment() -> dict[str, str]:
     """Environment in which MuJoCo renders; skips without one, or fails where CI wants it."""
-    found = doctor._rendering()
-    if not found.works:
+    works, how, _ = room(DEFAULT).drawing_diagnosis()
+    if not works:
         if "render" in REQUIRED:
-            pytest.fail(f"STATEMACHINE_REQUIRE names render: {found.found}")
-        pytest.skip(found.found)
-    chosen = {"MUJOCO_GL": found.found.rpartition("=")[2]} if "=" in found.found else {}
+            pytest.fail(f"STATEMACHINE_REQUIRE names render: {how}")
+        pytest.skip(how)
+    chosen = {"MUJOCO_GL": how.rpartition("=")[2]} if "=" in how else {}
     return {**os.environ, **chosen, "PYTHONPATH": str(ROOT)}
 
 

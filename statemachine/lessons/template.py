@@ -66,7 +66,7 @@ def page(
                 block = blocks[text[1:-1]]
                 page_blocks += block if isinstance(block, Sequence) else [block]
             elif not text.startswith("? ") or next(iter(texts)) in names:
-                page_blocks.append(_block(text, prefix, always="{printed}" not in template))
+                page_blocks.append(own_block(text, prefix, always="{printed}" not in template))
     if not prose:
         page_blocks = [each for each in page_blocks if not isinstance(each, (Text, Question))]
     return Page(title, origin(results), page_blocks)
@@ -94,8 +94,14 @@ def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
     return paragraphs
 
 
-def _block(text: str, prefix: str, always: bool) -> Block:
-    """The block that a paragraph is."""
+def own_block(text: str, prefix: str, always: bool) -> Block:
+    """The block that a paragraph is.
+
+    Args:
+        text: The paragraph, its slots filled.
+        prefix: Whose it is.
+        always: Whether a question is shown even where nobody can answer.
+    """
     marked = _MARKED.fullmatch(text)
     if text.startswith("## "):
         return Heading(text.removeprefix("## "))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from ..engines.futures import FutureGap, worst
-from ..measures.text import NONE, capital, milliseconds, rough
-from ..page import Block, Items, Page, Table, Text, Verdict
+from ..measures.text import NONE, milliseconds, rough
+from ..page import Block, Items, Page, Table, Text
 from ..probes.audit import Audit, Audited
 from ..probes.audit.trials import (
     AGAIN,
@@ -21,57 +22,21 @@ from ..probes.audit.trials import (
     WITHOUT,
     AuditFinding,
 )
+from . import template
+from .template import if_true
 
 _OF_THE_STATE = (RESTORE, WITHOUT, FORGETS, NO_CONTACTS)
 _AT_REST = 1e-2  # of the fastest joint or body [rad/s or m/s]
-_SAME = "same"
 
-ORIGIN = "{model} on {engines}, {timestep} a step, seed {seed}"
-METHOD = (
-    "A run is saved, and goes on. Then it is restored, and goes on again. Are all positions and "
-    "velocities the same, byte for byte, right after the restore and after each of {steps} steps? "
-    "What was saved is restored in three places: in the run itself; in a fresh one; and in a used "
-    "one, which had other commands before and, where they stay, has forces left applied. A cell "
-    "says 'same' if every byte is. Otherwise it gives the largest difference: of a joint or an "
-    "orientation in °, of a slide or a free body in mm; or 'bytes', if only bytes differ."
-)
-NOT_ASKED = "{backend} itself, by its own functions, was not asked."
-NOT_TRIED = "Not tried: {what}."
-PLACES = "{name}: where runs are saved (speeds in rad/s or m/s)"
-BY_POINT = "{name}: restored, against going on"
-BY_TARGET = "{name}: the same, by what it is restored in"
-FORGOTTEN = "{name}: changed after the save, at {point}, and then restored"
-TOUCHING = "{name}: in a fresh one, with and without contacts"
-PROMISES = "{name}: what should change nothing"
-DIFFERS = "{name}: what changes the bytes that follow, at the worst"
-NEEDED = "{name}: what has to be restored, and by how much the run differs without it"
-FALLEN = (
-    "Among the runs with a call before each step are {number} of another model: {boxes} boxes fall "
-    "onto each other, {steps} steps each. Contacts come and go there."
-)
-KEPT = "{name}: kept at every save point at which they were tried: {kept} of {promises} promises"
-
-# What follows; each holds only if it has something to name.
-SUFFICES = (
-    "{name}: the state that suffices: {what}. The bytes are the same at every save point, whatever "
-    "it was restored in."
-)
-NOTHING_SUFFICES = (
-    "{name}: no candidate suffices: none has the same bytes at every save point, whatever it is "
-    "restored in."
-)
-ALONE = {
-    True: "{name}: what has to be restored suffices alone: it was tried.",
-    False: "{name}: what has to be restored does not suffice alone.",
+# What follows beside the state; each holds only if it has something to name.
+FACTS = {
+    "idle": "Nothing differs without {what}.",
+    "read back": "Before any step, not every byte reads back as it was saved: {what}.",
+    "in contact": "What cannot be written acts through contacts, at {what}.",
+    "agree": "All restores of one state have one future, though not that of the run: {what}.",
+    "history": "What did bring every future back is a new one, and the whole past once more: here "
+    "the state is the history.",
 }
-IDLE = "nothing differs without {what}"
-READ_BACK = "before any step, not every byte reads back as it was saved: {what}"
-IN_CONTACT = "what cannot be written acts through contacts, at {what}"
-AGREE = "all restores of one state have one future, though not that of the run: {what}"
-HISTORY = (
-    "what did bring every future back is a new one, and the whole past once more: here the state "
-    "is the history"
-)
 
 
 def page(results: Mapping[str, Audit]) -> Page:
@@ -81,31 +46,42 @@ def page(results: Mapping[str, Audit]) -> Page:
         results: By backend.
     """
     first = next(iter(results.values()))
-    blocks: list[Block] = [Text(METHOD.format(steps=first.steps))]
+    tables: list[Block] = []
     for backend, result in results.items():
-        blocks.append(_places(result.audited[0]))
+        tables.append(_places(result.audited[0]))
         if result.audited[0].layer != "engine":
-            blocks.append(Text(NOT_ASKED.format(backend=backend)))
-        for one in result.audited:
-            blocks += [*_of_one(one), *_promises(one)]
+            tables.append(Text(f"{backend} itself, by its own functions, was not asked."))
+        for driver in result.audited:
+            tables += _of_driver(driver)
         if result.without:
-            blocks.append(Text(NOT_TRIED.format(what="; ".join(result.without))))
-    blocks += [b for r in results.values() for one in r.audited for b in _conclusion(one)]
-    made = first.provenance
-    of = [result.provenance for result in results.values()]
-    origin = ORIGIN.format(
-        model=made.model_file,
-        engines=", ".join(f"{each.backend} {each.versions[each.backend]}" for each in of),
-        timestep=milliseconds(made.timestep),
-        seed=made.seed,
+            tables.append(Text(f"Not tried: {'; '.join(result.without)}."))
+    versions = [(r.provenance.backend, r.provenance.versions) for r in results.values()]
+    drivers = [driver for result in results.values() for driver in result.audited]
+    return template.page(
+        "audit",
+        model=first.provenance.model_file,
+        engines=", ".join(f"{backend} {each[backend]}" for backend, each in versions),
+        timestep=milliseconds(first.provenance.timestep),
+        seed=first.provenance.seed,
+        steps=first.steps,
+        tables=tables,
+        conclusions=[block for driver in drivers for block in _conclusion(driver)],
     )
-    return Page("What exactly is the state?", origin, blocks)
 
 
-def _of_one(one: Audited) -> list[Block]:
-    """What was found of the state of one driver."""
-    rows = _candidates(one)
-    return [_by_point(one, rows), Text(one.legend), _by_target(one, rows), *_forgotten(one)]
+def _of_driver(driver: Audited) -> list[Block]:
+    """What was found of the state of one driver, and of what should change nothing."""
+    rows = _candidates(driver)
+    return template.blocks(
+        "audit_driver",
+        name=driver.name,
+        by_point=[_by_point(driver, rows)],
+        legend=driver.legend,
+        by_target=[_by_target(driver, rows)],
+        forgotten=_forgotten(driver),
+        touching=_touching(driver),
+        **_promises(driver),
+    )
 
 
 def _places(one: Audited) -> Table:
@@ -123,7 +99,7 @@ def _places(one: Audited) -> Table:
     return Table(
         ("save point", "how to get there", "after", "speed", "contacts", "limits"),
         rows,
-        title=PLACES.format(name=one.name),
+        title=f"{one.name}: where runs are saved (speeds in rad/s or m/s)",
         words=frozenset({0, 1}),
     )
 
@@ -147,7 +123,7 @@ def _by_point(one: Audited, rows: Mapping[str, Sequence[AuditFinding]]) -> Table
             (name, *(_worst(each for each in of if each.point == point) for point in points))
             for name, of in against.items()
         ],
-        title=BY_POINT.format(name=one.name),
+        title=f"{one.name}: restored, against going on",
     )
 
 
@@ -166,56 +142,49 @@ def _by_target(one: Audited, rows: Mapping[str, Sequence[AuditFinding]]) -> Tabl
     return Table(
         ("what is restored", *kinds, EACH_OTHER, "from step"),
         shown,
-        title=BY_TARGET.format(name=one.name),
+        title=f"{one.name}: the same, by what it is restored in",
     )
 
 
 def _forgotten(one: Audited) -> list[Block]:
-    """What is changed after a save and not brought back; and what contacts have to do with it."""
+    """What is changed after a save and not brought back."""
     of = [each for each in one.findings if each.experiment == FORGETS]
-    blocks: list[Block] = []
-    if of:
-        cells = {(each.into, each.case): each.gap.exact for each in of}
-        what = list(dict.fromkeys(each.case for each in of))
-        ways = [way for way in dict.fromkeys(each.into for each in of) if way != NOT_RESTORED]
+    if not of:
+        return []
+    cells = {(each.into, each.case): each.gap.exact for each in of}
+    cases = list(dict.fromkeys(each.case for each in of))
+    ways = [way for way in dict.fromkeys(each.into for each in of) if way != NOT_RESTORED]
 
-        def word(way: str, case: str) -> str:
-            if cells[NOT_RESTORED, case]:
-                return "does not show"
-            return "brought back" if cells[way, case] else "stays"
+    def word(way: str, case: str) -> str:
+        if cells[NOT_RESTORED, case]:
+            return "does not show"
+        return "brought back" if cells[way, case] else "stays"
 
-        blocks.append(
-            Table(
-                ("restored by", *what),
-                [(way, *(word(way, case) for case in what)) for way in ways],
-                title=FORGOTTEN.format(name=one.name, point=of[0].point),
-                words=frozenset(range(len(what) + 1)),
-            )
-        )
-    touching = one.conclusion.touching
-    if touching:
-        case = next(each.case for each in one.findings if each.experiment == NO_CONTACTS)
-        blocks.append(
-            Table(
-                (f"restored: {case}", *touching),
-                [
-                    ("as it stands", *(cell(standing) for standing, _ in touching.values())),
-                    ("contacts switched off", *(cell(off) for _, off in touching.values())),
-                ],
-                title=TOUCHING.format(name=one.name),
-            )
-        )
-    return blocks
+    rows = [(way, *(word(way, case) for case in cases)) for way in ways]
+    title = f"{one.name}: changed after the save, at {of[0].point}, and then restored"
+    return [Table(("restored by", *cases), rows, title, words=frozenset(range(len(cases) + 1)))]
 
 
-def _promises(one: Audited) -> list[Block]:
-    """What should change nothing."""
+def _touching(one: Audited) -> list[Block]:
+    """What contacts have to do with what is not restored."""
+    gaps = one.conclusion.touching
+    if not gaps:
+        return []
+    case = next(each.case for each in one.findings if each.experiment == NO_CONTACTS)
+    rows = [
+        ("as it stands", *(cell(standing) for standing, _ in gaps.values())),
+        ("contacts switched off", *(cell(off) for _, off in gaps.values())),
+    ]
+    title = f"{one.name}: in a fresh one, with and without contacts"
+    return [Table((f"restored: {case}", *gaps), rows, title)]
+
+
+def _promises(one: Audited) -> dict[str, Any]:
+    """What should change nothing: slots of `audit_driver.md`."""
     tried: dict[tuple[str, str, bool], list[AuditFinding]] = {}
     for each in one.findings:
         if each.experiment not in _OF_THE_STATE or each.promised:
             tried.setdefault((each.case, each.into, each.promised), []).append(each)
-    if not tried:
-        return []
     rows, differ, broken = [], [], []
     for (case, into, promised), of in tried.items():
         off = [each for each in of if not each.gap.exact]
@@ -226,19 +195,24 @@ def _promises(one: Audited) -> list[Block]:
             gap = worst([each.gap for each in off])
             sizes = rough(gap.length, "m"), rough(gap.angle, "rad"), str(gap.first)
             differ.append((case, ", ".join(each.point for each in off), *sizes))
-    promises = sum(promised for *_, promised in tried)
-    drops = {each.point for each in one.findings if each.point.startswith(FALL)}
-    fallen = FALLEN.format(number=len(drops), boxes=BOXES, steps=STEPS)
-    kept = KEPT.format(name=one.name, kept=promises - sum(broken), promises=promises)
+    promised = sum(promised for *_, promised in tried)
     heads = ("what is done", "compared with", "same bytes at", "promised")
     emphasis = frozenset(k for k, is_broken in enumerate(broken) if is_broken)
-    words = frozenset({0, 1, 2, 3})
-    title = PROMISES.format(name=one.name)
-    blocks: list[Block] = [Table(heads, rows, title, words=words, emphasis=emphasis)]
-    if differ:
-        heads = ("what is done", "differs at", "by", "and", "from step")
-        blocks.append(Table(heads, differ, DIFFERS.format(name=one.name), words=frozenset({0, 1})))
-    return [*blocks, *([Text(fallen)] if drops else []), Verdict(kept, not any(broken))]
+    title = f"{one.name}: what should change nothing"
+    changes = ("what is done", "differs at", "by", "and", "from step")
+    changing = f"{one.name}: what changes the bytes that follow, at the worst"
+    return {
+        "promises": [Table(heads, rows, title, words=frozenset(range(4)), emphasis=emphasis)]
+        if rows
+        else [],
+        "differing": [Table(changes, differ, changing, words=frozenset({0, 1}))] if differ else [],
+        "drops": len({each.point for each in one.findings if each.point.startswith(FALL)}) or None,
+        "boxes": BOXES,
+        "steps": STEPS,
+        "holds": not any(broken) if tried else None,
+        "intact": promised - sum(broken),
+        "promised": promised,
+    }
 
 
 _PROMISED = {(True, False): "yes", (True, True): "yes, broken", (False, False): "no"}
@@ -254,39 +228,42 @@ def _conclusion(one: Audited) -> list[Block]:
     of = one.conclusion
     again = [each.gap.exact for each in one.findings if each.experiment == AGAIN]
     facts = {
-        IDLE: of.idle,
-        READ_BACK: [f"{name} (at {', '.join(at)})" for name, at in of.not_read_back.items()],
-        IN_CONTACT: of.in_contact,
-        AGREE: [name for name in of.agree if name not in of.suffice],
-        HISTORY: [AGAIN] if again and all(again) and not of.suffice else [],
+        "idle": of.idle,
+        "read back": [f"{name} (at {', '.join(at)})" for name, at in of.not_read_back.items()],
+        "in contact": of.in_contact,
+        "agree": [name for name in of.agree if name not in of.suffice],
+        "history": [AGAIN] if again and all(again) and not of.suffice else [],
     }
-    suffices = SUFFICES if of.suffice else NOTHING_SUFFICES
-    blocks: list[Block] = [Text(suffices.format(name=one.name, what=" or ".join(of.suffice)))]
-    if of.missing:
-        rows = [
-            (each.field, *_where(each.itself, one), cell(each.gap), str(each.gap.first))
-            for each in of.missing
-        ]
-        heads = ("left out", "the run itself differs at", "differs by", "from step")
-        words = frozenset({0, 1})
-        blocks.append(Table(heads, rows, NEEDED.format(name=one.name), words=words))
-    if of.smallest is not None:
-        blocks.append(Text(ALONE[of.smallest].format(name=one.name)))
-    lines = [capital(text.format(what=", ".join(what))) for text, what in facts.items() if what]
-    return [*blocks, Items([f"{line}." for line in lines])] if lines else blocks
+    lines = [FACTS[name].format(what=", ".join(what)) for name, what in facts.items() if what]
+    rows = [
+        (each.field, _where(each.itself, one), cell(each.gap), str(each.gap.first))
+        for each in of.missing
+    ]
+    heads = ("left out", "the run itself differs at", "differs by", "from step")
+    title = f"{one.name}: what has to be restored, and by how much the run differs without it"
+    return template.blocks(
+        "audit_conclusion",
+        name=one.name,
+        suffices=" or ".join(of.suffice) or None,
+        none_suffices=if_true(not of.suffice),
+        needed=[Table(heads, rows, title, words=frozenset({0, 1}))] if rows else [],
+        alone=if_true(of.smallest is True),
+        not_alone=if_true(of.smallest is False),
+        facts=[Items(lines)] if lines else [],
+    )
 
 
-def _where(points: Sequence[str], one: Audited) -> tuple[str]:
+def _where(points: Sequence[str], one: Audited) -> str:
     """Save points where the run itself needs a field; without one, only a used run does."""
     if len(points) == len(one.points):
-        return ("all",)
-    return (", ".join(points) or "none; only a used one does",)
+        return "all"
+    return ", ".join(points) or "none; only a used one does"
 
 
 def cell(off: FutureGap) -> str:
     """The larger of angle and length, or that every byte is the same."""
     if off.exact:
-        return _SAME
+        return "same"
     if not off.size:  # of a velocity, or a 0 that became -0
         return "bytes"
     if off.angle >= off.length:

@@ -8,59 +8,50 @@ from itertools import groupby, zip_longest
 from ..engines import room
 from ..engines.call_watch import CallWords
 from ..interface import DERIVED
-from ..measures.text import NONE
+from ..measures.text import NONE, few
 from ..page import Block, Code, Table, Text
 from ..probes.calls import Call, CallRecording, Statement
+from . import template
 
-_MOST_NAMES = 8  # of what a call changed
-_MOST_ROWS = 6  # of the calls on one thing, before those that changed nothing share one
-_NO_OBJECT = "no object"
+_NAMES_SHOWN = 8  # of what a call changed
+_ROWS_SHOWN = 6  # of the calls on one thing, before those that changed nothing share one
 
 
 def blocks(recordings: Mapping[str, CallRecording]) -> list[Block]:
     """Blocks for the recordings of one code, by engine; the code's backend may differ."""
-    found: list[Block] = [_heading(recordings)]
-    for statements in zip_longest(*(each.statements for each in recordings.values())):
-        ran = {
-            name: statement
-            for name, statement in zip(recordings, statements, strict=True)
-            if statement is not None
-        }
+    several = len(recordings) > 1
+    prefix = {name: f"{name}: " if several else "" for name in recordings}
+    looks = [f"{prefix[name]}{_words(each.engine).shown}" for name, each in recordings.items()]
+    statements: list[Block] = []
+    for together in zip_longest(*(each.statements for each in recordings.values())):
+        pairs = zip(recordings, together, strict=True)
+        ran = {name: statement for name, statement in pairs if statement is not None}
         first = next(iter(ran.values()))
         if first.source.startswith(("import ", "from ")) and not any(
             each.calls or each.changed for each in ran.values()
         ):
             continue
         sources = dict.fromkeys(each.source for each in ran.values())
-        found.append(Code([line for source in sources for line in source.splitlines()]))
-        found += _answers(ran)
-    for name, recording in recordings.items():
-        if recording.error:
-            found.append(Text(f"{_prefix(name, recordings)}The run ended there: {recording.error}"))
-    return [*found, *_legend(recordings)]
+        statements.append(Code([line for source in sources for line in source.splitlines()]))
+        statements += _answers(ran)
+    return template.blocks(
+        "calls",
+        engines=" and ".join(f"{name} {each.version}" for name, each in recordings.items()),
+        none=NONE,
+        looks="; ".join(looks),
+        statements=statements,
+        ended=[
+            Text(f"{prefix[name]}The run ended there: {recording.error}")
+            for name, recording in recordings.items()
+            if recording.error
+        ],
+        legend=list(_legend(recordings)),
+    )
 
 
 def not_asked(backend: str) -> Text:
     """What is said of a backend whose engine has no room that tells of its calls."""
     return Text(f"{backend}: not asked which of its own functions it ran.")
-
-
-def _prefix(name: str, recordings: Mapping[str, CallRecording]) -> str:
-    return f"{name}: " if len(recordings) > 1 else ""
-
-
-def _heading(recordings: Mapping[str, CallRecording]) -> Text:
-    engines = " and ".join(f"{name} {each.version}" for name, each in recordings.items())
-    looks = "; ".join(
-        f"{_prefix(name, recordings)}{_words(recording.engine).shown}"
-        for name, recording in recordings.items()
-    )
-    return Text(
-        f"The engine's own words, recorded from this run on {engines}: under each line, the "
-        "functions of the engine that it made run, how often, and what differed after a call, "
-        f"bit by bit ({NONE} is nothing that shows there). Looked at, before and after each "
-        f"call: {looks}. Looking takes time: what the code prints of the clock is not the engine's."
-    )
 
 
 def _answers(ran: Mapping[str, Statement]) -> Iterator[Block]:
@@ -90,7 +81,8 @@ def _table(engine: str, statement: Statement) -> Table:
     titles: set[int] = set()
     for (owner, on), group in groupby(statement.calls, key=lambda call: (call.engine, call.on)):
         titles.add(len(rows))
-        rows.append((_title(owner, on, engine), "", ""))
+        of = "" if owner == engine else f"{owner}: "
+        rows.append((f"{of}{on or 'no object'}", "", ""))
         rows += _rows(list(group))
     if statement.changed:
         computed = [each for each in statement.changed if each.rpartition(".")[2] in DERIVED]
@@ -110,15 +102,10 @@ def _table(engine: str, statement: Statement) -> Table:
     )
 
 
-def _title(owner: str, on: str, engine: str) -> str:
-    where = on or _NO_OBJECT
-    return where if owner == engine else f"{owner}: {where}"
-
-
 def _rows(calls: Sequence[Call]) -> Iterator[tuple[str, str, str]]:
     """The calls on one thing; where they are many, those without effect in one row."""
     idle = [call for call in calls if not call.changed]
-    together = len(calls) > _MOST_ROWS and len(idle) > 1
+    together = len(calls) > _ROWS_SHOWN and len(idle) > 1
     for call in calls:
         if call.changed or not together:
             yield f"  {call.function}", f"{call.count:,}", _names(call.changed)
@@ -132,9 +119,8 @@ def _rows(calls: Sequence[Call]) -> Iterator[tuple[str, str, str]]:
 
 
 def _names(changed: Sequence[str]) -> str:
-    if len(changed) <= _MOST_NAMES + 1:
-        return ", ".join(changed) or NONE
-    return f"{', '.join(changed[:_MOST_NAMES])} and {len(changed) - _MOST_NAMES} more"
+    shown = _NAMES_SHOWN if len(changed) > _NAMES_SHOWN + 1 else len(changed)
+    return few(changed, shown) or NONE
 
 
 def _words(engine: str) -> CallWords:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from ..probes.phrasebook import CONCEPTS, Phrasebook
+from .template import versions_of
 
 # With this library, concept by concept: a program, as the engines' own cells are.
 OURS = {
@@ -52,7 +53,7 @@ def cheat_sheet(table: Phrasebook) -> str:
             for column in columns.values()
         )
         rows.append(f"<tr><th>{escape(concept)}</th>{row}</tr>")
-    versions = ", ".join(f"{name} {version}" for name, version in table.versions.items())
+    versions = versions_of(table.versions)
     lines = "\n".join(f"- {text} (`lesson {lesson}`)" for lesson, text in REMEMBER)
     body = "\n".join(rows)
     return (

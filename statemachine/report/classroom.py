@@ -8,6 +8,7 @@ from ..grading.class_table import NOTHING, ClassEntry
 from ..grading.judges import JUDGES
 from ..measures.text import count
 from ..page import Page, Table, Text, Verdict
+from . import template
 
 
 def page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
@@ -34,20 +35,21 @@ def page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
         words=frozenset(all_words),
         wide=frozenset(k for k, name in enumerate(shown) if name in wide),
     )
-    blocks: list[Text | Table | Verdict] = [table]
-    solved = sum(entry.right == len(JUDGES) for entry in entries)
-    files = count(sum(entry.refusal != NOTHING for entry in entries), "file")
-    blocks.append(Text(f"All functions are right in {solved} of {files}."))
-    if ignored:
-        blocks.append(Text(f"No Python files, and not looked at: {', '.join(ignored)}."))
-    for entry in entries:
-        if entry.same_as:
-            blocks.append(Text(f"{entry.name} has the same code as {entry.same_as}."))
-        blocks += [Text(f"{entry.name}: {look}") for look in entry.looks]
-    unjudged = [entry for entry in entries if not entry.judged]
-    for entry in unjudged:
-        text = entry.refusal or next(e.remarks[0] for e in entry.functions if not e.judged)
-        blocks.append(Verdict(f"{entry.name} could not be judged: {text}", False))
-    if not unjudged:
-        blocks.append(Verdict("every file was judged", True))
-    return Page(f"{files} of a class", entries[0].made_with, blocks)
+    copies = [(e.name, f"has the same code as {e.same_as}.") for e in entries if e.same_as]
+    looks = [(f"{entry.name}:", look) for entry in entries for look in entry.looks]
+    unjudged = {
+        entry.name: entry.refusal or next(e.remarks[0] for e in entry.functions if not e.judged)
+        for entry in entries
+        if not entry.judged
+    }
+    return template.page(
+        "classroom",
+        files=count(sum(entry.refusal != NOTHING for entry in entries), "file"),
+        made_with=entries[0].made_with,
+        table=[table],
+        solved=sum(entry.right == len(JUDGES) for entry in entries),
+        ignored=", ".join(ignored) or None,
+        notes=[Text(f"{name} {note}") for name, note in (*copies, *looks)],
+        unjudged=[Verdict(f"{n} could not be judged: {why}", False) for n, why in unjudged.items()],
+        all_judged=None if unjudged else True,
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from ..compare import (
     Agreement,
@@ -21,7 +22,7 @@ from ..measures.text import NONE, milliseconds, quantity, sentence
 from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
 from ..runs import Trace
 from ..witness import SAME_READING
-from . import why
+from . import template, why
 from .commanded import commanded
 from .contacts import contact_words
 from .events import Event, events_of, events_table
@@ -39,11 +40,10 @@ from .floor import floor_words
 from .loops import also_open, loops, told, unmatched
 from .over_time import BothRuns, QuantityChart, charts_of
 from .provenance import emulated, provenance
+from .template import if_true
 
 _ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
 _HEADERS = ("quantity", "verdict", "largest", "at, s", "RMS", "settled", "from, s", "tolerance")
-AGREEING = "Those that agree: {count}"
-MORE = "Quantities that have no chart, because they are nearer to agreement or not finite: {count}."
 _EMULATED = ("emulated", "What is emulated")
 
 
@@ -88,7 +88,7 @@ def page(
     both = _over_time(comparison, one, two, curves, events, explanation, tip, floor)
     reasons: list[Block] = [Text(why_not)] if why_not else []
     if explanation is not None:
-        reasons = [*why.causes(explanation), *_three(explanation)]
+        reasons = [*why.causes(explanation), *why.three_parts(explanation)]
     kept = emulated(comparison)
     agree = why.steps(explanation) if explanation is not None else []
     made_by = [Text("This page was made by:"), Code([command])] if command else []
@@ -110,7 +110,7 @@ def page(
         *([Text(one.header.says)] if one.header.says else []),
         *told(run),
         *commanded(one, two, labels),
-        *in_words(comparison, events, explanation),
+        *in_words(comparison),
         *(() if comparison.ended else contact_words(comparison, touching)),
         *([Items(notes)] if notes else []),
         both,
@@ -136,34 +136,21 @@ def _over_time(
     floor: ChaosFloor | None,
 ) -> BothRuns:
     """The scene and a chart for each quantity that is a number throughout."""
-    found = {each.name: each for each in comparison.agreements}
     charts = charts_of(comparison, one, two, curves, floor)
     of, most = subject(comparison, explanation), leading(comparison)
     lead = [k for k, chart in enumerate(charts) if most and chart.curve.name == most.name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
-    moments = {each.at for each in found.values()}
-    moments |= {each.since for each in found.values() if each.since is not None}
     return BothRuns(
         comparison.one.experiment,
         one,
         two,
-        long_labels(comparison),
-        short_labels(comparison),
+        comparison,
         default_tip(one.header, two.header) if tip is None else tip,
-        comparison.until,
         0.0 if of is None else of.at,
-        tuple(sorted(moments)),
         tuple(events),
         charts,
         tuple(dict.fromkeys(lead))[:2] or (0,),
     )
-
-
-def _three(explanation: Explanation) -> list[Block]:
-    """The three parts of the gap, and what they mean; nothing where there is none to explain."""
-    if explanation.is_rounding:
-        return []
-    return [Text(f"{why.parts(explanation)}."), Text(why.THREE, small=True)]
 
 
 def _sorted(charts: Sequence[QuantityChart], total: int) -> list[Block]:
@@ -173,9 +160,10 @@ def _sorted(charts: Sequence[QuantityChart], total: int) -> list[Block]:
     beyond: list[Block] = [chart for chart in ranked if chart.found.verdict != "agrees"]
     within: list[Block] = [chart for chart in ranked if chart.found.verdict == "agrees"]
     if beyond and within:
-        within = [Section("", AGREEING.format(count=len(within)), within, folded=True)]
-    more = [Text(MORE.format(count=total - len(charts)))] if total > len(charts) else []
-    return [*beyond, *within, *more]
+        within = [Section("", f"Those that agree: {len(within)}", within, folded=True)]
+    left_out = total - len(charts)
+    text = f"Quantities without a chart, nearer to agreement or not finite: {left_out}."
+    return [*beyond, *within, *([Text(text)] if left_out else [])]
 
 
 def _figures(
@@ -183,49 +171,36 @@ def _figures(
 ) -> list[Block]:
     """Figures and verdicts, the floor, the reasons of tolerances, what a third party says."""
     one, two = short_labels(comparison)
-    agreements = comparison.agreements
-    more: list[Block] = []
-    text = "Neither side is the truth, and two engines that agree may both be wrong."
+    agreements, checked = comparison.agreements, list[Block]()
+    sides: dict[str, Any] = dict.fromkeys(("site", "rows", "by", "left_off", "right_off"))
     if witness is not None:
-        text += (
-            f" So a third party was asked where {witness.site} is in each of {witness.rows} "
-            f"poses: {witness.by} puts it within {1e3 * witness.one:.0e} mm of {one}'s and "
-            f"within {1e3 * witness.two:.0e} mm of {two}'s."
-        )
-        checked = f"That checks where {witness.site} is for given joint angles, not the motion."
-        if witness.grade == SAME_READING:
-            checked += (
-                " Its parser cannot read the model's file, so it computed from the numbers that "
-                "the file was compiled to: a misreading of the file would be in them."
-            )
-        more.append(Section("", "", [Text(checked)], detail=True))
-    return [
-        Table(
-            _HEADERS if floor is None else (*_HEADERS, "floor", "inside from, s"),
-            [(*_row(found), *_floor_cells(found, floor)) for found in agreements],
-            f"{one} against {two}: how far apart",
-            words=frozenset({0, 1}),
-            emphasis=frozenset(
-                k for k, found in enumerate(agreements) if found.verdict == "differs"
-            ),
-            wide=frozenset({7, 8, 9}) if floor else frozenset({7}),
-        ),
-        Text(
-            f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled: the "
-            f"mean over {window(comparison)} (of forces: how far apart the means are). From: when "
-            "first beyond tolerance. A quantity agrees if it never is; it settles if it is within "
-            "its tolerance at the end, and DIFFERS otherwise."
-        ),
-        *(floor_words(comparison, floor) if floor else []),
-        Table(
-            ("quantities", "tolerance", "because"),
-            _reasons(comparison),
-            "What does not matter, and why",
-            words=frozenset({0, 2}),
-        ),
-        Text(text),
-        *more,
-    ]
+        compiled = if_true(witness.grade == SAME_READING)
+        text = template.blocks("compare_witness", site=witness.site, compiled=compiled)
+        checked.append(Section("", "", text, detail=True))
+        sides = {name: getattr(witness, name) for name in ("site", "rows", "by")}
+        sides |= {"left_off": f"{1e3 * witness.one:.0e}", "right_off": f"{1e3 * witness.two:.0e}"}
+    figures = Table(
+        _HEADERS if floor is None else (*_HEADERS, "floor", "inside from, s"),
+        [(*_row(found), *_floor_cells(found, floor)) for found in agreements],
+        f"{one} against {two}: how far apart",
+        words=frozenset({0, 1}),
+        emphasis=frozenset(k for k, found in enumerate(agreements) if found.verdict == "differs"),
+        wide=frozenset({7, 8, 9}) if floor else frozenset({7}),
+    )
+    heads, title = ("quantities", "tolerance", "because"), "What does not matter, and why"
+    return template.blocks(
+        "compare_figures",
+        figures=[figures],
+        moments=comparison.moments,
+        until=comparison.until,
+        window=window(comparison),
+        floor=floor_words(comparison, floor) if floor else [],
+        reasons=[Table(heads, _reasons(comparison), title, words=frozenset({0, 2}))],
+        left=one,
+        right=two,
+        checked=checked,
+        **sides,
+    )
 
 
 def _row(found: Agreement) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from ..measures.text import NONE, figure, quantity, short_time
 from ..page import Block, Table, TableCell
 from .finding import short_labels, window
 
-_MOST = 3  # pairs of bodies that have rows: those that press hardest
+_PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
 _HEADS = ("bodies", "side", "force, N", "with friction, N", "deepest", "at, s", "last touch")
 TITLE = "Who presses on what ({shown} of {pairs} pairs; forces are means over {window})"
 
@@ -20,11 +20,11 @@ def contact_words(comparison: Comparison, touches: Sequence[Touch]) -> list[Bloc
     labels = short_labels(comparison)
     rows = [
         _row(touch.pair, label, side)
-        for touch in ranked[:_MOST]
+        for touch in ranked[:_PAIRS_SHOWN]
         for label, side in zip(labels, (touch.one, touch.two), strict=True)
     ]
     title = TITLE.format(
-        shown=min(_MOST, len(ranked)), pairs=len(ranked), window=window(comparison)
+        shown=min(_PAIRS_SHOWN, len(ranked)), pairs=len(ranked), window=window(comparison)
     )
     return (
         [Table(_HEADS, rows, title, words=frozenset({0, 1}), wide=frozenset({5}))] if rows else []

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from itertools import chain
 
 from ..engines.measured import Measurement
 from ..measures.text import capital, reading, significant
 from ..page import Block, Code, Page, Section, Table, Text, Verdict
 from ..probes.conventions import Answered, Conventions
 from ..probes.phrasebook import CONCEPTS, Phrasebook
+from . import template
+from .template import versions_of
 
 _ZERO = 1e-12
 _NOT_ASKED = "not asked"
@@ -16,56 +18,53 @@ _NOT_ASKED = "not asked"
 
 def page(result: Conventions) -> Page:
     """One table for each question, and why it matters."""
-    blocks: list[Block] = [
-        Text(
-            "The engines themselves were asked, each question on a small model made for it. The "
-            "lessons ask this project's backends instead, which make every engine keep one "
-            "contract. So an answer here may differ from what a lesson shows on the same engine."
-        )
-    ]
-    for answered in result.questions:
-        blocks += [_table(answered), Text(answered.question.why)]
-    return Page("What the engines take for granted", _origin(result.versions), blocks)
+    answers = [(_table(answered), Text(answered.question.why)) for answered in result.questions]
+    return template.page(
+        "conventions", engines=versions_of(result.versions), answers=list(chain(*answers))
+    )
 
 
 def calls_page(result: Phrasebook) -> Page:
     """For each concept what to type on each engine, and whether all of it did what it should."""
-    blocks: list[Block] = []
-    for concept in CONCEPTS:
-        shown: list[Block] = []
-        for engine, calls in result.engines.items():
-            call = next((each for each in calls if each.concept == concept), None)
-            if call is None:
-                shown.append(Text(f"{engine}: {_NOT_ASKED}"))
-                continue
-            shown += [Text(f"{engine} {'✓' if call.works else '✗'}"), Code(call.code.splitlines())]
-        blocks.append(Section("", capital(concept), shown))
-    every = [(engine, call) for engine, calls in result.engines.items() for call in calls]
-    wrong = [(engine, call) for engine, call in every if not call.works]
-    blocks += [Verdict(f"{engine}, {call.concept}: {call.said}", False) for engine, call in wrong]
-    count = f"{len(every) - len(wrong)} of {len(every)} calls ran"
-    blocks.append(Verdict(f"{count}, and what they should do happened", not wrong))
-    return Page("Which call does what", _origin(result.versions), blocks)
+    calls = [(engine, call) for engine, those in result.engines.items() for call in those]
+    wrong = [f"{engine}, {call.concept}: {call.said}" for engine, call in calls if not call.works]
+    return template.page(
+        "conventions_calls",
+        engines=versions_of(result.versions),
+        concepts=[_concept(concept, result) for concept in CONCEPTS],
+        wrong=[Verdict(text, False) for text in wrong],
+        holds=not wrong,
+        right=len(calls) - len(wrong),
+        total=len(calls),
+    )
 
 
-def _origin(versions: Mapping[str, str]) -> str:
-    return ", ".join(f"{engine} {version}".strip() for engine, version in versions.items())
+def _concept(concept: str, result: Phrasebook) -> Section:
+    """What to type for a concept, engine by engine."""
+    shown: list[Block] = []
+    for engine, calls in result.engines.items():
+        call = next((each for each in calls if each.concept == concept), None)
+        state = f": {_NOT_ASKED}" if call is None else " ✓" if call.works else " ✗"
+        shown.append(Text(f"{engine}{state}"))
+        shown += [Code(call.code.splitlines())] if call else []
+    return Section("", capital(concept), shown)
 
 
 def _table(answered: Answered) -> Table:
-    parts = any(finding.of for each in answered.findings.values() for finding in each or ())
+    """Answers by engine, with a column for the parts of the question if it has any."""
     rows = []
     for engine, findings in answered.findings.items():
-        if findings is None:
-            rows.append((engine, *([""] if parts else []), _NOT_ASKED, ""))
-            continue
-        for k, finding in enumerate(findings):
+        for k, finding in enumerate(findings or ()):
             measured = ", ".join(_text(figure) for figure in finding.figures)
-            part = (finding.of,) if parts else ()
-            rows.append(("" if k else engine, *part, finding.answer, measured))
-    headers = ("", *([""] if parts else []), "answer", "measured")
+            rows.append(("" if k else engine, finding.of, finding.answer, measured))
+        rows += [] if findings is not None else [(engine, "", _NOT_ASKED, "")]
+    shown = [0, 1, 2, 3] if any(row[1] for row in rows) else [0, 2, 3]
+    headers = ("engine", "of", "answer", "measured")
     return Table(
-        headers, rows, f"{answered.name}: {answered.question.title}", frozenset(range(len(headers)))
+        [headers[k] for k in shown],
+        [[row[k] for k in shown] for row in rows],
+        f"{answered.name}: {answered.question.title}",
+        frozenset(range(len(shown))),
     )
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 from ..engines import room
 from ..installed import DEFAULT, ENGINES, engine_version, wheel_here
-from ..page import Page, Table, Text, Verdict
+from ..page import Page, Table, Text
+from . import template
 
 _PATIENCE = 60  # seconds for an import
 
@@ -79,44 +80,30 @@ class Diagnosis:
 def examine() -> Diagnosis:
     """Look at Python, the engines, rendering, the viewer, the import name and the extras."""
     python = HealthCheck("python", True, f"{platform.python_version()}, {sys.executable}")
-    findings = [python, *map(_engine, ENGINES), _rendering(), _viewer(), _clash()]
+    drawing = HealthCheck("rendering", *room(DEFAULT).drawing_diagnosis(), optional=True)
+    findings = [python, *map(_engine, ENGINES), drawing, _viewer(), _clash()]
     packages = (replace(package, version=_version(package.name)) for package in _PACKAGES)
     return Diagnosis(tuple(findings), tuple(packages))
 
 
 def page(diagnosis: Diagnosis) -> Page:
     """The diagnosis as a page."""
-    rows = [
-        (finding.name, ("works" if finding.works else "no"), finding.found)
-        for finding in diagnosis.findings
-    ]
-    blocks = [
-        Table(("", "", "found"), rows, title="What this machine has", words=frozenset({0, 1, 2})),
-        Table(
-            ("", "found", "for", "extra"),
-            [
-                (package.name, package.version or "no", package.role, ", ".join(package.extras))
-                for package in diagnosis.packages
-            ],
-            title="Optional packages",
-            words=frozenset({0, 1, 2, 3}),
-        ),
-        Text("An extra is installed by its name: pip install 'statemachine-sim[plot]'"),
-    ]
-    steps = [f"{f.name}: {f.next_step}" for f in diagnosis.findings if f.next_step]
-    return Page(
-        "statemachine doctor",
-        f"Python {platform.python_version()}, {platform.system()} {platform.machine()}",
-        [
-            *blocks,
-            *(Text(step) for step in steps),
-            Verdict(
-                "everything that the lessons need on MuJoCo is here"
-                if diagnosis.healthy
-                else "the lessons cannot run yet: see above",
-                diagnosis.healthy,
-            ),
+    findings, packages = diagnosis.findings, diagnosis.packages
+    machine = [(f.name, "works" if f.works else "no", f.found) for f in findings]
+    optional = [(p.name, p.version or "no", p.role, ", ".join(p.extras)) for p in packages]
+    words = frozenset(range(4))
+    return template.page(
+        "doctor",
+        python=platform.python_version(),
+        system=platform.system(),
+        machine=platform.machine(),
+        tables=[
+            Table(("what", "state", "found"), machine, "What this machine has", words),
+            Table(("package", "found", "for", "extra"), optional, "Optional packages", words),
         ],
+        steps=[Text(f"{f.name}: {f.next_step}") for f in findings if f.next_step],
+        healthy=True if diagnosis.healthy else None,
+        unhealthy=None if diagnosis.healthy else False,
     )
 
 
@@ -133,12 +120,9 @@ def _engine(name: str) -> HealthCheck:
 
 
 def _viewer() -> HealthCheck:
-    name = "viser"
     code = "from statemachine.view.server import require_viser; require_viser()"
-    check = _imported(name, code, optional=True)
-    if not check.works:
-        return check
-    return replace(check, found=f"{importlib.metadata.version(name)}, for `statemachine view`")
+    check = _imported("viser", code, optional=True)
+    return replace(check, found=check.found or f"{_version('viser')}, for `statemachine view`")
 
 
 def _imported(name: str, code: str, optional: bool) -> HealthCheck:
@@ -161,11 +145,6 @@ def _imported(name: str, code: str, optional: bool) -> HealthCheck:
     return HealthCheck(name, False, reason, optional=optional)
 
 
-def _rendering() -> HealthCheck:
-    works, found, step = room(DEFAULT).drawing_diagnosis()
-    return HealthCheck("rendering", works, found, step, optional=True)
-
-
 def _version(name: str) -> str | None:
     """Version of an installed package, which is not imported."""
     try:
@@ -175,9 +154,8 @@ def _version(name: str) -> str | None:
 
 
 def _clash() -> HealthCheck:
-    try:
-        version = importlib.metadata.version("python-statemachine")
-    except importlib.metadata.PackageNotFoundError:
+    version = _version("python-statemachine")
+    if version is None:
         return HealthCheck("import name", True, "statemachine is ours alone")
     return HealthCheck(
         "import name",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,37 +14,35 @@ from ..compare.series import SETTLED, at_the_end
 from ..compare.why import Explanation
 from ..measures import QUANTITIES
 from ..measures.text import capital, quantity, short_time
-from ..page import Block, Headline, Text
+from ..page import Block, Headline
+from . import template
 from .events import Event
+from .template import if_true
 from .why import answer, proofs
 
-_MOVES = 0.1  # share by which a difference may change in the end and be called settled
+_STEADY = 0.1  # share by which a difference may change in the end and be called settled
 
-# The headline, and what follows it.
-SAME = "The two runs are the same in every figure that was compared"
-AGREE = "The two runs agree for {until:g} s: nothing leaves its tolerance"
-ENDED = "{sides} ended early; until {until:g} s {agrees} of {total} quantities are within tolerance"
-DIFFER = "The two runs differ"
-APART = "{what} is up to {far} apart between {left} and {right}, at {at}{parting}"
-CONTACT = "{what}: {far}{parting}"
+LEADS = {
+    "same": "The two runs are the same in every figure that was compared",
+    "agree": "The two runs agree for {until:g} s: nothing leaves its tolerance",
+    "ended": "{sides} ended early; until {until:g} s {agrees} of {total} quantities are within "
+    "tolerance",
+    "differ": "The two runs differ",
+    "apart": "{what} is up to {far} apart between {left} and {right}, at {at}{parting}",
+    "contact": "{what}: {far}{parting}",
+}
 PARTING = {
     "at the start": "; the runs part from the start",
     "exact": "; the runs part at {time}",
     "first": "; they are apart at the first common moment already, {time}",
     "coarse": "; they are apart from the common moment {time} on",
 }
-MEETS = ", when {body} touches {ground}"
-WITHIN = "On average over {window}, all of the motion is within its tolerance."
-STILL = "On average over {window} {what} is still {far} apart"
-CHANGING = "{still}, and still changing: {last} at the last moment"
-
-# Below the headline.
-ALL_WITHIN = "All {total} quantities stay within tolerance at all {moments} moments."
-NEAREST = "{text} Nearest to its tolerance comes {what}: {far} of {tolerance}."
-CUT = "What comes after cannot be compared, and no cause is named."
-FIRST = "First to leave its tolerance: {what}, at {at}."
-VERDICTS = "Of {total} quantities: agrees {agrees}, settles {settles}, differs {differs}."
-FARTHEST = "{text} Farthest beyond its tolerance is {what}: {far} of {tolerance}, at {at}."
+ENDS = {
+    "within": "On average over {window}, all of the motion is within its tolerance.",
+    "settled": "On average over {window} {what} is still {far} apart.",
+    "changing": "On average over {window} {what} is still {far} apart, and still changing: {last} "
+    "at the last moment.",
+}
 
 
 @dataclass(frozen=True)
@@ -64,29 +63,31 @@ def headline(
 ) -> Headline:
     """The largest difference, what explains it, and what is left of it in the end."""
     agreements, until = comparison.agreements, comparison.until
-    if comparison.agrees:
-        same = all(agreement.max == 0 for agreement in agreements)
-        return Headline(SAME if same else AGREE.format(until=until))
-    if comparison.ended:
-        sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
-        agrees = sum(agreement.verdict == "agrees" for agreement in agreements)
-        lead = ENDED.format(
-            sides=" and ".join(sides), until=until, agrees=agrees, total=len(agreements)
-        )
-        return Headline(lead, holds=False)
-    main = subject(comparison, explanation)
-    if main is None:
-        return Headline(DIFFER, holds=False)
-    contact = main.found if main.found and main.found.kind == "contact" else None
+    holds, main = comparison.agrees, subject(comparison, explanation)
+    of = main.found if main else None
+    if holds:
+        kind = "same" if all(agreement.max == 0 for agreement in agreements) else "agree"
+    elif comparison.ended:
+        kind = "ended"
+    else:
+        kind = "differ" if main is None else "contact" if of and of.kind == "contact" else "apart"
+    sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
     left, right = short_labels(comparison)
-    lead = (CONTACT if contact else APART).format(
-        what=name_of(contact.name) if contact else main.named,
-        far=contact.note or main.far if contact else main.far,
+    slots = {"what": main.named, "far": main.far, "at": short_time(main.at)} if main else {}
+    if of and kind == "contact":
+        slots |= {"what": name_of(of.name), "far": of.note or slots["far"]}
+    lead = LEADS[kind].format(
+        until=until,
+        sides=" and ".join(sides),
+        agrees=sum(agreement.verdict == "agrees" for agreement in agreements),
+        total=len(agreements),
         left=left,
         right=right,
-        at=short_time(main.at),
         parting=_parting(comparison, events),
+        **slots,
     )
+    if kind not in ("apart", "contact"):
+        return Headline(lead, holds=holds)
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
     return Headline(capital(lead), causes, _in_the_end(comparison, curves), holds=False)
 
@@ -102,21 +103,11 @@ def _parting(comparison: Comparison, events: Sequence[Event]) -> str:
     if at and spacing > 1.5 * max(steps):
         kind = "first" if at <= 1.001 * spacing else "coarse"
     # A touch later than a step after the parting has nothing to do with it.
-    touch = next(
-        (
-            e
-            for e in events
-            if at and e.time and kind != "first" and _is_touch(e, at, 1.001 * max(steps))
-        ),
-        None,
-    )
-    body, _, ground = touch.what.partition(" on ") if touch else ("", "", "")
-    when = MEETS.format(body=body, ground=ground) if touch else ""
+    slack = 1.001 * max(steps) if at and kind != "first" else -1.0
+    touches = (e.what for e in events if e.kind == "touch" and e.time and abs(e.time - at) <= slack)
+    body, _, ground = next(touches, "").partition(" on ")
+    when = f", when {body} touches {ground}" if body else ""
     return PARTING[kind].format(time=short_time(at)) + when
-
-
-def _is_touch(event: Event, at: float, slack: float) -> bool:
-    return event.kind == "touch" and abs(event.time - at) <= slack
 
 
 def short_labels(comparison: Comparison) -> tuple[str, str]:
@@ -139,21 +130,21 @@ def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
     motion = [a for a in comparison.agreements if QUANTITIES[a.kind].moves]
     differ = [a for a in motion if a.verdict == "differs"]
     known = [a for a in differ if a.settled >= 0]  # what is no number is on neither side
+    over = window(comparison)
     if not known:
-        return WITHIN.format(window=window(comparison)) if motion and not differ else ""
+        return ENDS["within"].format(window=over) if motion and not differ else ""
     most = max(known, key=lambda a: a.settled / (a.tolerance or 1e-300))
     far = quantity(most.settled, most.unit)
-    text = STILL.format(window=window(comparison), what=named(most), far=far)
     last = next((_last(curve, most) for curve in curves if curve.name == most.name), None)
-    if last is not None:
-        text = CHANGING.format(still=text, last=quantity(last, most.unit))
-    return f"{text}."
+    kind = "settled" if last is None else "changing"
+    last_one = quantity(last, most.unit)
+    return ENDS[kind].format(window=over, what=named(most), far=far, last=last_one)
 
 
 def _last(curve: Series, agreement: Agreement) -> float | None:
     """The last difference, if it moves within the end by more than it may to be settled."""
     tail = curve.difference[at_the_end(curve.time)]
-    moves = float(np.ptp(tail)) > min(agreement.tolerance, _MOVES * agreement.settled)
+    moves = float(np.ptp(tail)) > min(agreement.tolerance, _STEADY * agreement.settled)
     return float(tail[-1]) if moves else None
 
 
@@ -212,33 +203,30 @@ def parting(comparison: Comparison) -> float | None:
     return min((a.since for a in comparison.agreements if a.since is not None), default=None)
 
 
-def in_words(
-    comparison: Comparison, events: Sequence[Event], explanation: Explanation | None = None
-) -> list[Block]:
+def in_words(comparison: Comparison) -> list[Block]:
     """What a reader should know before the figures."""
-    agreements, total = comparison.agreements, len(comparison.agreements)
-    worst = leading(comparison)
-    figures = {}
+    agreements, holds, ended = comparison.agreements, comparison.agrees, comparison.ended
+    worst, first = leading(comparison), parting(comparison)
+    counts = Counter(agreement.verdict for agreement in agreements)
+    unlike = not holds and not ended
+    slots: dict[str, Any] = {"nearest": None, "farthest": None, "first": None}
     if worst is not None:
-        far, tolerance = (quantity(size, worst.unit) for size in (worst.max, worst.tolerance))
-        figures = {"far": far, "tolerance": tolerance, "at": short_time(worst.at)}
-    if comparison.agrees:
-        text = ALL_WITHIN.format(total=total, moments=comparison.moments)
-        if worst is not None and worst.max:
-            text = NEAREST.format(text=text, what=name_of(worst.name), **figures)
-        return [Text(text)]
-    if comparison.ended:
-        first = min((a for a in agreements if a.since is not None), key=_since, default=None)
-        parted = first and FIRST.format(what=named(first), at=short_time(_since(first)))
-        return [Text(f"{CUT} {parted}" if parted else CUT)]
-    counts = Counter(a.verdict for a in agreements)
-    text = VERDICTS.format(
-        total=total, **{kind: counts[kind] for kind in ("agrees", "settles", "differs")}
+        slots["far"], slots["tolerance"] = (
+            quantity(size, worst.unit) for size in (worst.max, worst.tolerance)
+        )
+        slots["at"] = short_time(worst.at)
+        slots["nearest"] = name_of(worst.name) if holds and worst.max else None
+        slots["farthest"] = named(worst) if unlike and worst.kind != "contact" else None
+    if ended and not holds and first is not None:
+        slots["first"] = named(next(a for a in agreements if a.since == first))
+        slots["at"] = short_time(first)
+    return template.blocks(
+        "finding",
+        total=len(agreements),
+        moments=comparison.moments,
+        within=if_true(holds),
+        cut=if_true(ended and not holds),
+        unlike=if_true(unlike),
+        **{kind: counts[kind] for kind in ("agrees", "settles", "differs")},
+        **slots,
     )
-    if worst is not None and worst.kind != "contact":
-        text = FARTHEST.format(text=text, what=named(worst), **figures)
-    return [Text(text)]
-
-
-def _since(agreement: Agreement) -> float:
-    return agreement.since or 0.0

@@ -10,6 +10,7 @@ import json
 from ..grading.class_table import verdict_word
 from ..grading.exercise import Grade
 from ..grading.judges import JUDGES
+from .template import versions_of
 
 
 def results(grade: Grade | None, refusal: str = "", points: float = 1.0) -> str:
@@ -37,6 +38,6 @@ def results(grade: Grade | None, refusal: str = "", points: float = 1.0) -> str:
             }
         )
     versions = grade.versions if grade else {}
-    output = ", ".join(f"{name} {version}" for name, version in versions.items())
+    output = versions_of(versions)
     document = {"tests": tests, "output": output or refusal, "visibility": "visible"}
     return json.dumps(document, indent=1, ensure_ascii=False) + "\n"

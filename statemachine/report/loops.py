@@ -6,32 +6,11 @@ from dataclasses import replace
 
 from ..compare import Agreement, Comparison, SidesRun
 from ..measures.text import NONE, quantity, sentence
-from ..page import Block, Headline, Items, Section, Table, TableCell, Text
+from ..page import Block, Headline, Items, Section, Table, TableCell
+from . import template
 from .finding import name_of, short_labels
+from .template import if_true
 from .why import missing
-
-_MEANS = (
-    "Closed loop: each side computes its commands from its own state, so this is what feedback "
-    "makes of a difference. Open loop: the left's start and its recorded commands are played on "
-    "the right, so this says whether the machine itself differs."
-)
-_SAID = {
-    "the same": (
-        "Both sides were told the same at every moment, so the open loop, which says whether the "
-        "machine itself differs, and the closed loop, which says what feedback makes of it, are "
-        "one run."
-    ),
-    "recorded": (
-        "Both sides were told the recorded commands, an open loop: the figures say whether the "
-        "machine itself differs, and nothing of what feedback would make of it."
-    ),
-    "more than ctrl": (
-        "There is no open loop: beside ctrl the function wrote into the state or applied forces, "
-        "which the recorded commands of the left do not repeat on the right."
-    ),
-}
-_LACKING = "Actuators of the left that the right lacks are not commanded there."
-_OPEN = "{lead}; in open loop, with the left's commands on both, they {verdict}"
 
 
 def unmatched(run: SidesRun | None) -> list[Block]:
@@ -42,10 +21,17 @@ def unmatched(run: SidesRun | None) -> list[Block]:
 
 def told(run: SidesRun | None) -> list[Block]:
     """Whether the two sides were told the same, where that takes one sentence."""
-    if run is None or run.commands not in _SAID:
+    if run is None:
         return []
     lacking = run.matched.only[0].get("actuator", ()) if run.matched else ()
-    return [Text(_SAID[run.commands]), *([Text(_LACKING)] if lacking else [])]
+    commands = run.commands
+    return template.blocks(
+        "loops_told",
+        same=if_true(commands == "the same"),
+        recorded=if_true(commands == "recorded"),
+        more=if_true(commands == "more than ctrl"),
+        lacking=if_true(lacking and commands != "its own"),
+    )
 
 
 def loops(comparison: Comparison, played: Comparison | None) -> list[Block]:
@@ -65,7 +51,7 @@ def loops(comparison: Comparison, played: Comparison | None) -> list[Block]:
         f"{one} against {two}: each with its own commands, and both with the left's",
         words=frozenset({0, 1, 3}),
     )
-    return [Section("loops", "Closed loop and open loop", [Text(_MEANS), table])]
+    return [Section("loops", "Closed loop and open loop", template.blocks("loops", table=[table]))]
 
 
 def also_open(headline: Headline, played: Comparison | None) -> Headline:
@@ -73,7 +59,7 @@ def also_open(headline: Headline, played: Comparison | None) -> Headline:
     if played is None or played.agrees == headline.holds:
         return headline
     verdict = "agree" if played.agrees else "do not agree"
-    lead = _OPEN.format(lead=headline.lead, verdict=verdict)
+    lead = f"{headline.lead}; in open loop, with the left's commands on both, they {verdict}"
     return replace(headline, lead=lead, holds=headline.holds and played.agrees)
 
 

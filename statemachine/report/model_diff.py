@@ -8,7 +8,9 @@ from itertools import groupby
 from ..compare.models import AgreedFigures, Compared, DescribedFile, Difference
 from ..compare.models.ledger import SUBJECTS, Value
 from ..measures.text import after, capital, listed, reading, rounded, sentence, significant
-from ..page import Block, Items, Page, Table, Text, Verdict
+from ..page import Block, Items, Page, Table, Text
+from . import template
+from .template import if_true, versions_of
 
 _ROWS = 8  # of a table, unless all are asked for
 _MOMENT = "of a part"  # kg m², which are of another size than those of a joint
@@ -77,57 +79,60 @@ def page(result: Compared, everything: bool = False) -> Page:
         result: Of `compare`.
         everything: Whether every figure has a row of its own.
     """
-    blocks: list[Block] = [_sides(result), _verdict(result)]
-    for subject, group in groupby(result.found.differences, key=lambda each: each.subject):
-        blocks += _subject(subject, list(group), everything)
-    blocks += _brought(result)
-    blocks += _equal(result)
-    notes = [
-        *(f"left: {note}" for note in result.one.notes),
-        *(f"right: {note}" for note in result.two.notes),
-        *result.found.notes,
-        *result.skipped,
-    ]
-    blocks += [Text(sentence(note)) for note in notes]
-    origin = ", ".join(f"{name} {version}" for name, version in result.versions.items())
-    names = [
-        f"{side.file} on {side.reader.split()[0]}" if side.format == "engine" else side.file
-        for side in (result.one, result.two)
-    ]
-    return Page(f"Before anything moves: {names[0]} against {names[1]}", origin, blocks)
+    found, sides = result.found, {"left": result.one, "right": result.two}
+    rows, posed = found.differences, found.posed
+    matter = [row for row in rows if row.matters]
+    able = dict.fromkeys(name for row in rows for name in row.causes if not row.refused)
+    refused = {row.causes[0]: row.refused for row in rows if row.refused}
+    weigh = [rounded(mass, "kg", 4) for mass in found.mass]
+    notes = [f"{name}: {note}" for name, side in sides.items() for note in side.notes]
+    groups = groupby(rows, key=lambda row: row.subject)
+    return template.page(
+        "model_diff",
+        **{f"{name}_name": _name(side) for name, side in sides.items()},
+        **{name: _described(side) for name, side in sides.items()},
+        origin=versions_of(result.versions),
+        weight=weigh[0] if weigh[0] == weigh[1] else None,
+        weights=listed(weigh) if weigh[0] != weigh[1] else None,
+        none_differ=None if matter or result.skipped else True,
+        digits=result.digits,
+        not_all_compared=False if result.skipped and not matter else None,
+        differ=False if matter else None,
+        figures=len(matter),
+        subjects=", ".join(dict.fromkeys(row.subject for row in matter)),
+        differences=[b for name, group in groups for b in _subject(name, list(group), everything)],
+        all_able=if_true(able and not refused),
+        able=len(able) if able and refused else None,
+        command="" if able else None,
+        refused_too=if_true(refused),
+        refused=[Items([f"{capital(n)}: {why}." for n, why in refused.items()])] if refused else [],
+        equal=_equal(found.agreements),
+        joints=posed.joints or None,
+        distance=_tiny(posed.distance, "m"),
+        angle=_tiny(posed.angle, "rad"),
+        poses=posed.poses,
+        seed=posed.seed,
+        furthest=posed.link if posed.joints and posed.distance > 1e-5 else None,
+        notes=[Text(sentence(note)) for note in (*notes, *found.notes, *result.skipped)],
+    )
 
 
-def _sides(result: Compared) -> Text:
-    def said(side: DescribedFile) -> str:
-        how = (
-            f"loaded into {side.reader}"
-            if side.format == "engine"
-            else f"{side.format}, by {side.reader}"
-        )
-        return (
-            f"{side.file} ({how}; {side.links} links, {side.joints} joints, {side.shapes} shapes)"
-        )
-
-    weigh = [rounded(mass, "kg", 4) for mass in result.found.mass]
-    alike = f"Both weigh {weigh[0]}" if weigh[0] == weigh[1] else f"They weigh {listed(weigh)}"
-    return Text(f"Left is {said(result.one)}. Right is {said(result.two)}. {alike}.")
+def _name(side: DescribedFile) -> str:
+    """A file, and of one that an engine has read the engine."""
+    return f"{side.file} on {side.reader.split()[0]}" if side.format == "engine" else side.file
 
 
-def _verdict(result: Compared) -> Verdict:
-    matter = [each for each in result.found.differences if each.matters]
-    if not matter and result.skipped:
-        return Verdict("nothing that was compared differs; not everything was compared", False)
-    if not matter:
-        return Verdict(f"nothing differs that matters, to {result.digits} digits", True)
-    subjects = ", ".join(dict.fromkeys(each.subject for each in matter))
-    count = f"{len(matter)} figures differ" if len(matter) > 1 else "1 figure differs"
-    return Verdict(f"{count}, the weightiest first: {subjects}", False)
+def _described(side: DescribedFile) -> str:
+    """A side in a few words: how it was read, and what it has."""
+    how = "loaded into" if side.format == "engine" else f"{side.format}, by"
+    what = f"{side.links} links, {side.joints} joints, {side.shapes} shapes"
+    return f"{side.file} ({how} {side.reader}; {what})"
 
 
 def _subject(subject: str, found: list[Difference], everything: bool) -> Iterator[Block]:
     rows = list(_rows(subject, found, 1 if everything else 3))
     shown = rows if everything else rows[:_ROWS]
-    headers: list[str] = ["", "left", "right", "apart", _LAST.get(subject, "")]
+    headers: list[str] = ["figure", "left", "right", "apart", _LAST.get(subject, "")]
     keep = [k for k in range(5) if k < 3 or any(row[k] for row in shown)]
     title = SUBJECTS[subject]
     if not any(each.matters for each in found):
@@ -194,22 +199,6 @@ def _label(row: Difference, more: int) -> str:
     return name if not figure or figure in _SAID_BY_ITS_NAME else f"{name}: {figure}"
 
 
-def _brought(result: Compared) -> Iterator[Block]:
-    """What the right can be brought to the left in, and why not in the rest."""
-    rows = result.found.differences
-    able = dict.fromkeys(name for row in rows for name in row.causes if not row.refused)
-    refused = {row.causes[0]: row.refused for row in rows if row.refused}
-    if able:
-        many = "What differs" if not refused else f"{len(able)} of these differences"
-        yield Text(
-            f"{many} can be brought from the right to the left, one by one: statemachine compare "
-            "hold LEFT RIGHT --why does so, and tells what each explains."
-        )
-    if refused:
-        yield Text("These cannot be brought over:")
-        yield Items([f"{capital(name)}: {why}." for name, why in refused.items()])
-
-
 def _value(value: Value, unit: str) -> str:
     if value is None:
         return "not said"
@@ -226,24 +215,12 @@ def _number(value: float, unit: str, units: dict[str, tuple[float, str]]) -> str
     return f"{significant(value * factor)}{shown}"
 
 
-def _equal(result: Compared) -> Iterator[Block]:
-    found = result.found
-    if found.agreements:
-        rows = [
-            _agreement(list(group))
-            for _, group in groupby(found.agreements, key=lambda each: each.subject)
-        ]
-        yield Table(
-            ("", "figures", "apart, at most", "to digits"), rows, "What is equal", frozenset({0})
-        )
-    posed = found.posed
-    if posed.joints:
-        yield Text(
-            f"The same positions of {posed.joints} joints put every link within "
-            f"{_tiny(posed.distance, 'm')} and {_tiny(posed.angle, 'rad')} of the same "
-            f"pose, at {posed.poses} poses (seed {posed.seed})"
-            + (f"; {posed.link} is the furthest off." if posed.distance > 1e-5 else ".")
-        )
+def _equal(agreements: Sequence[AgreedFigures]) -> list[Block]:
+    """A row for each subject: how well both sides agree in it."""
+    groups = groupby(agreements, key=lambda each: each.subject)
+    rows = [_agreement(list(group)) for _, group in groups]
+    heads = ("subject", "figures", "apart, at most", "to digits")
+    return [Table(heads, rows, "What is equal", frozenset({0}))] if rows else []
 
 
 def _tiny(value: float, unit: str) -> str:
@@ -258,6 +235,6 @@ def _agreement(group: Sequence[AgreedFigures]) -> list[str]:
         factor, unit = _APART.get(of, (1.0, after(of)))
         if each.worst:
             worst.append(f"{each.worst * factor:.1e}{unit}")
-    count, digits = sum(each.count for each in group), min(each.digits for each in group)
+    total, digits = sum(each.count for each in group), min(each.digits for each in group)
     name = SUBJECTS[subject].partition(":")[0]
-    return [name, str(count), ", ".join(worst) or "0", "all" if digits == 17 else str(digits)]
+    return [name, str(total), ", ".join(worst) or "0", "all" if digits == 17 else str(digits)]

@@ -7,19 +7,9 @@ from collections.abc import Sequence
 from ..compare import StepComparison
 from ..compare.step_samples import StageGap
 from ..measures.text import NONE, figure, quantity, sentence, short_time
-from ..page import Block, Headline, Items, Page, Table, TableCell, Text
+from ..page import Headline, Items, Page, Table, TableCell, Text
+from . import template
 
-METHOD = (
-    "{right} is put to a state of {left}'s run (every {every} steps), and both take one step: "
-    "nothing drifts, and a difference is of that step. From the step before {right} gets: {primed}."
-)
-TOLERANCE = (
-    "Differs: at how many moments it is beyond {relative} of its usual size, and beyond the null: "
-    "how far {left} gets from its own run when it is put back to its own states, since a restore "
-    "may forget what the engine knows of contacts. Here that is at most {null} ({stage})."
-)
-NOT_COMPARED = "{stage} is not compared: {reason}."
-ORIGIN = "{left} and {right}; moments: {moments}, until {until:g} s"
 SAME_BITS = "From the same state both sides take the same step, to the last bit"
 SAME_STEP = "From the same state both sides take the same step"
 PART = "The sides part in the stage “{stage}”, {when} (at {beyond} of {moments} moments): {where}"
@@ -38,33 +28,37 @@ def page(
         experiment: What was run.
         said: Lines to say before anything else.
     """
-    one, two = labels
-    sides = {"left": one, "right": two}
-    primed = result.primed or "nothing"
-    blocks: list[Block] = [
-        *(Text(line) for line in said),
-        Text(METHOD.format(every=result.every, primed=primed, **sides)),
-        Table(
-            _HEADS,
-            [_row(gap, result.moments) for gap in result.stages],
-            "The stages of a step, in their order",
-            words=frozenset({0, 5}),
-            emphasis=frozenset(k for k, gap in enumerate(result.stages) if gap is result.first),
-            wide=frozenset({7, 8}),
-        ),
-        Text(_tolerance(result, sides)),
-    ]
-    if result.spikes:
-        blocks.append(_spikes(result))
-    notes = [
-        NOT_COMPARED.format(stage=gap.stage, reason=gap.reason)
-        for gap in result.stages
-        if not gap.told
-    ]
+    compared = [gap for gap in result.stages if gap.told and gap.unit]
+    null = max(compared, key=lambda gap: gap.null / (gap.tolerance or 1e-300))
+    left_out = [gap for gap in result.stages if not gap.told]
+    notes = [f"{gap.stage} is not compared: {gap.reason}." for gap in left_out]
     notes += [sentence(line) for line in result.notes]
-    blocks += [Items(notes)] if notes else []
-    origin = ORIGIN.format(moments=result.moments, until=result.until, **sides)
-    return Page(f"{experiment}: one step at a time", origin, blocks, _headline(result))
+    stages = Table(
+        _HEADS,
+        [_row(gap, result.moments) for gap in result.stages],
+        "The stages of a step, in their order",
+        words=frozenset({0, 5}),
+        emphasis=frozenset(k for k, gap in enumerate(result.stages) if gap is result.first),
+        wide=frozenset({7, 8}),
+    )
+    return template.page(
+        "one_step",
+        _headline(result),
+        experiment=experiment,
+        left=labels[0],
+        right=labels[1],
+        moments=result.moments,
+        until=result.until,
+        said=[Text(line) for line in said],
+        every=result.every,
+        primed=result.primed or "nothing",
+        stages=[stages],
+        relative=figure(result.relative),
+        null=quantity(null.null, null.unit),
+        stage=null.stage,
+        spikes=[_spikes(result)] if result.spikes else [],
+        notes=[Items(notes)] if notes else [],
+    )
 
 
 def _row(gap: StageGap, moments: int) -> tuple[str, ...]:
@@ -74,26 +68,13 @@ def _row(gap: StageGap, moments: int) -> tuple[str, ...]:
         gap.stage,
         str(gap.beyond),
         str(moments),
-        _size(gap.worst, gap) if gap.beyond else "≈ 0" if gap.worst else "0",
+        quantity(gap.worst, gap.unit) if gap.beyond else "≈ 0" if gap.worst else "0",
         TableCell(f"{gap.at:.3f}", at=gap.at) if gap.beyond and gap.at is not None else NONE,
         gap.where if gap.beyond else NONE,
         TableCell(f"{gap.first:.3f}", at=gap.first) if gap.first is not None else "never",
-        _size(gap.null, gap),
-        _size(gap.tolerance, gap),
+        quantity(gap.null, gap.unit),
+        quantity(gap.tolerance, gap.unit),
     )
-
-
-def _size(value: float, gap: StageGap) -> str:
-    return quantity(value, gap.unit)
-
-
-def _tolerance(result: StepComparison, sides: dict[str, str]) -> str:
-    """What a difference is, and how large the largest null is, in its tolerances."""
-    compared = [gap for gap in result.stages if gap.told and gap.unit]
-    most = max(compared, key=lambda gap: gap.null / (gap.tolerance or 1e-300))
-    null = _size(most.null, most)
-    relative = figure(result.relative)
-    return TOLERANCE.format(relative=relative, null=null, stage=most.stage, **sides)
 
 
 def _spikes(result: StepComparison) -> Table:

@@ -18,17 +18,7 @@ from ..runs import Trace
 from .events import Event
 from .finding import name_of
 
-SPOKEN = (
-    "{name}, difference over time: at most {far} at {at}, settled at {settled}; tolerance "
-    "{tolerance}, left: {since}."
-)
-ENERGY = "Computed by {by}, from the masses, the armature and the gravity of the model."
-DRAWN = "Drawn is the sum of the normal forces."
-FORCE = (
-    "{label}: at most {normal} N; the whole force, friction added as vectors: at most {total} N."
-)
-
-MOST = 20  # charts of a page or a figure
+CHARTS_SHOWN = 20  # of a page or a figure
 GAP = "how far apart"
 
 
@@ -95,11 +85,9 @@ class BothRuns(Interactive):
     Attributes:
         one: The run that is drawn solid.
         two: The run that is drawn as a ghost over it.
-        labels: What they are called; short: for short.
+        comparison: Of the two: what they are called, and until when they are shown.
         site: The site whose way is drawn; "" for none.
-        until: The last moment [s].
         start: The moment to begin at [s].
-        moments: Those that must be among the ones shown [s].
         events: First touches among them are marked.
         charts: What is followed.
         lead: Of these, the ones that are spoken, by number.
@@ -107,12 +95,9 @@ class BothRuns(Interactive):
 
     one: Trace
     two: Trace
-    labels: tuple[str, str]
-    short: tuple[str, str]
+    comparison: Comparison
     site: str
-    until: float
     start: float
-    moments: tuple[float, ...]
     events: tuple[Event, ...]
     charts: tuple[QuantityChart, ...]
     lead: tuple[int, ...]
@@ -131,7 +116,7 @@ def charts_of(
     bands = {} if floor is None else {band.name: band.width for band in floor.bands}
     drawn = [curve for curve in curves if np.isfinite(curve.difference).all()]
     ranked = sorted(drawn, key=lambda curve: (curve.kind != "tip", -found[curve.name].tolerances()))
-    kept = {curve.name for curve in ranked[:MOST]}
+    kept = {curve.name for curve in ranked[:CHARTS_SHOWN]}
     return tuple(
         chart_of(
             curve,
@@ -153,13 +138,13 @@ def chart_of(
     floor: Array | None = None,
 ) -> QuantityChart:
     """The chart of a quantity."""
-    said = SPOKEN.format(
-        name=name_of(curve.name),
-        far=quantity(found.max, curve.unit),
-        at=short_time(found.at),
-        settled=quantity(found.settled, curve.unit),
-        tolerance=quantity(found.tolerance, curve.unit),
-        since="never" if found.since is None else f"at {short_time(found.since)}",
+    far, settled, tolerance = (
+        quantity(size, curve.unit) for size in (found.max, found.settled, found.tolerance)
+    )
+    since = "never" if found.since is None else f"at {short_time(found.since)}"
+    said = (
+        f"{name_of(curve.name)}, difference over time: at most {far} at {short_time(found.at)}, "
+        f"settled at {settled}; tolerance {tolerance}, left: {since}."
     )
     return QuantityChart(name_of(curve.name), curve, found, labels, said, foot, floor)
 
@@ -167,19 +152,23 @@ def chart_of(
 def foot_of(curve: Series, one: Trace, two: Trace, labels: tuple[str, str]) -> str:
     """Under a chart of the energy by what it was computed; of a force its other figure."""
     if curve.kind == "energy":
-        by = [trace.header.energy_by or trace.header.backend for trace in (one, two)]
-        return ENERGY.format(by=" and ".join(dict.fromkeys(by)))
+        by = dict.fromkeys(trace.header.energy_by or trace.header.backend for trace in (one, two))
+        return (
+            f"Computed by {' and '.join(by)}, from the masses, the armature and the gravity of "
+            "the model."
+        )
     if curve.kind != "force":
         return ""
     pair, sides = curve.name.removesuffix(NORMAL), []
     for of in (normal_forces, total_forces):
         left = of(one)
         sides.append([_most(forces, pair) for forces in (left, same_pairs(left, of(two)))])
-    each = [
-        FORCE.format(label=label, normal=normal, total=total)
+    strongest = [
+        f"{label}: at most {normal} N; the whole force, friction added as vectors: at most "
+        f"{total} N."
         for label, normal, total in zip(labels, *sides, strict=True)
     ]
-    return " ".join([DRAWN, *each])
+    return " ".join(["Drawn is the sum of the normal forces.", *strongest])
 
 
 def _most(forces: Mapping[str, Array], pair: str) -> str:

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,12 @@ from ..measures.text import few, milliseconds, reading, short_time
 from ..page import Traces
 from ..runs import Header, Trace
 from ..runs.whole import replace_bytes
+from . import template
 from .figures import SETTINGS, SIDES, check_suffix, draw_picture, saved
 from .finding import long_labels, parting
 from .floor import changed_by
-from .over_time import MOST, charts_of, spans
+from .over_time import CHARTS_SHOWN, charts_of, spans
+from .template import if_true
 
 FIGURE_SETTINGS = {
     **SETTINGS,
@@ -37,21 +39,12 @@ _DOTS = 300  # a PNG has to an inch
 _WIDTH, _MM = 80.0, 1 / 25.4  # of the figure [mm]; inches to a millimetre
 _ROW, _TOUCH, _LINE = 17.0, 5.0, 3.0  # heights of a row of charts, of a touch, of text [mm]
 _LETTERS, _TITLE = 82, 30  # of a line of notes; of a title over half of the width
-_MOST_PAIRS = 8
+_PAIRS_SHOWN = 8
 
-READ = (
-    "Left: both sides. Right: how far apart, on a log axis, and below it in grey what is exactly "
-    "0; the dotted line is the tolerance. Above it: the verdict and the largest difference."
-)
-FLOOR = "Grey area: the chaos floor, how far the first side gets from itself with {changed}."
-PART = "Grey line: they part at {at}, first {names}."
-FEWER = "{count} further quantities differ less, or are not finite."
-NOT_SHOWN = "{count} further joints are not shown."
 COMMAND = "the command"
 
 
-@dataclass(frozen=True, eq=False)
-class TouchSpans:
+class TouchSpans(NamedTuple):
     """When two bodies touch: spans of time, (from, to) [s], on each side."""
 
     name: str
@@ -93,13 +86,6 @@ def of_comparison(
     names = few(
         [a.name for a in comparison.agreements if first is not None and a.since == first], 1
     )
-    more = len(curves) - len(charts)
-    notes = [
-        READ,
-        *([] if floor is None else [FLOOR.format(changed=changed_by(floor))]),
-        *([] if first is None else [PART.format(at=short_time(first), names=names)]),
-        *([FEWER.format(count=more)] if more else []),
-    ]
     return Plot(
         one.header.experiment,
         _origin(one, two),
@@ -108,7 +94,13 @@ def of_comparison(
         _touches([one, two], comparison.until),
         comparison.until,
         first,
-        notes,
+        _notes(
+            two=if_true(True),
+            changed=changed_by(floor) if floor else None,
+            at=None if first is None else short_time(first),
+            names=names,
+            fewer=len(curves) - len(charts) or None,
+        ),
     )
 
 
@@ -125,7 +117,7 @@ def of_trace(trace: Trace) -> Plot:
     told = {joint: k for k, joint in enumerate(header.actuator_jntid) if joint >= 0}
     kinds = JointType.HINGE, JointType.SLIDE
     joints = [k for k, kind in enumerate(header.jnt_type) if kind in kinds]
-    for joint in joints[:MOST]:
+    for joint in joints[:CHARTS_SHOWN]:
         hinge = header.jnt_type[joint] == JointType.HINGE
         scale, unit = reading("rad" if hinge else "m")
         curves = {header.label: (time, scale * trace.qpos[:, header.jnt_qposadr[joint]])}
@@ -138,7 +130,6 @@ def of_trace(trace: Trace) -> Plot:
     if "energy" in trace and np.isfinite(trace["energy"]).all():
         energy = {header.label: (time, trace["energy"].sum(axis=1))}
         charts.append(Traces("energy [J]", "", "", energy, sides=True))
-    more = len(joints) - MOST
     return Plot(
         header.experiment,
         _origin(trace),
@@ -147,8 +138,14 @@ def of_trace(trace: Trace) -> Plot:
         _touches([trace], float(time[-1])),
         float(time[-1]),
         None,
-        [NOT_SHOWN.format(count=more)] if more > 0 else [],
+        _notes(not_shown=len(joints[CHARTS_SHOWN:]) or None),
     )
+
+
+def _notes(**slots: object) -> list[str]:
+    """What the reader must know: the sentences of `plot.md` that have what they need."""
+    none = dict.fromkeys(("two", "changed", "at", "names", "fewer", "not_shown"))
+    return template.texts("plot", **(none | slots))
 
 
 def _touches(traces: Sequence[Trace], until: float) -> list[TouchSpans]:
@@ -165,7 +162,7 @@ def _touches(traces: Sequence[Trace], until: float) -> list[TouchSpans]:
         if any(sides):
             rows.append(TouchSpans(pair, sides))
     rows.sort(key=lambda touch: min(span[0] for side in touch.spans for span in side))
-    return rows[:_MOST_PAIRS]
+    return rows[:_PAIRS_SHOWN]
 
 
 def _origin(*traces: Trace) -> list[str]:

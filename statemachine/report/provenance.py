@@ -6,6 +6,7 @@ from ..compare import Comparison
 from ..measures.text import listed, milliseconds, numbers
 from ..page import Block, Section, Table, TableCell, Text
 from ..runs import Header
+from . import template
 
 # Of the promises that a backend may emulate, those that move the arm, in plain words.
 PHYSICS = {
@@ -28,18 +29,17 @@ def emulated(comparison: Comparison) -> list[Block]:
         engines.add(side.engine)
         moving = [PHYSICS[name] for name in kept if name in PHYSICS]
         rest = [name for name in kept if name not in PHYSICS]
-        if moving:
-            blocks.append(
-                Text(
-                    f"{side.engine} lacks some of what the model asks for, so this library "
-                    f"computes it: {listed(moving)}. The engine without that: --defaults engine."
-                )
-            )
-        if rest:
-            told = f"What else is kept around {side.engine}"
-            text = "Promises of this library, and conventions of its states and forces: "
-            text += f"{'; '.join(rest)}."
-            blocks.append(Section("", told, [Text(text)], folded=True, detail=True))
+        text = Text(
+            "Promises of this library, and conventions of its states and forces: "
+            f"{'; '.join(rest)}."
+        )
+        heading = f"What else this library adds to {side.engine}"
+        blocks += template.blocks(
+            "provenance",
+            engine=side.engine,
+            moving=listed(moving) if moving else None,
+            rest=[Section("", heading, [text], folded=True, detail=True)] if rest else [],
+        )
     return blocks
 
 
@@ -72,7 +72,7 @@ def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
     ]
     labels = comparison.one.label, comparison.two.label
     told = [row for row in rows if any(row[1:])]
-    return Table(("", *labels), told, "What made the two runs", words=frozenset({0, 1, 2}))
+    return Table(("what", *labels), told, "What made the two runs", words=frozenset({0, 1, 2}))
 
 
 def _options(header: Header) -> str:

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from ..measures.text import NONE, count, few, figure, listed, rough, sentence
 from ..page import Block, Page, Table, Text, Verdict
 from ..robots.examine import TRIED
 from ..robots.gaps import STEPS
-from ..robots.records import RUNS, TOLERANCE, BackendRow, ExaminedModel, RunGap, Survey
+from ..robots.records import (
+    RUNS,
+    TOLERANCE,
+    BackendRow,
+    ExaminedModel,
+    RunGap,
+    Survey,
+    WitnessRow,
+)
+from . import template
 
 _WIDEST = 28  # characters of a name
 _LISTED = 20  # of what is wrong, and of features
 
-LEGEND = (
-    "bits: {default} computes the bits of the engine without us, and two futures of a State are "
-    "the same bits on every engine. no contacts, contacts: the largest gap to {default} within "
-    "{steps} steps under random commands, in rad (hinges) or m (slides and free bodies), whichever "
-    "is larger; h: it vanishes with the timestep; rounding: changed by rounding alone, {default} "
-    "gets as far from its own run; still: nothing in it moves. witness: its reading, and its "
-    "largest gap in m."
-)
-LEGEND_RUNS = " runs: of {tried}, how many run on {backends}."
 SUMS = (
     "How many of {total} models load, and of how many the gap without contacts to {default} is "
     "within {tolerance:g} rad or m, no more than rounding makes, or vanishes with the timestep"
@@ -36,7 +37,7 @@ _SUMS_HEADERS = (
     "rounding",
     "vanishes",
 )
-INSIDE = "Shapes are inside each other at the start of {number} of {total}: {pairs}."
+_MARKS = {None: NONE, True: "✓", False: "✗"}
 
 
 def page(survey: Survey, widest: int = _WIDEST) -> Page:
@@ -48,51 +49,49 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
     """
     if len(survey.models) == 1 and not survey.parts:
         return _one(survey, survey.models[0])
-    others = _others(survey)
-    headers = ["model", "bits", *_headers(others), "witness"]
-    words = {0, 1, len(headers) - 1}
-    wide: set[int] = set()
-    if tried := any(each.scenarios for row in survey.models for each in row.backends.values()):
-        words, wide = words | {len(headers)}, {len(headers) + 1}
-        headers += ["runs", "cost"]
-    rows = [
-        [_short(row.file, widest), *_row(survey, row, others)][: len(headers)]
-        for row in survey.models
-    ]
-    blocks: list[Block] = [
-        Table(headers, rows, words=frozenset(words), wide=frozenset(wide)),
-        Text(_legend(survey, tried), small=True),
-    ]
-    blocks += _sums(survey, others)
+    backends = list(dict.fromkeys(name for row in survey.models for name in row.backends))
+    others = [name for name in backends if name != survey.default]
+    tried = any(each.scenarios for row in survey.models for each in row.backends.values())
+    wrong = [f"{file}: {text}" for file, texts in survey.wrong.items() for text in texts]
+    return template.page(
+        "robots",
+        models=count(len(survey.models), "model"),
+        made_with=survey.made_with,
+        table=[_table(survey, others, widest, tried)],
+        default=survey.default,
+        steps=STEPS,
+        tried=", ".join(TRIED) if tried else None,
+        backends=listed(backends),
+        sums=_sums(survey, others),
+        refused=[block for other in others for block in _refused(survey.models, other)],
+        parts=count(len(survey.parts), "file") if survey.parts else None,
+        wrong=[Verdict(text, False) for text in wrong[:_LISTED]],
+        more=max(len(wrong) - _LISTED, 0) or None,
+        fine=None if wrong else True,
+    )
+
+
+def _table(survey: Survey, others: Sequence[str], widest: int, tried: bool) -> Table:
+    """A row for each model."""
+    models = survey.models
+    columns = {
+        "model": [_short(row.file, widest) for row in models],
+        "bits": [_bits(survey, row) for row in models],
+    }
     for other in others:
-        blocks += _refused(survey.models, other)
-    if survey.parts:
-        files = count(len(survey.parts), "file")
-        verb = "is" if len(survey.parts) == 1 else "are"
-        blocks.append(Text(f"{files} that others include {verb} no model alone: left out."))
-    wrong = [(file, text) for file, said in survey.wrong.items() for text in said]
-    blocks += [Verdict(f"{file}: {text}", False) for file, text in wrong[:_LISTED]]
-    if len(wrong) > _LISTED:
-        blocks.append(Text(f"And {len(wrong) - _LISTED} more like these; --json has them all."))
-    if not wrong:
-        blocks.append(Verdict("every model was examined, and nothing contradicts another", True))
-    return Page(f"{count(len(survey.models), 'model')} on every engine", survey.made_with, blocks)
-
-
-def _others(survey: Survey) -> list[str]:
-    names = dict.fromkeys(name for row in survey.models for name in row.backends)
-    return [name for name in names if name != survey.default]
-
-
-def _headers(others: Sequence[str]) -> list[str]:
-    if len(others) == 1:
-        return ["no contacts", "contacts"]
-    return [f"{name}, {what}" for name in others for what in ("no contacts", "contacts")]
-
-
-def _row(survey: Survey, row: ExaminedModel, others: Sequence[str]) -> list[str]:
-    gaps = [_gap(row, other, without) for other in others for without in (True, False)]
-    return [_bits(survey, row), *gaps, _witness(row), _runs(row), _cost(row)]
+        of = f"{other}, " if len(others) > 1 else ""
+        columns[f"{of}no contacts"] = [_gap(row, other, True) for row in models]
+        columns[f"{of}contacts"] = [_gap(row, other, False) for row in models]
+    columns["witness"] = [_witness(row) for row in models]
+    if tried:
+        columns |= {"runs": list(map(_runs, models)), "cost": list(map(_cost, models))}
+    words = {"model", "bits", "witness", "runs"}
+    return Table(
+        list(columns),
+        list(zip(*columns.values(), strict=True)),
+        words=frozenset(k for k, name in enumerate(columns) if name in words),
+        wide=frozenset(k for k, name in enumerate(columns) if name == "cost"),
+    )
 
 
 def _short(name: str, widest: int) -> str:
@@ -117,15 +116,14 @@ def _gap(model: ExaminedModel, other: str, without: bool) -> str:
     gap = row.without_contacts if without else row.with_contacts
     if gap is None:
         return "refused" if (row.refusal_without if without else row.refusal) else NONE
-    if not model.nv:
-        return "still"
-    if gap.explodes:
-        return "explodes"
-    if gap.ended:
-        return "stops"
-    if gap.is_rounding:
-        return "rounding"
-    return figure(gap.largest) + (" h" if gap.first_order else "")
+    outcomes = {
+        "still": not model.nv,
+        "explodes": gap.explodes,
+        "stops": gap.ended,
+        "rounding": gap.is_rounding,
+    }
+    size = figure(gap.largest) + (" h" if gap.first_order else "")
+    return next((word for word, holds in outcomes.items() if holds), size)
 
 
 def _witness(row: ExaminedModel) -> str:
@@ -146,13 +144,7 @@ def _cost(row: ExaminedModel) -> str:
     return " ".join(costs) or NONE
 
 
-def _legend(survey: Survey, tried: bool) -> str:
-    backends = list(dict.fromkeys(name for row in survey.models for name in row.backends))
-    runs = LEGEND_RUNS.format(tried=", ".join(TRIED), backends=listed(backends)) * tried
-    return LEGEND.format(default=survey.default, steps=STEPS) + runs
-
-
-def _sums(survey: Survey, others: Sequence[str]) -> Iterator[Block]:
+def _sums(survey: Survey, others: Sequence[str]) -> list[Block]:
     """How many models each engine loads and what becomes of them, and what the witness reads."""
     models, total = survey.models, len(survey.models)
     rows = []
@@ -170,16 +162,17 @@ def _sums(survey: Survey, others: Sequence[str]) -> Iterator[Block]:
         known = range(3) if name == survey.default else (0, 1, 3, 4, 5)
         rows.append((name, *(str(n) if k in known else NONE for k, n in enumerate(counts))))
     title = SUMS.format(total=total, default=survey.default, tolerance=TOLERANCE)
-    yield Table(_SUMS_HEADERS, rows, title)
     inside = [f"{row.file}, {row.inside[0]}" for row in models if row.inside]
-    if inside:
-        pairs = few(inside, _LISTED, "; ")
-        yield Text(INSIDE.format(number=len(inside), total=total, pairs=pairs))
-    asked = [row.witness for row in models if row.witness is not None]
-    grades = Counter(witness.grade or "refused" for witness in asked)
-    if asked:
-        rows = [(grade, str(number)) for grade, number in sorted(grades.items())]
-        yield Table(("the witness's reading", "models"), rows)
+    grades = Counter(row.witness.grade or "refused" for row in models if row.witness is not None)
+    read = [(grade, str(number)) for grade, number in sorted(grades.items())]
+    return template.blocks(
+        "robots_sums",
+        sums=[Table(_SUMS_HEADERS, rows, title)],
+        inside=len(inside) or None,
+        total=total,
+        pairs=few(inside, _LISTED, "; "),
+        grades=[Table(("the witness's reading", "models"), read)] if read else [],
+    )
 
 
 def _refused(rows: Sequence[ExaminedModel], other: str) -> list[Block]:
@@ -208,47 +201,62 @@ def _refused(rows: Sequence[ExaminedModel], other: str) -> list[Block]:
 
 def _one(survey: Survey, row: ExaminedModel) -> Page:
     """All that was found of one model."""
-    names, backends = list(row.backends), row.backends.values()
-    blocks: list[Block] = []
-    if row.nq is not None:
-        sizes = f"nq {row.nq}, nv {row.nv}, nu {row.nu}, nbody {row.nbody}, ngeom {row.ngeom}"
-        blocks.append(Text(f"{sizes}; examined in {row.took:g} s."))
-    lines = [
-        ("loads", [_loads(each) for each in backends]),
-        ("the bits of the engine without us", [_mark(each.equals_engine) for each in backends]),
-        ("two futures of a State are one", [_mark(each.restores) for each in backends]),
-        ("gap without contacts", [_whole(each.without_contacts) for each in backends]),
-        ("gap with contacts", [_whole(each.with_contacts) for each in backends]),
-    ]
-    for name in TRIED:
-        cells = [each.scenarios.get(name) for each in backends]
-        marks = [NONE if cell is None else "✓" if cell == RUNS else "no" for cell in cells]
-        lines.append((f"scenario {name}", marks))
-    costs = [NONE if each.cost is None else f"{each.cost:.3g} ×" for each in backends]
-    lines.append(("cost of a step, on this machine", costs))
-    lines = [(what, cells) for what, cells in lines if set(cells) != {NONE}]
-    table = Table(
-        ("", *names), [(what, *cells) for what, cells in lines], words=frozenset(range(9))
+    wrong, witness = row.wrong(survey.default), row.witness or WitnessRow()
+    reason = sentence(witness.refusal) if witness.refusal else None
+    facts: dict[str, Callable[[BackendRow], str]] = {
+        "loads": _loads,
+        "the bits of the engine without us": lambda each: _MARKS[each.equals_engine],
+        "two futures of a State are one": lambda each: _MARKS[each.restores],
+        "gap without contacts": lambda each: _whole(each.without_contacts),
+        "gap with contacts": lambda each: _whole(each.with_contacts),
+        **{f"scenario {name}": partial(_scenario, name) for name in TRIED},
+        "cost of a step, on this machine": lambda each: (
+            NONE if each.cost is None else f"{each.cost:.3g} ×"
+        ),
+    }
+    rows = [(fact, *map(cell, row.backends.values())) for fact, cell in facts.items()]
+    rows = [cells for cells in rows if set(cells[1:]) != {NONE}]
+    table = Table(("what", *row.backends), rows, words=frozenset(range(9)))
+    return template.page(
+        "robots_one",
+        file=row.file,
+        made_with=row.made_with,
+        **{name: getattr(row, name) for name in ("nq", "nv", "nu", "nbody", "ngeom", "took")},
+        table=[table] if row.backends else [],
+        backends=[block for name in row.backends for block in _refusals(name, row.backends[name])],
+        refusal=None if witness.gap is not None else reason,
+        grade=witness.grade,
+        frames=count(witness.frames, "frame"),
+        gap=None if witness.gap is None else rough(witness.gap),
+        no_reading=sentence(witness.refusal)
+        if witness.gap is not None and witness.refusal
+        else None,
+        wrong=[Verdict(text, False) for text in wrong],
+        fine=None if wrong else True,
     )
-    blocks += [table] if names else []
-    for name, found in row.backends.items():
-        for when, text in (("", found.refusal), (" with contacts off", found.refusal_without)):
-            if text and not (when and text == found.refusal):
-                blocks.append(Text(f"{name} refuses it{when}: {text}"))
-        blocks += [
-            Text(f"{name} warns: {text}") for text in found.warnings or found.warnings_without
-        ]
-        refused = dict.fromkeys(word for word in found.scenarios.values() if word != RUNS)
-        for reason in refused:
-            which = [scenario for scenario, word in found.scenarios.items() if word == reason]
-            blocks.append(Text(f"{', '.join(which)} on {name}: {reason}"))
-    if row.witness is not None:
-        blocks.append(Text(_witness_words(row)))
-    wrong = row.wrong(survey.default)
-    blocks += [Verdict(text, False) for text in wrong]
-    if not wrong:
-        blocks.append(Verdict("it was examined, and nothing contradicts another", True))
-    return Page(f"{row.file} on every engine", row.made_with, blocks)
+
+
+def _refusals(name: str, row: BackendRow) -> list[Block]:
+    """What an engine refuses of a model, and of what it warns."""
+    warnings = [f"{name} warns: {text}" for text in row.warnings or row.warnings_without]
+    reasons: dict[str, list[str]] = {}
+    for scenario, word in row.scenarios.items():
+        reasons.setdefault(word, []).append(scenario)
+    stops = [f"{', '.join(of)} on {name}: {why}" for why, of in reasons.items() if why != RUNS]
+    without = row.refusal_without if row.refusal_without != row.refusal else ""
+    return template.blocks(
+        "robots_backend",
+        name=name,
+        refusal=row.refusal or None,
+        refusal_without=without or None,
+        further=[Text(text) for text in (*warnings, *stops)],
+    )
+
+
+def _scenario(name: str, row: BackendRow) -> str:
+    """Whether an experiment runs."""
+    word = row.scenarios.get(name)
+    return NONE if word is None else "✓" if word == RUNS else "no"
 
 
 def _loads(row: BackendRow) -> str:
@@ -257,22 +265,14 @@ def _loads(row: BackendRow) -> str:
     return "no" if row.refusal_without else "with contacts off"
 
 
-def _mark(value: bool | None) -> str:
-    return NONE if value is None else "✓" if value else "✗"
-
-
 def _whole(gap: RunGap | None) -> str:
     if gap is None:
         return NONE
+    sizes = {"hinge": "rad", "slide": "m", "position": "m", "turn": "rad"}
     parts = [
-        f"{what} {rough(value)} {unit}"
-        for what, value, unit in (
-            ("hinge", gap.hinge, "rad"),
-            ("slide", gap.slide, "m"),
-            ("free body", gap.position, "m"),
-            ("turn", gap.turn, "rad"),
-        )
-        if value is not None
+        f"{'free body' if name == 'position' else name} {rough(getattr(gap, name))} {unit}"
+        for name, unit in sizes.items()
+        if getattr(gap, name) is not None
     ]
     text = ", ".join(parts) or NONE
     if gap.shrinks is not None:
@@ -280,17 +280,3 @@ def _whole(gap: RunGap | None) -> str:
     if gap.floor is not None:
         text += f"; rounding alone makes {rough(gap.floor)}"
     return f"{text}; {gap.ended} (after {count(gap.steps, 'step')})" if gap.ended else text
-
-
-def _witness_words(row: ExaminedModel) -> str:
-    witness = row.witness
-    assert witness is not None
-    if witness.gap is None:
-        return f"The witness refuses it: {sentence(witness.refusal)}"
-    text = (
-        f"The witness, by its {witness.grade}, places {count(witness.frames, 'frame')} within "
-        f"{rough(witness.gap)} m of the engine."
-    )
-    if witness.refusal:
-        text += f" It has no reading of its own: {sentence(witness.refusal)}"
-    return text

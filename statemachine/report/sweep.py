@@ -3,43 +3,35 @@
 from __future__ import annotations
 
 from ..measures.text import count, listed
-from ..page import Block, Page, Table, Text, Verdict
+from ..page import Page, Table
 from ..sweep import PreparedSweep, SweepSummary
+from . import template
+from .template import if_true, versions_of
 
 
 def page(ready: PreparedSweep, summary: SweepSummary) -> Page:
     """The summary, and how the dataset is read."""
-    asked = ready.sweep
-    text = (
-        f"{count(summary.points, 'point')}"
-        f"{f' ({listed(asked.vary)})' if asked.vary else ''}, {count(asked.seeds, 'seed')}, "
-        f"{listed(list(ready.backends))}: {count(summary.cells, 'cell')}. "
-        f"{_ran(summary)}"
-    )
-    blocks: list[Block] = [Text(text)]
-    if summary.failed:
-        rows = [("done", str(summary.done))]
-        rows += [(kind, str(number)) for kind, number in summary.failed.items()]
-        blocks.append(Table(("what became of them", "cells"), rows, words=frozenset({0})))
-    blocks.append(Text(f"Read it: import pyarrow.dataset; {summary.read}"))
-    failed = sum(summary.failed.values())
-    if failed:
-        blocks.append(
-            Verdict(
-                f"{count(failed, 'cell')} failed: the column error of each says why; "
-                "--retry-failed runs them again",
-                False,
-            )
-        )
-    else:
-        blocks.append(Verdict(f"{count(summary.done, 'cell')} done, none failed", True))
-    versions = ", ".join(f"{name} {version}" for name, version in ready.versions.items())
-    return Page(f"Sweep of {ready.sweep.what.rpartition('/')[2]}", versions, blocks)
-
-
-def _ran(summary: SweepSummary) -> str:
-    if not summary.ran:
-        return "Nothing was missing."
+    asked, failed = ready.sweep, sum(summary.failed.values())
     before = summary.cells - summary.ran
-    kept = f"; {count(before, 'cell')} there before" if before else ""
-    return f"{summary.ran} of them ran now, in {summary.seconds:.3g} s{kept}."
+    rows = [(kind, str(n)) for kind, n in {"done": summary.done, **summary.failed}.items()]
+    outcomes = Table(("what became of them", "cells"), rows, words=frozenset({0}))
+    return template.page(
+        "sweep",
+        what=asked.what.rpartition("/")[2],
+        versions=versions_of(ready.versions),
+        points=count(summary.points, "point"),
+        varied=f" ({listed(asked.vary)})" if asked.vary else "",
+        seeds=count(asked.seeds, "seed"),
+        backends=listed(list(ready.backends)),
+        cells=count(summary.cells, "cell"),
+        idle=if_true(not summary.ran),
+        ran=summary.ran or None,
+        seconds=summary.seconds,
+        before=f"; {count(before, 'cell')} there before" if before else "",
+        outcomes=[outcomes] if summary.failed else [],
+        read=summary.read,
+        bad=False if failed else None,
+        failed=count(failed, "cell"),
+        good=None if failed else True,
+        done=count(summary.done, "cell"),
+    )

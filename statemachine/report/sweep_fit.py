@@ -6,61 +6,45 @@ from ..measures.text import listed, quantity
 from ..page import Block, Table, Text
 from ..sweep.analysis import SweepReport
 from ..sweep.analysis_together import BroughtTogether
+from . import template
 from .sweep_pictures import fit_curve
+from .template import if_true
 
-ROUNDING = "Nothing is to be brought together: every gap is inside the chaos floor."
-NO_RANGE = "No parameter has three numbers or a range: nothing is fitted."
-NOT_FITTED = "{label} is not fitted: {why_not}."
-OWN_IS_BEST = "The model's own {label} is the best already: at {value}, {sizes}."
+NONE_FITTED = {
+    True: "Nothing is to be brought together: every gap is inside the chaos floor.",
+    False: "No parameter has three numbers or a range: nothing is fitted.",
+}
 LINES = {
+    "not fitted": "{label} is not fitted: {why_not}.",
+    "own": "The model's own {label} is the best already: at {value}, {sizes}.",
     "none": "No value of {label} is better than {other}: at the best, {value}, {sizes}.",
     "edge": "{label} {where}: the gap is least at the edge of the range, {value} ({sizes}): look "
     "beyond it.",
     "together": "{label} = {value} {where} brings {pair} together: {sizes}.",
     "closer": "{label} = {value} {where} brings {pair} closer, not together: {sizes}.",
 }
-SIZES = "{what} {before} → {after}"
-VARIED = {
-    "right": "{left} keeps the model's own {label}, {right} has the values.",
-    "both": "Both sides have the same {label}.",
-}
-UNCHECKED = "It is not checked by a run: {why_not}."
-REFINED = (
-    "The run is far off what was predicted: between its values the design is too coarse for this "
-    "gap. So {number} values from {low} to {high} were run, {apart} apart: the value above is the "
-    "best of them, and ± is that distance."
-)
 
 
 def together(found: SweepReport) -> list[Block]:
     """The sentence of each fit, how it was made, and its picture."""
-    if not found.together:
-        return [Text(ROUNDING if found.only_rounding else NO_RANGE)]
-    blocks: list[Block] = []
-    for each in found.together:
-        blocks.append(Text(line(found, each)))
-        if each.fit is not None:
-            blocks += _how(found, each)
-        picture = fit_curve(found, each)
-        if picture is not None:
-            blocks.append(picture)
-    return blocks
+    blocks = [block for fit in found.together for block in _fit(found, fit)]
+    return blocks or [Text(NONE_FITTED[found.only_rounding])]
 
 
 def line(found: SweepReport, each: BroughtTogether) -> str:
     """What a fit says, in a sentence."""
     unit, what = found.quantity.unit, found.quantity.says
     if each.fit is None:
-        return NOT_FITTED.format(label=each.label, why_not=each.why_not)
+        return LINES["not fitted"].format(label=each.label, why_not=each.why_not)
     before, after = quantity(each.before, unit), quantity(each.after, unit)
     own = each.verdict == "none" and _is_own(each)
-    return (OWN_IS_BEST if own else LINES[each.verdict]).format(
+    return LINES["own" if own else each.verdict].format(
         label=each.label,
         value=_fitted(each),
         where=f"in {found.sides[1]}" if each.varied == "right" else "in both",
         pair=listed(list(found.sides)),
         other="any other" if each.own is None else "the model's own",
-        sizes=SIZES.format(what=what, before=before, after=after),
+        sizes=f"{what} {before} → {after}",
     )
 
 
@@ -72,12 +56,11 @@ def _is_own(each: BroughtTogether) -> bool:
     return abs(each.value - each.own) <= max(2 * (each.error or 0.0), 0.02 * wide)
 
 
-def _how(found: SweepReport, each: BroughtTogether) -> list[Block]:
-    """How a fit was made, and what a run says of it."""
-    unit, fit = found.quantity.unit, each.fit
-    assert fit is not None
-    left, right = found.sides
-    lines = [VARIED[each.varied].format(left=left, right=right, label=each.label)]
+def _fit(found: SweepReport, each: BroughtTogether) -> list[Block]:
+    """What a fit says, how it was made, and what a run says of it."""
+    unit, fit, picture = found.quantity.unit, each.fit, fit_curve(found, each)
+    if fit is None:
+        return [Text(line(found, each))]
     figures = {
         "the model's own value": None if each.own is None else _times(each, each.own),
         "values looked at": " to ".join(_times(each, end) for end in fit.bounds),
@@ -85,20 +68,28 @@ def _how(found: SweepReport, each: BroughtTogether) -> list[Block]:
         "curves in the mean, over settings and seeds": str(fit.curves),
         "± is the standard error, from": fit.of if fit.error is not None and not each.tried else "",
     }
-    if each.measured is None:
-        lines.append(UNCHECKED.format(why_not=each.why_not))
-    else:
+    if each.measured is not None:
         figures["gap of runs there"] = quantity(each.measured, unit)
         figures["predicted for them"] = quantity(each.predicted, unit)
         figures["pairs of runs"] = str(each.pairs)
-    if each.tried is not None and each.error is not None:
-        values = each.tried[0]
-        ends = {"low": _times(each, min(values)), "high": _times(each, max(values))}
-        apart = _times(each, each.error)
-        lines.append(REFINED.format(number=len(values) - 1, apart=apart, **ends))
     rows = [(name, value) for name, value in figures.items() if value]
-    table = Table(("the fit", each.label), rows, words=frozenset({0, 1}))
-    return [table, Text(" ".join(lines), small=True)]
+    values = each.tried[0] if each.tried is not None and each.error is not None else None
+    right = each.varied == "right"
+    return template.blocks(
+        "sweep_fit",
+        line=[Text(line(found, each))],
+        table=[Table(("the fit", each.label), rows, words=frozenset({0, 1}))],
+        left=found.sides[0] if right else None,
+        right=found.sides[1],
+        both=if_true(not right),
+        label=each.label,
+        why_not=each.why_not if each.measured is None else None,
+        number=str(len(values) - 1) if values else None,
+        low=_times(each, min(values or [0.0])),
+        high=_times(each, max(values or [0.0])),
+        apart=_times(each, each.error or 0.0),
+        pictures=[picture] if picture else [],
+    )
 
 
 def _between(each: BroughtTogether, ends: tuple[float, float] | None) -> str:

@@ -47,33 +47,24 @@ def map_picture(found: SweepReport) -> HeatMap | Traces | None:
 
 def _curve(found: SweepReport, chart: GapMap, title: str) -> Traces:
     """The gap over one parameter."""
-    main, scale = found.quantity, reading(found.quantity.unit)[0]
+    main, (scale, unit) = found.quantity, reading(found.quantity.unit)
     place = found.parameters.index(chart.across)
-    by = sorted(
-        (float(s.values[place]), s)
-        for s in found.settings
-        if s.median is not None
-    ) if not chart.sampled else []  # fmt: skip
-    x = [v for v, _ in by]
-    curves: dict[str, tuple[Sequence[float], Sequence[float]]] = {}
-    if by:
-        curves["median of the seeds"] = (x, [(s.median or 0.0) * scale for _, s in by])
-        if found.seeds > 1:
-            curves["worst seed"] = (x, [(s.worst or 0.0) * scale for _, s in by])
-        if found.floor is not None:
-            curves["chaos floor"] = (x, [(s.floor or 0.0) * scale for _, s in by])
-    else:
-        pairs = [
-            (float(v), g * scale)
-            for v, g in zip(chart.columns, chart.gap[0], strict=True)
-            if g is not None
-        ]
-        x = [v for v, _ in pairs]
-        curves["median"] = (x, [g for _, g in pairs])
+    known = [setting for setting in found.settings if setting.median is not None]
+    known.sort(key=lambda setting: setting.values[place])
+    x = [float(setting.values[place]) for setting in known]
+    figures = {"median of the seeds": [setting.median for setting in known]}
+    if found.seeds > 1:
+        figures["worst seed"] = [setting.worst for setting in known]
+    if found.floor is not None:
+        figures["chaos floor"] = [setting.floor for setting in known]
+    if chart.sampled or not known:
+        pairs = [pair for pair in zip(chart.columns, chart.gap[0], strict=True) if None not in pair]
+        x, figures = [float(value) for value, _ in pairs], {"median": [gap for _, gap in pairs]}
+    curves: dict[str, tuple[Sequence[float], Sequence[float]]] = {
+        name: (x, [scale * (gap or 0.0) for gap in gaps]) for name, gaps in figures.items()
+    }
     curves["tolerance"] = ([x[0], x[-1]], [main.tolerance * scale] * 2)
-    return Traces(
-        title, axis(found, chart.across), f"gap [{reading(main.unit)[1].strip()}]", curves
-    )
+    return Traces(title, axis(found, chart.across), f"gap [{unit.strip()}]", curves)
 
 
 def bars(found: SweepReport) -> Bars | None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..measures.text import NONE, few, fixed, listed, quantity, reading, rough, rounded
 from ..page import Block, Headline, Page, Section, Table, TableCell, Text
 from ..sweep.analysis import SweepReport
 from ..sweep.analysis_gaps import VERDICTS, GapMap, SettingGap
+from . import template
 from .sweep_fit import line, together
 from .sweep_pictures import axis, bars, map_picture, setting_word
+from .template import if_true, versions_of
 
 _SHOWN = 5  # settings of the largest gaps
 _COLUMNS = 7  # of a map that 80 characters have room for
@@ -18,24 +22,6 @@ CAUSES = {
     "rank": "The gap goes most with {label}.",
     "share": "The gap is most sensitive to {label} (total {total}).",
 }
-DESIGN = (
-    "{settings} settings{varied}; starts (seeds) of each: {seeds}. The gap of a setting is the "
-    "median over its seeds; that of the fingertip or of the joint angles is the largest of the "
-    "moments that the dataset keeps. A setting agrees if the gap is within tolerance at every seed."
-)
-FLOOR = (
-    "The chaos floor is what rounding alone makes of a run: {backend} ran again, its starts and "
-    "commands changed by {rounding:g}, at {where} of {settings} settings (the nearest one stands "
-    "for others): {cells} cells, {seconds:.2g} s. The largest gap that this makes is {width}. "
-    "Settings in which the gap between the engines is inside it, so that nothing can be concluded: "
-    "{inside}."
-)
-NO_FLOOR = "The chaos floor is not known: {why}."
-LEFT_OUT = "Left out: cells that {what}. Settings that thereby have no gap: {none}."
-MEDIAN = "Each figure is the median over {others}. "
-MIDDLES = "{sampled}: the middles of equal parts of the range. "
-MARKS = "~: inside the chaos floor. =: within tolerance."
-MAP = "The gap of the {what},{unit}: {down}{across} across"
 NO_SHARES = {
     "rounding": "To nothing: every gap is inside the chaos floor.",
     "same": "Nothing can be said: the gap is the same everywhere, or there are too few.",
@@ -48,12 +34,6 @@ METHODS = {
     "values; settings: {samples}.",
     "rank": "Squares of Spearman's rank correlation; settings: {samples}.",
 }
-SHARES = (
-    "First order: the share of the gap's variance that a parameter explains alone. Total: with "
-    "what it does together with others. Where the total is near 0 the parameter does not matter."
-)
-INTERVALS = "Intervals: {error}."
-NO_INTERVALS = "They have no error here: it takes three seeds."
 
 
 def page(found: SweepReport, command: str = "") -> Page:
@@ -63,17 +43,30 @@ def page(found: SweepReport, command: str = "") -> Page:
         found: The report.
         command: What was typed, or "".
     """
-    varied = f" over {listed(found.parameters)}" if found.parameters else ""
-    design = DESIGN.format(settings=len(found.settings), varied=varied, seeds=found.seeds)
-    blocks: list[Block] = [Text(design), Text(_floor(found)), *_left_out(found)]
-    blocks.append(Section("where", "Where they agree", _where(found)))
+    sections = [Section("where", "Where they agree", _where(found))]
     if found.parameters:
-        blocks.append(Section("sensitive", "What the gap is sensitive to", _sensitive(found)))
-        blocks.append(Section("together", "What brings them together", together(found)))
-    versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
-    origin = f"{versions}; {found.folder}" + (f"; {command}" if command else "")
-    title = f"Sweep of {found.what}: {found.sides[0]} and {found.sides[1]}"
-    return Page(title, origin, blocks, _headline(found))
+        sections += [
+            Section("sensitive", "What the gap is sensitive to", _sensitive(found)),
+            Section("together", "What brings them together", together(found)),
+        ]
+    failed = {f"failed with {kind}": number for kind, number in found.failed.items()}
+    counts = {**failed, "have not run": found.missing}
+    left_out = [f"{kind}: {number}" for kind, number in counts.items() if number]
+    return template.page(
+        "sweep_report",
+        _headline(found),
+        what=found.what,
+        left=found.sides[0],
+        right=found.sides[1],
+        origin="; ".join(filter(None, (versions_of(found.versions), str(found.folder), command))),
+        settings=len(found.settings),
+        varied=f" over {listed(found.parameters)}" if found.parameters else "",
+        seeds=found.seeds,
+        **_floor_slots(found),
+        left_out=", ".join(left_out) or None,
+        none=found.quantity.counts.get("no runs", 0),
+        sections=sections,
+    )
 
 
 def _headline(found: SweepReport) -> Headline:
@@ -118,43 +111,31 @@ def _quantities(found: SweepReport) -> Table:
     )
 
 
-def _floor(found: SweepReport) -> str:
+def _floor_slots(found: SweepReport) -> dict[str, Any]:
+    """How high the chaos floor is, and how it was made; or why it is not known."""
     floor = found.floor
     if floor is None:
-        return NO_FLOOR.format(why=found.no_floor)
+        return {"no_floor": found.no_floor, "backend": None, "width": None}
     widths = [each.floor for each in found.settings if each.floor is not None]
-    return FLOOR.format(
-        backend=floor.backend,
-        rounding=floor.rounding,
-        where=floor.settings,
-        settings=len(found.settings),
-        cells=floor.cells,
-        seconds=floor.seconds,
-        width=rough(max(widths), found.quantity.unit),
-        inside=sum(each.inside_floor for each in found.settings),
-    )
-
-
-def _left_out(found: SweepReport) -> list[Block]:
-    """What is told of cells that have no run."""
-    kinds = {f"failed with {kind}": number for kind, number in found.failed.items()}
-    counts = {**kinds, "have not run": found.missing}
-    what = [f"{kind}: {number}" for kind, number in counts.items() if number]
-    none = found.quantity.counts.get("no runs", 0)
-    return [Text(LEFT_OUT.format(what=", ".join(what), none=none))] if what else []
+    return {
+        **{"no_floor": None, "backend": floor.backend, "rounding": floor.rounding},
+        **{"where": floor.settings, "cells": floor.cells, "seconds": floor.seconds},
+        "width": rough(max(widths), found.quantity.unit),
+        "inside": sum(each.inside_floor for each in found.settings),
+    }
 
 
 def _where(found: SweepReport) -> list[Block]:
     blocks: list[Block] = [_quantities(found)]
     picture = map_picture(found)
     if found.map is not None:
-        blocks += _map_tables(found, found.map)
-        others, sampled = listed(found.map.others), listed(found.map.sampled)
-        notes = MEDIAN.format(others=others) if others else ""
-        notes += MIDDLES.format(sampled=sampled) if sampled else ""
-        blocks.append(Text(notes + MARKS, small=True))
-    if picture is not None:
-        blocks.append(picture)
+        blocks += template.blocks(
+            "sweep_map",
+            tables=_map_tables(found, found.map),
+            others=listed(found.map.others) or None,
+            sampled=listed(found.map.sampled) or None,
+            pictures=[picture] if picture else [],
+        )
     if len(found.settings) > _SHOWN or found.map is None:
         blocks.append(_largest(found))
     return blocks
@@ -185,7 +166,7 @@ def _map_tables(found: SweepReport, chart: GapMap) -> list[Table]:
         for label in (chart.up, chart.across)
     )
     down = f"{up} down, " if chart.up else ""
-    title = MAP.format(what=found.quantity.says, unit=name, down=down, across=across)
+    title = f"The gap of the {found.quantity.says},{name}: {down}{across} across"
     return [
         Table(
             (chart.up or chart.across, *places[k : k + _COLUMNS]),
@@ -237,18 +218,21 @@ def _sensitive(found: SweepReport) -> list[Block]:
         )
         for each in shares.indices
     ]
-    heads, title = (
-        ("parameter", "first order", "95 %", "total", "95 %"),
-        "Shares of the gap's variance",
-    )
+    heads = ("parameter", "first order", "95 %", "total", "95 %")
+    table = Table(heads, rows, "Shares of the gap's variance")
     if rank:
-        heads, rows, title = ("parameter", "rank²"), [r[:2] for r in rows], "What the gap goes with"
-    error = INTERVALS.format(error=shares.error) if shares.error else NO_INTERVALS * (not rank)
-    method = METHODS[shares.method].format(samples=shares.samples)
-    lines = [SHARES * (not rank), method, error, *shares.notes]
-    text = Text(" ".join(text for text in lines if text), small=True)
+        table = Table(("parameter", "rank²"), [row[:2] for row in rows], "What the gap goes with")
     picture = bars(found)
-    return [Table(heads, rows, title), text, *([picture] if picture else [])]
+    return template.blocks(
+        "sweep_shares",
+        table=[table],
+        sobol=if_true(not rank),
+        method=METHODS[shares.method].format(samples=shares.samples),
+        error=shares.error or None,
+        no_error=if_true(not rank and not shares.error),
+        notes=" ".join(shares.notes) or None,
+        pictures=[picture] if picture else [],
+    )
 
 
 def _interval(pair: tuple[float, float] | None) -> str:

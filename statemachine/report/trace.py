@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..measures.text import figure, milliseconds, numbers, short_time
 from ..page import Page, Table, Text
 from ..runs import COLUMNS, Trace
+from . import template
+from .template import if_true, versions_of
 
 
 def page(trace: Trace, name: str) -> Page:
@@ -28,7 +28,7 @@ def page(trace: Trace, name: str) -> Page:
         ("gravity", numbers(header.gravity) + " m/s²"),
         ("options", ", ".join(f"{key}={value}" for key, value in header.options.items()) or "none"),
         ("seed", "none" if header.provenance.seed is None else str(header.provenance.seed)),
-        ("versions", ", ".join(f"{k} {v}" for k, v in header.provenance.versions.items())),
+        ("versions", versions_of(header.provenance.versions)),
         ("made by", header.command or "a program"),
     ]
     if header.rewritten:
@@ -37,35 +37,28 @@ def page(trace: Trace, name: str) -> Page:
         )
     if header.ended:
         facts.append(("ended", header.ended))
-    blocks: list[Any] = [Text(header.says)] if header.says else []
-    blocks += [
-        Table(("what", "is"), facts, title="What it is of", words=frozenset({0, 1})),
-        Table(
-            ("column", "shape", "smallest", "largest"),
-            [_row(column, trace) for column in COLUMNS if column in trace],
-            title="What is in it",
-        ),
-    ]
-    touches = trace.touches()
-    if touches:
-        blocks.append(
-            Table(
-                ("bodies", "first touch", "rows"),
-                [
-                    (
-                        pair,
-                        short_time(trace.time[int(np.argmax(rows))] - trace.time[0]),
-                        f"{int(rows.sum())} of {len(trace)}",
-                    )
-                    for pair, rows in touches.items()
-                ],
-                title="What touches what",
-            )
+    touches = [
+        (
+            pair,
+            short_time(trace.time[int(np.argmax(rows))] - trace.time[0]),
+            f"{int(rows.sum())} of {len(trace)}",
         )
-    elif "contact_row" in trace:
-        blocks.append(Text("Nothing touches anything."))
-    return Page(
-        f"{name}: {header.experiment} on {header.label}", "opened without an engine", blocks
+        for pair, rows in trace.touches().items()
+    ]
+    columns = [_row(column, trace) for column in COLUMNS if column in trace]
+    tables = [
+        Table(("what", "is"), facts, "What it is of", words=frozenset({0, 1})),
+        Table(("column", "shape", "smallest", "largest"), columns, "What is in it"),
+        Table(("bodies", "first touch", "rows"), touches, "What touches what"),
+    ]
+    return template.page(
+        "trace",
+        name=name,
+        experiment=header.experiment,
+        engine=header.label,
+        says=[Text(header.says)] if header.says else [],
+        tables=[table for table in tables if table.rows],
+        nothing=if_true("contact_row" in trace and not touches),
     )
 
 

@@ -11,7 +11,9 @@ from ..compare.labels import lacking
 from ..compare.why import ADDS_UP, CauseShare, Explanation, Located
 from ..measures import Deviation
 from ..measures.text import NONE, capital, percent, quantity, sentence, short_time, significant
-from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
+from ..page import Block, Items, Page, Section, Table, TableCell, Text
+from . import template
+from .template import if_true
 
 _SHOWN = 12  # rows; the rest is folded away
 _WIDE = 15  # characters of a value
@@ -20,6 +22,7 @@ _NO_PART = 1e-3  # of the gap: causes below that are one row
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 _OFF = ("place", "anchor", "com", "axis")
 _HEADS = ("what", "left", "right", "explains", "alone", "last")
+_SINGULAR = {"joints": "worst joint", "slides": "worst slide", "ball joints": "worst ball joint"}
 _MEASURES = {"worst": "at its largest", "end": "in the end", "rms": "as a root mean square"}
 
 # Line one: what a side has nothing of, and what the gap comes from.
@@ -33,68 +36,37 @@ ANSWERS = {
     "chaos": "Nothing can be concluded: chaos alone makes {floor}, and the gap is {gap}",
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
-    "located": "{cause}: {part} of the {gap} goes only where {without} on both sides",
+    "located": "{cause}: {part} of the {gap} is localised there, not explained",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
 }
-ORIGIN = (
-    "{experiment}; left: {left}; right: {right}; {seconds}, {runs} runs in {took}, compared at "
-    "{moments} moments"
-)
-PLAYED = "the models were run again, with the recorded starts and commands"
-GAP = (
-    "As they come, the {what} is up to {worst} apart, at {at} (root mean square {rms}, in the end "
-    "{end})."
-)
 TOUCH = (
     "Until the first touch, {what} at {time}, the two are {before} apart: what parts them acts "
     "where they touch."
 )
+PARTS = "{explained} of the gap is explained, {located} is localised, {unexplained} is unexplained"
 THREE = (
-    "Explained: it goes where settings are brought to the same. Located: it goes only where "
-    "something is left out on both sides, which says where it comes from, and not why. "
-    "Unexplained: it stays."
+    "Explained: this part goes when settings of the right are given the left's values. Localised "
+    "by leaving it out, not explained: this part goes only when something is left out on both "
+    "sides, which says where it comes from, and not why. Unexplained: this part stays."
 )
-PARTS = "{explained} of the gap is explained, {located} is located, {unexplained} is unexplained"
-LOCATED = "* Located: {cause} left out on both sides. That is another motion."
-STILL = "* With {cause} left out nothing moves any more, so there can be no gap: a weak hint."
-CHAOS = (
-    "The left is as far from itself, {floor}, when its start and its commands are changed by no "
-    "more than is known of them (the chaos floor). Of a gap that is not clearly larger nothing can "
-    "be concluded."
-)
-NOISE = "The chaos floor is {floor}, {part} of the gap: smaller parts say nothing."
-NEGLIGIBLE = "What is below {negligible} is taken for rounding."
-BETWEEN = "The timesteps have too few moments in common: rows between were interpolated."
+LEFT_OUT = {
+    False: "* Localised by leaving it out, not explained: both sides ran again without {cause}, "
+    "which is another motion.",
+    True: "* Without {cause} nothing moves any more, so there can be no gap: a weak hint.",
+}
 METHODS = {
-    "nothing": "",
-    "one at a time": "They add up, to within {adds_up} of the gap: each takes away as much alone "
-    "as after all others, and explains the mean of the two.",
-    "all sets": "They interact. Each share is the mean of what a cause takes away over all orders "
-    "in which the causes can be brought to the same (Shapley value), over all sets of them.",
-    "drawn orders": "They interact. Each share is the mean of what a cause takes away over "
-    "{orders} drawn orders in which the causes are brought to the same (Shapley value), with its "
+    "nothing": None,
+    "one at a time": "The parts add up, to within {adds_up} of the gap: each cause takes away as "
+    "much alone as last, and “explains” is the mean of the two.",
+    "all sets": "The causes interact. “explains” is the mean of what a cause takes away over all "
+    "orders in which the right can be given the left's values (Shapley value, over all sets).",
+    "drawn orders": "The causes interact. “explains” is the mean of what a cause takes away over "
+    "{orders} drawn orders in which the right is given the left's values (Shapley value), with its "
     "standard error.",
 }
-COLUMNS = "Alone, last: brought to the same first, or after all others."
-WAY = "The right is brought to the left: the other way round the parts are those of another motion."
-NO_FIGURE = "No figure: it can be brought to the same only together with others."
-NEGATIVE = "Below zero: it hides others, so the gap is wider where it is brought to the same."
-REDUNDANT = "Either one alone closes the gap: {causes}."
-REFUSED = "These differ, too, and cannot be brought to the same:"
-IMPOSSIBLE = "{number} of the sets of causes could not be run, such as: {causes}."
-HARDLY_MOVE = (
-    "In this experiment these joints hardly move, so a difference there cannot show: {joints}. "
-    "Another may move them (waves)."
-)
-CHANGE = "What to change on the right:"
-SET = "{place}{cause}: {right} → {left}"
-SAME = (
-    "All that is compared is the same: files, options, starts. What a user's function reads from "
-    "elsewhere is not compared."
-)
 NEXT = {
-    "refused": "What stays may come from what cannot be brought to the same: {causes}. Give both "
-    "sides the same there, and compare again.",
+    "refused": "What stays may come from what cannot be made the same: {causes}. Give both sides "
+    "the same there, and compare again.",
     "engines": "What stays is between the engines. Look at one step at a time (--one-step), which "
     "names the stage, and at the timestep (--converge).",
     "files": "What stays is in nothing that is compared. Look at the function that commands, and "
@@ -110,20 +82,29 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         result: The explanation.
         said: Lines to say before anything else.
     """
-    origin = ORIGIN.format(
+    only = lacking(result.unmatched, ("the left", "the right"))
+    title, *further = [*missing(result.missing), answer(result)]
+    lines = [*map(sentence, (*further, *said, *only, *result.notes)), *proofs(result), result.says]
+    rounding, stays = result.is_rounding, not (result.is_rounding or result.is_explained)
+    refused = any(row.note for row in result.shares)
+    return template.page(
+        "why",
+        title=title,
         experiment=result.experiment,
         left=result.one,
         right=result.two,
-        seconds=f"{result.seconds:g} s",
+        seconds=result.seconds,
         runs=result.runs,
         took=short_time(result.took),
         moments=result.moments,
+        first=[Text(line) for line in lines if line],
+        causes=causes(result),
+        changes=steps(result),
+        next=_next(result) if stays else None,
+        parts=three_parts(result)[1:],
+        holds=not refused if rounding else result.is_explained,
+        verdict=answer(result) if rounding else parts(result),
     )
-    only = lacking(result.unmatched, ("the left", "the right"))
-    lines = [*map(sentence, (*said, *only, *result.notes)), *proofs(result), result.says]
-    title, *further = [*missing(result.missing), answer(result)]
-    first: list[Block] = [Text(line) for line in (*map(sentence, further), *lines) if line]
-    return Page(title, origin, [*first, *causes(result), *_verdict(result)])
 
 
 def missing(parts: Sequence[tuple[str, str]]) -> list[str]:
@@ -147,17 +128,16 @@ def answer(result: Explanation) -> str:
         "unexplained": result.unexplained,
     }
     kind = max(parts, key=parts.__getitem__)
+    slots: dict[str, object] = {}
     if kind == "located" and place:
-        return ANSWERS[kind].format(
-            cause=capital(place.name), part=percent(place.share), gap=gap, without=place.without
-        )
-    if kind == "cause" and first:
+        slots = {"cause": capital(place.name)}
+    elif kind == "cause" and first:
         left, right = _values(first)
-        told = NONE not in (left, right)
-        return ANSWERS["cause" if told else "bare"].format(
-            cause=capital(first.name), left=left, right=right, part=percent(first.share), gap=gap
-        )
-    return ANSWERS["unexplained"].format(part=percent(result.unexplained), gap=gap)
+        slots = {"cause": capital(first.name), "left": left, "right": right}
+        kind = "bare" if NONE in (left, right) else kind
+    # A cause that hides others has a share below zero.
+    part = first.share if first and kind in ("cause", "bare") else parts[kind]
+    return ANSWERS[kind].format(part=percent(part), gap=gap, **slots)
 
 
 def proofs(result: Explanation) -> tuple[str, ...]:
@@ -171,18 +151,37 @@ def proofs(result: Explanation) -> tuple[str, ...]:
 
 def causes(result: Explanation) -> list[Block]:
     """How far apart the sides are, and how much of it each difference explains."""
-    blocks: list[Block] = [Text(_gap_sentence(result.first, result.quantity))]
-    if result.between:
-        blocks.append(Text(BETWEEN))
-    if result.is_rounding and result.gap <= result.negligible:
-        blocks.append(Text(NEGLIGIBLE.format(negligible=_amount(result, result.negligible))))
-    elif result.is_rounding:
-        blocks.append(Text(CHAOS.format(floor=_amount(result, result.floor))))
-    blocks += _table(result)
-    if not result.is_rounding and result.floor > _SMALL * result.gap:
-        floor, part = _amount(result, result.floor), percent(result.floor / result.gap)
-        blocks.append(Text(NOISE.format(floor=floor, part=part)))
-    return blocks
+    able = [row for row in result.shares if not row.note]
+    refused = [f"{capital(row.name)}: {row.note}." for row in result.shares if row.note]
+    small, floor = result.gap <= result.negligible, _amount(result, result.floor)
+    noisy = not result.is_rounding and result.floor > _SMALL * result.gap
+    legend = METHODS[result.method]
+    return template.blocks(
+        "why_causes",
+        **_gap_slots(result.first, result.quantity),
+        between=if_true(result.between),
+        negligible=_amount(result, result.negligible) if result.is_rounding and small else None,
+        chaos=floor if result.is_rounding and not small else None,
+        same=if_true(not result.shares and not result.found_in),
+        table=_table(result, able),
+        left_out=[
+            Text(LEFT_OUT[part.is_still].format(cause=part.name), small=True)
+            for part in result.found_in
+        ],
+        hardly_move=", ".join(result.still) or None,
+        method=legend and legend.format(orders=result.orders, adds_up=f"{100 * ADDS_UP:g} %"),
+        legend=if_true(legend),
+        several=if_true(legend and len(able) > 1),
+        negative=if_true(legend and any((row.share or 0.0) < -_NO_PART for row in able)),
+        no_figure=if_true(legend and any(None in (row.alone, row.last) for row in able)),
+        redundant=", ".join(result.redundant) or None,
+        refused_too=if_true(refused),
+        refused=[Items(refused)] if refused else [],
+        impossible=len(result.impossible) or None,
+        such_as=", ".join(next(iter(result.impossible), ())),
+        noise=floor if noisy else None,
+        noise_part=percent(result.floor / result.gap) if noisy else None,
+    )
 
 
 def steps(result: Explanation) -> list[Block]:
@@ -192,27 +191,22 @@ def steps(result: Explanation) -> list[Block]:
         if (row.share or 0.0) >= _NO_PART and not row.note:
             left, right = _values(row)
             place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
-            lines.append(SET.format(place=place, cause=row.name, right=right, left=left))
-    return [Text(CHANGE), Items(lines)] if lines and not result.is_rounding else []
+            lines.append(f"{place}{row.name}: {right} → {left}")
+    hidden = result.is_rounding or not lines
+    return [] if hidden else [Text("What to change on the right:"), Items(lines)]
 
 
 def parts(result: Explanation) -> str:
     """The three parts of a gap, in a sentence without its end."""
-    return PARTS.format(
-        explained=percent(result.explained),
-        located=percent(result.located),
-        unexplained=percent(result.unexplained),
-    )
+    names = ("explained", "located", "unexplained")
+    return PARTS.format(**{name: percent(getattr(result, name)) for name in names})
 
 
-def _verdict(result: Explanation) -> list[Block]:
+def three_parts(result: Explanation) -> list[Block]:
+    """The three parts of the gap, and what they mean; nothing where there is none to explain."""
     if result.is_rounding:
-        refused = any(row.note for row in result.shares)
-        return [Verdict(answer(result), not refused)]
-    blocks = steps(result)
-    if not result.is_explained:
-        blocks.append(Text(_next(result)))
-    return [*blocks, Text(THREE, small=True), Verdict(parts(result), result.is_explained)]
+        return []
+    return [Text(f"{parts(result)}."), Text(THREE, small=True)]
 
 
 def _next(result: Explanation) -> str:
@@ -223,24 +217,20 @@ def _next(result: Explanation) -> str:
     return NEXT[kind].format(causes=", ".join(refused[:4]))
 
 
-def _gap_sentence(gaps: Mapping[str, Deviation], of: str) -> str:
-    """How far apart two runs are in one of some quantities; the others follow."""
+def _gap_slots(gaps: Mapping[str, Deviation], of: str) -> dict[str, str | None]:
+    """How far two runs are apart in one of some quantities, and in the others."""
     gap = gaps[of]
-    worst, rms, end = (quantity(size, gap.unit) for size in (gap.worst, gap.rms, gap.end))
-    singular = {"joints": "worst joint", "slides": "worst slide", "ball joints": "worst ball joint"}
-    text = GAP.format(
-        what=singular.get(of, of), worst=worst, at=short_time(gap.at), rms=rms, end=end
-    )
     others = [f"{name} {quantity(g.worst, g.unit)}" for name, g in gaps.items() if name != of]
-    return f"{text} Elsewhere (--quantity): {', '.join(others)}." if others else text
+    return {
+        "what": _SINGULAR.get(of, of),
+        "at": short_time(gap.at),
+        **{size: quantity(getattr(gap, size), gap.unit) for size in ("worst", "rms", "end")},
+        "elsewhere": ", ".join(others) or None,
+    }
 
 
-def _table(result: Explanation) -> list[Block]:
+def _table(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
     """The differences, the largest share first; those without an effect folded away."""
-    able = [row for row in result.shares if not row.note]
-    refused = [row for row in result.shares if row.note]
-    if not result.shares and not result.found_in:
-        return [Text(SAME)]
     rows = [_row(result, row) for row in able if result.is_rounding or _counts(row)]
     rows += [_located_row(part) for part in result.found_in]
     small = [row for row in able if not result.is_rounding and not _counts(row)]
@@ -249,57 +239,21 @@ def _table(result: Explanation) -> list[Block]:
         name = capital(small[0].name) if len(small) == 1 else f"{len(small)} more, none above 0.1 %"
         values = _values(small[0]) if len(small) == 1 else (NONE, NONE)
         rows.append((name, *values, TableCell(percent(share), share=share), NONE, NONE))
-    blocks: list[Block] = []
-    if rows:
-        title = f"What differs, and its part of the {_amount(result, result.gap)} of the "
-        title += f"{result.quantity} ({_MEASURES[result.measure]})"
-        title = "What differs" if result.is_rounding else title
-        words = frozenset({0, 1, 2})
-        most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
-        blocks.append(Table(_HEADS, rows[:most], title, words=words))
-        if rows[most:]:
-            heading = f"{len(rows) - most} more differences, with smaller parts"
-            more = Table(_HEADS, rows[most:], heading, words=words)
-            blocks.append(Section("", heading, [more], folded=True))
-    blocks += [
-        Text((STILL if part.is_still else LOCATED).format(cause=part.name), small=True)
-        for part in result.found_in
-    ]
-    if result.still:
-        blocks.append(Text(HARDLY_MOVE.format(joints=", ".join(result.still))))
-    return [*blocks, *_legend(result, able), *_not_brought(result, refused)]
+    title = "What differs"
+    if not result.is_rounding:
+        title += f", and its part of the {_amount(result, result.gap)} of the {result.quantity} "
+        title += f"({_MEASURES[result.measure]})"
+    words = frozenset({0, 1, 2})
+    most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
+    heading = f"{len(rows) - most} more differences, with smaller parts"
+    more = Table(_HEADS, rows[most:], heading, words=words)
+    first: list[Block] = [Table(_HEADS, rows[:most], title, words=words)] if rows else []
+    return [*first, *([Section("", heading, [more], folded=True)] if more.rows else [])]
 
 
 def _counts(row: CauseShare) -> bool:
     """Whether a cause has a row of its own."""
     return max(abs(part or 0.0) for part in (row.share, row.alone, row.last)) >= _NO_PART
-
-
-def _legend(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
-    """How the shares were computed, and what the columns are."""
-    if result.method == "nothing":
-        return []
-    method = METHODS[result.method].format(orders=result.orders, adds_up=f"{100 * ADDS_UP:g} %")
-    lines = [method, COLUMNS, WAY] if len(able) > 1 else [COLUMNS]
-    if any((row.share or 0.0) < -_NO_PART for row in able):
-        lines.append(NEGATIVE)
-    if any(None in (row.alone, row.last) for row in able):
-        lines.append(NO_FIGURE)
-    if result.redundant:
-        lines.append(REDUNDANT.format(causes=", ".join(result.redundant)))
-    return [Text(" ".join(lines))]
-
-
-def _not_brought(result: Explanation, refused: Sequence[CauseShare]) -> list[Block]:
-    """What could not be brought to the same, and what could not be run."""
-    blocks: list[Block] = []
-    if refused:
-        lines = [f"{capital(row.name)}: {row.note}." for row in refused]
-        blocks += [Text(REFUSED), Items(lines)]
-    if result.impossible:
-        number, first = len(result.impossible), ", ".join(result.impossible[0])
-        blocks.append(Text(IMPOSSIBLE.format(number=number, causes=first)))
-    return blocks
 
 
 def _row(result: Explanation, row: CauseShare) -> tuple[str | TableCell, ...]:
@@ -388,6 +342,3 @@ def _number(value: object, unit: str) -> str:
 def _amount(result: Explanation, value: float) -> str:
     """A gap of the explanation's quantity, with its unit."""
     return quantity(value, result.unit) if math.isfinite(value) else "no bound"
-
-
-__all__ = ["answer", "causes", "page", "parts", "proofs", "steps"]

@@ -22,7 +22,7 @@ from ...page import (
     Verdict,
 )
 from ..robot_pictures import inline
-from .markup import Html, joined, kept, tag
+from .markup import Html, joined, non_breaking, tag
 
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
 _FULL = 1.0  # share that fills a bar
@@ -46,9 +46,9 @@ def _block(block: Block, draw: Draw, level: int) -> Html:
             return tag("h3", text)
         case Text(text, (name, heading), small):
             link = (" ", tag("a", heading, href=f"#{name}"), ".") if name else ()
-            return tag("p", kept(text), *link, class_="foot" if small else None)
+            return tag("p", non_breaking(text), *link, class_="foot" if small else None)
         case Items(texts, ordered):
-            items = (tag("li", kept(text)) for text in texts)
+            items = (tag("li", non_breaking(text)) for text in texts)
             return tag("ol" if ordered else "ul", *items)
         case Code(lines):
             return tag("pre", tag("code", "\n".join(lines)))
@@ -90,9 +90,9 @@ def headline(found: Headline) -> Html:
     """The answer of a page, above all else."""
     return tag(
         "h1",
-        kept(f"{found.lead}."),
-        *(tag("span", kept(f" {each}"), class_="cause") for each in found.causes),
-        tag("span", kept(f" {found.end}"), class_="cause end") if found.end else None,
+        non_breaking(f"{found.lead}."),
+        *(tag("span", non_breaking(f" {each}"), class_="cause") for each in found.causes),
+        tag("span", non_breaking(f" {found.end}"), class_="cause end") if found.end else None,
         id="finding",
         tabindex="-1",
     )
@@ -166,6 +166,6 @@ def _bar(share: float, text: str, signed: bool) -> Html:
     return tag(
         "span",
         tag("span", fill, class_=look, aria_hidden="true"),
-        tag("span", kept(text), class_="percent"),
+        tag("span", non_breaking(text), class_="percent"),
         class_="measure",
     )

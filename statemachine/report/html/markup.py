@@ -38,7 +38,7 @@ def literal(text: object) -> Html:
     return Html(html.escape(_printable(str(text))))
 
 
-def kept(text: str) -> str:
+def non_breaking(text: str) -> str:
     """A text whose figures stay on one line with their units and signs."""
     return re.sub(r"(?<=\d) (?=(?:%|mm|ms|s|N|J|kg|m)(?!\w))|(?<=[<>]) (?=\d)", "\u00a0", text)
 

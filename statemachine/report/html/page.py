@@ -14,10 +14,11 @@ from ... import __version__
 from ...errors import BadInputError
 from ...page import Block, Interactive, Items, Page, Section, Text
 from ...runs.whole import check_place, replace_text
+from ..finding import long_labels
 from ..over_time import BothRuns, QuantityChart
 from .blocks import drawn, headline
 from .charts import quantity_row
-from .markup import Html, data_of, escaped, filled, joined, kept, tag, template
+from .markup import Html, data_of, escaped, filled, joined, non_breaking, tag, template
 from .scene import SideDrawing
 from .stage import StagePart, staged
 
@@ -47,7 +48,7 @@ def report(page: Page, looks: Sequence[SideDrawing] = (_NO_LOOK, _NO_LOOK)) -> s
         rest.append(Section("picture", "Of the picture", [Items(stage.notes)]))
     parts = [_header(page, opening, draw, runs), drawn(rest, draw)]
     about = f"statemachine {__version__}; this file asks for nothing but itself."
-    footer = tag("footer", tag("p", kept(page.origin)), tag("p", about))
+    footer = tag("footer", tag("p", non_breaking(page.origin)), tag("p", about))
     body = joined((tag("main", *parts), footer))
     title = page.headline.lead if page.headline else page.title
     return _assembled(title, body, stage)
@@ -65,7 +66,7 @@ def _header(page: Page, opening: Sequence[Block], draw: Any, runs: BothRuns | No
     if runs is not None:
         one, two = (
             tag("span", tag("i", class_=f"key {look}"), label, class_="side")
-            for look, label in zip(("one", "two"), runs.labels, strict=True)
+            for look, label in zip(("one", "two"), long_labels(runs.comparison), strict=True)
         )
         against = tag("span", "against", class_="against")
         theme = tag("button", "Dark", id="theme", type="button", hidden=True,
@@ -76,7 +77,7 @@ def _header(page: Page, opening: Sequence[Block], draw: Any, runs: BothRuns | No
         "header",
         tag("p", *name, class_="kicker"),
         headline(page.headline) if page.headline else tag("h1", page.title, id="finding"),
-        *(tag("p", kept(block.text), class_="says") for block in lead),
+        *(tag("p", non_breaking(block.text), class_="says") for block in lead),
         tag("div", drawn(opening[len(lead) :], draw), class_="words"),
     )
 

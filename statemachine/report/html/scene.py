@@ -14,6 +14,7 @@ from ...drawing import Drawing
 from ...drawing.camera import Camera
 from ...interface import Array, Ints
 from ...runs import Trace
+from .. import template
 from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised
 from .timeline import Frames
 
@@ -80,18 +81,11 @@ def scene_of(
     shared = drawings[0] is drawings[1]
     most = _TRIANGLES // (1 if shared else 2)
     meshes = [mesh_of(drawing, most) for drawing in drawings[: 1 if shared else 2]]
-    for mesh in meshes:
-        if mesh.simplified:
-            notes.append(
-                f"The shapes are drawn with {len(mesh.faces)} of their {mesh.simplified} triangles."
-            )
-    if frames.between:
-        notes.append(
-            f"The timesteps differ: for the picture alone, and for no figure, poses of "
-            f"{labels_of(one.header, two.header).long[1]} are taken between two of its rows."
-        )
-    if frames.left_out:
-        notes.append(f"{frames.left_out} of the compared moments are not shown, for their number.")
+    notes += [
+        f"The shapes are drawn with {len(mesh.faces)} of their {mesh.simplified} triangles."
+        for mesh in meshes
+        if mesh.simplified
+    ]
     extent = max(drawing.extent for drawing in drawings)
     places = ((one, frames.one, np.zeros(len(frames))), (two, frames.two, frames.share))
     poses = [_between(trace["xpos"], rows, share) for trace, rows, share in places]
@@ -122,8 +116,12 @@ def scene_of(
                 **_way(trace, tip, float(frames.time[-1]), frames.time),
             }
         )
-    if any(_most_at_once(trace) > few for trace in traces):
-        notes.append(f"Of the contacts of a moment the {few} strongest are drawn.")
+    notes += template.texts(
+        "html/scene",
+        other=labels_of(one.header, two.header).long[1] if frames.between else None,
+        hidden=frames.left_out or None,
+        few=few if any(_most_at_once(trace) > few for trace in traces) else None,
+    )
     data = {
         "moving": [int(_moves(one, two, body)) for body in range(len(two.header.bodies))],
         "low": low.tolist(),
@@ -161,24 +159,19 @@ def _drawings(
 ) -> tuple[list[str], list[Drawing]]:
     """A drawing for each side, of sticks where there is none better."""
     notes: list[str] = []
-    found: list[Drawing] = []
+    drawings: list[Drawing] = []
     labels = labels_of(*(trace.header for trace in traces)).long
-    for k, (trace, look) in enumerate(zip(traces, looks, strict=True)):
-        if look.drawing is not None:
-            found.append(look.drawing)
-            left_out = look.drawing.left_out
-            if left_out and not (k and look is looks[0]):
-                notes.append(f"Not drawn: {', '.join(left_out)}.")
-            continue
-        if k and look is looks[0]:
-            found.append(found[0])
-            continue
-        notes.append(
-            f"The shapes of {labels[k]} cannot be had ({look.why_not}): sticks join its "
-            "bodies instead."
+    for trace, look, label in zip(traces, looks, labels, strict=True):
+        if drawings and look is looks[0]:
+            return notes, [*drawings, *drawings]
+        drawings.append(look.drawing or bones_of(trace))
+        notes += template.texts(
+            "html/scene_side",
+            left_out=", ".join(drawings[-1].left_out) or None,
+            label=label if look.drawing is None else None,
+            why_not=look.why_not,
         )
-        found.append(bones_of(trace))
-    return notes, found
+    return notes, drawings
 
 
 def _held(pos: Array) -> Array:

@@ -12,9 +12,10 @@ import numpy as np
 
 from ...interface import Ints
 from ...measures.text import figure, on, reading, short_time
+from ..finding import long_labels, short_labels
 from ..over_time import BothRuns, QuantityChart, spans
 from .geometry import packed
-from .markup import Html, escaped, filled, joined, kept, tag
+from .markup import Html, escaped, filled, joined, non_breaking, tag
 from .scene import Scene, SideDrawing, scene_of
 from .timeline import Frames, frames_of
 
@@ -47,7 +48,10 @@ def staged(runs: BothRuns, looks: Sequence[SideDrawing]) -> StagePart:
         runs: The runs.
         looks: What each is drawn as.
     """
-    frames = frames_of(runs.one, runs.two, runs.moments)
+    # Of these moments the page tells: they must be among those that can be shown.
+    agreements = runs.comparison.agreements
+    moments = {t for each in agreements for t in (each.at, each.since) if t is not None}
+    frames = frames_of(runs.one, runs.two, tuple(sorted(moments)))
     start = int(np.argmin(np.abs(frames.time - runs.start)))
     scene = scene_of(runs.one, runs.two, frames, looks, runs.site, start)
     compared = runs.charts[0].curve.time if runs.charts else frames.time
@@ -55,7 +59,7 @@ def staged(runs: BothRuns, looks: Sequence[SideDrawing]) -> StagePart:
     data = {
         "time": packed(frames.time, "f8"),
         "compared": packed(compared[rows], "f8"),
-        "until": runs.until,
+        "until": runs.comparison.until,
         "start": start,
         "quantities": [_quantity_data(chart, rows) for chart in runs.charts],
         "lead": list(runs.lead),
@@ -66,19 +70,20 @@ def staged(runs: BothRuns, looks: Sequence[SideDrawing]) -> StagePart:
 
 def _stage(runs: BothRuns, frames: Frames, start: int, scene: Scene) -> Html:
     """The scene, what the figures are at its moment, the slider and the lanes under it."""
-    now = float(frames.time[start])
-    names = {"one": runs.labels[0], "two": runs.labels[1], "tip": tip_name(runs.site)}
-    names |= {"short_one": runs.short[0], "short_two": runs.short[1], "now": short_time(now)}
+    now, until = float(frames.time[start]), runs.comparison.until
+    (one, two), short = long_labels(runs.comparison), short_labels(runs.comparison)
+    names = {"one": one, "two": two, "tip": tip_name(runs.site)}
+    names |= {"short_one": short[0], "short_two": short[1], "now": short_time(now)}
     slots = {name: escaped(text) for name, text in names.items()}
     slots |= {
-        "on_one": escaped(kept(f"{runs.until:g} s {on(runs.labels[0])}")),
-        "on_two": escaped(on(runs.labels[1])),
-        "arrows": escaped(kept(ARROWS.format(force=figure(scene.strongest))))
+        "on_one": escaped(non_breaking(f"{until:g} s {on(one)}")),
+        "on_two": escaped(on(two)),
+        "arrows": escaped(non_breaking(ARROWS.format(force=figure(scene.strongest))))
         if scene.strongest
         else Html(""),
         "last": escaped(len(frames) - 1),
         "start": escaped(start),
-        "share": escaped(f"{now / runs.until if runs.until else 0.0:.6f}"),
+        "share": escaped(f"{now / until if until else 0.0:.6f}"),
         "still": joined(tag("p", note) for note in scene.notes) if scene.data is None else Html(""),
         "lanes": _lanes(runs),
     }
@@ -92,7 +97,7 @@ def tip_name(tip: str) -> str:
 
 def _lanes(runs: BothRuns) -> Html:
     """For each quantity when it is beyond its tolerance, under the slider and as wide."""
-    until = runs.until or 1.0
+    until = runs.comparison.until or 1.0
     rows = []
     for side, look in enumerate(("one", "two")):
         marks = [
@@ -103,7 +108,7 @@ def _lanes(runs: BothRuns) -> Html:
         ]  # fmt: skip
         if marks:
             key = tag("i", class_=f"mark key-of {look}")
-            name = joined(("first touches, ", runs.short[side], " ", key))
+            name = joined(("first touches, ", short_labels(runs.comparison)[side], " ", key))
             rows.append(_lane(name, joined(marks), "touches"))
     beyond = [(chart.title, _beyond(chart)) for chart in runs.charts]
     beyond = sorted(((name, s) for name, s in beyond if s), key=lambda pair: pair[1][0][0])

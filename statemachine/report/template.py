@@ -1,0 +1,81 @@
+"""A report's text, from the template beside its code: `why.md` is that of `why.py`.
+
+The grammar is that of a lesson's template (`lessons/template.py`): Markdown with named slots,
+whose paragraphs become the blocks of a page. In a report
+
+    *{engines}, {seconds:g} s*        below the title: what it was computed with
+    <small>Left: the gap.</small>     a note to what stands above it
+    It is {width} wide.               a line with a slot that has no value, None, is left out, and
+                                      so is a paragraph whose lines all are
+
+A slot whose value is "" stands for a condition; see `if_true`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from string import Formatter
+from typing import Any
+
+from ..lessons.template import filled, own_block
+from ..page import Block, Headline, Page, Text
+
+
+def page(name: str, headline: Headline | None = None, /, **slots: Any) -> Page:
+    """A page, from its template.
+
+    Args:
+        name: Of the template.
+        headline: Of the page.
+        **slots: Texts and numbers; None for no value. One whose value is a list of blocks stands
+            in a paragraph of its own.
+    """
+    title, origin, *rest = _paragraphs(name, slots)
+    return Page(title.removeprefix("# "), origin.strip("*"), _blocks(rest, slots), headline)
+
+
+def blocks(name: str, /, **slots: Any) -> list[Block]:
+    """The blocks of a template that has neither a title nor an origin; arguments as of `page`."""
+    return _blocks(_paragraphs(name, slots), slots)
+
+
+def texts(name: str, /, **slots: Any) -> list[str]:
+    """The paragraphs of a template that stand alone, as notes do; arguments as of `page`."""
+    return _paragraphs(name, slots)
+
+
+def if_true(holds: object) -> str | None:
+    """The value of a slot at the head of a line that stands there only if something holds."""
+    return "" if holds else None
+
+
+def versions_of(versions: Mapping[str, str]) -> str:
+    """Engines and packages with their versions, in a row."""
+    return ", ".join(f"{name} {version}".strip() for name, version in versions.items())
+
+
+def _paragraphs(name: str, slots: dict[str, Any]) -> list[str]:
+    """The paragraphs that have all they need; one of blocks as its slot, in braces."""
+    alone = {key: f"{{{key}}}" for key, value in slots.items() if isinstance(value, list)}
+    template = resources.files(__package__ or "").joinpath(f"{name}.md").read_text("utf-8")
+    known = {key for key, value in slots.items() if value is not None}
+    lines = [
+        line
+        for line in template.splitlines()
+        if all(slot in known for _, slot, *_ in Formatter().parse(line) if slot)
+    ]
+    return list(filled("\n".join(lines), slots | alone).values())
+
+
+def _blocks(paragraphs: Sequence[str], slots: dict[str, Any]) -> list[Block]:
+    shown: list[Block] = []
+    for text in paragraphs:
+        note = text.removeprefix("<small>").removesuffix("</small>").strip()
+        if text[1:-1] in slots:
+            shown += slots[text[1:-1]]
+        elif note != text:
+            shown.append(Text(note, small=True))
+        else:
+            shown.append(own_block(text, "", always=True))
+    return shown
