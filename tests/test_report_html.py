@@ -347,6 +347,10 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     assert answer(located).startswith("Contact: 50.0 % of the 2.58° is localised")
     stays = explanation_of(hold, shares=(), found_in=(), explained=0.0, located=0.0, unexplained=1)
     assert answer(stays) == "The cause was not found: 100.0 % of the 2.58° is unexplained"
+    for shares in ((-217.0, 127.0), (127.0, -126.5)):
+        rows = zip(explanation_of(hold).shares, shares, strict=True)
+        masked = explanation_of(hold, shares=[replace(row, share=share) for row, share in rows])
+        assert answer(masked).startswith("No single difference causes the 2.58°"), shares
     noisy = explanation_of(hold, floor=0.2 * located.gap)
     (table,) = [block for block in causes(noisy) if isinstance(block, Table)]
     assert [row[3] for row in table.rows] == ["60.0 %", "< 20.0 %", "50.0 %*"]

@@ -15,7 +15,7 @@ from ..lessons import LESSONS
 from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
 from ..measures.text import reading
-from ..page import Page, Picture, RobotPicture, Traces
+from ..page import Page, Picture, RobotPicture, Text, Traces
 from ..probes import phrasebook
 from ..probes.conventions import probe
 from ..runs.scenarios import scenario
@@ -116,6 +116,8 @@ def _explain(folder: Path, name: str, backends: tuple[str, str]) -> Path:
     asked = scenario(name)
     models = [load(asked.model, backend=backend, defaults="engine") for backend in backends]
     page = why.page(explain(models[0], models[1], asked))
+    title = f"{name}, engines as they come: why"
+    page = replace(page, title=title, blocks=[Text(f"{page.title}."), *page.blocks])
     return _write(
         folder, f"{name}-why", page, "", f"statemachine compare {name} --why --defaults engine"
     )

@@ -19,6 +19,7 @@ _SHOWN = 12  # rows; the rest is folded away
 _WIDE = 15  # characters of a value
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
+_MASKED = 2.0  # of the gap: a cause with more has others against it
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 _OFF = ("place", "anchor", "com", "axis")
 _HEADS = ("what", "left", "right", "explains", "alone", "last")
@@ -30,12 +31,14 @@ MISSING = {
     "actuators": "The {side} has no actuators, the {other} has: --actuators {other} gives it those",
     "floor": "The {side} has no floor, the {other} has: --floor {other} gives it that",
 }
+PLAYED = "the models were run again, with the recorded starts and commands"
 ANSWERS = {
     "rounding": "The two sides move alike: {gap} is rounding",
     "alike": "The two sides move alike, although they differ: {gap} is rounding",
     "chaos": "Nothing can be concluded: chaos alone makes {floor}, and the gap is {gap}",
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
+    "masked": "No single difference causes the {gap}: the differences hide one another",
     "located": "{cause}: {part} of the {gap} is localised there, not explained",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
 }
@@ -135,9 +138,9 @@ def answer(result: Explanation) -> str:
         left, right = _values(first)
         slots = {"cause": capital(first.name), "left": left, "right": right}
         kind = "bare" if NONE in (left, right) else kind
-    # A cause that hides others has a share below zero.
-    part = first.share if first and kind in ("cause", "bare") else parts[kind]
-    return ANSWERS[kind].format(part=percent(part), gap=gap, **slots)
+        # A share below zero hides others; one far above the whole gap does only what they hide.
+        kind = kind if 0 < (first.share or 0.0) < _MASKED else "masked"
+    return ANSWERS[kind].format(part=percent(max(parts.values())), gap=gap, **slots)
 
 
 def proofs(result: Explanation) -> tuple[str, ...]:
