@@ -10,9 +10,6 @@ from ..page import Block, Section, Table, Text
 from ..runs import Trace
 
 _NEAR = 0.2  # rad: joints that end as near as this to their ctrl were told an angle
-OFF = "The actuators are off on both sides: nothing is commanded."
-TITLE = "{what}, by actuator"
-HEADING = "What was commanded ({same} on both sides)"
 
 
 def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> list[Block]:
@@ -20,7 +17,7 @@ def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> list[Block]:
     if not one.header.nu or one.header.actuators != two.header.actuators:
         return []
     if all(trace.header.options.get("actuation") is False for trace in (one, two)):
-        return [Text(OFF)]
+        return [Text("The actuators are off on both sides: nothing is commanded.")]
     misses = [_ends(trace) for trace in (one, two)]
     # The trace does not say so, but ctrl is an angle where most joints end near it.
     angle = all(np.isfinite(miss).all() and np.median(miss) < _NEAR for miss in misses)
@@ -36,8 +33,8 @@ def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> list[Block]:
         for miss, label in zip(misses, labels, strict=True):
             columns[f"missed in the end, {label}"] = [quantity(far, "rad") for far in miss.tolist()]
     rows = list(zip(one.header.actuators, *columns.values(), strict=True))
-    title = TITLE.format(what="Commanded" if angle else "ctrl")
-    heading = HEADING.format(same="the same" if same else "not the same")
+    heading = f"What was commanded ({'' if same else 'not '}the same on both sides)"
+    title = f"{'Commanded' if angle else 'ctrl'}, by actuator"
     table = Table(("actuator", *columns), rows, title)
     return [Section("", heading, [table], folded=True, detail=True)]
 

@@ -11,7 +11,6 @@ from .finding import short_labels, window
 
 _PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
 _HEADS = ("bodies", "side", "force, N", "with friction, N", "deepest", "at, s", "last touch")
-TITLE = "Who presses on what ({shown} of {pairs} pairs; forces are means over {window})"
 
 
 def contact_words(comparison: Comparison, touches: Sequence[Touch]) -> list[Block]:
@@ -23,9 +22,8 @@ def contact_words(comparison: Comparison, touches: Sequence[Touch]) -> list[Bloc
         for touch in ranked[:_PAIRS_SHOWN]
         for label, side in zip(labels, (touch.one, touch.two), strict=True)
     ]
-    title = TITLE.format(
-        shown=min(_PAIRS_SHOWN, len(ranked)), pairs=len(ranked), window=window(comparison)
-    )
+    shown = f"{min(_PAIRS_SHOWN, len(ranked))} of {len(ranked)} pairs"
+    title = f"Who presses on what ({shown}; forces are means over {window(comparison)})"
     return (
         [Table(_HEADS, rows, title, words=frozenset({0, 1}), wide=frozenset({5}))] if rows else []
     )

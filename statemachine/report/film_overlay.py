@@ -20,7 +20,6 @@ _ORANGE = (230, 159, 0)
 STRIP = 0.18  # of the film's height
 _BOX = (0.11, 0.25, 0.86, 0.5)  # of the axes of a strip: left, bottom, width, height
 _TO_COME = 0.6  # how pale the curve is after the moment that is shown
-STRIP_SAYS = "{name}: {gap} apart; dotted: the tolerance, {tolerance}"
 
 
 class Overlay:
@@ -123,7 +122,7 @@ class Overlay:
         row = max(0, int(np.searchsorted(curve.time, time + 1e-9, side="right")) - 1)
         gap = quantity(float(curve.difference[row]), curve.unit)
         tolerance = quantity(strip.found.tolerance, curve.unit)
-        text = STRIP_SAYS.format(name=strip.title, gap=gap, tolerance=tolerance)
+        text = f"{strip.title}: {gap} apart; dotted: the tolerance, {tolerance}"
         draw.text((0.5 * self._text, top), _plain(text), font=self._small, fill=_INK)
 
 

@@ -59,11 +59,10 @@ def _paragraphs(name: str, slots: dict[str, Any]) -> list[str]:
     """The paragraphs that have all they need; one of blocks as its slot, in braces."""
     alone = {key: f"{{{key}}}" for key, value in slots.items() if isinstance(value, list)}
     template = resources.files(__package__ or "").joinpath(f"{name}.md").read_text("utf-8")
-    known = {key for key, value in slots.items() if value is not None}
     lines = [
         line
         for line in template.splitlines()
-        if all(slot in known for _, slot, *_ in Formatter().parse(line) if slot)
+        if all(slots[slot] is not None for _, slot, *_ in Formatter().parse(line) if slot)
     ]
     return list(filled("\n".join(lines), slots | alone).values())
 
