@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import TracebackType
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -81,7 +81,7 @@ class Session:
         )
 
 
-class LiveSession(Session):
+class LiveSession(Session, ExitStack):
     """One or two engines under the same commands, at the same steps.
 
     Whoever makes it is the only one to touch its Data: what other threads want comes as
@@ -91,7 +91,7 @@ class LiveSession(Session):
     def __init__(
         self, models: Sequence[Model], keyframe: int | str | None = None, site: str | None = None
     ) -> None:
-        """Make a Data on each engine and put it to its start; paused.
+        """Make a Data on each engine, until `close`, and put it to its start; paused.
 
         Args:
             models: One Model, or the same file on two engines: the second is the ghost.
@@ -102,6 +102,7 @@ class LiveSession(Session):
             UnknownNameError: There is no such keyframe or site.
             BadInputError: The two are not the same model at the same timestep.
         """
+        ExitStack.__init__(self)
         first = models[0]
         for other in models[1:]:
             if (other.nq, other.nu, other.nbody) != (first.nq, first.nu, first.nbody):
@@ -127,7 +128,7 @@ class LiveSession(Session):
         self._good: tuple[float, tuple[EnginePose, ...]] = 0.0, ()
         try:
             for model in models:
-                self._arms.append((model, make_data(model)))
+                self._arms.append((model, self.enter_context(make_data(model))))
             self._reset(start)
         except BaseException:
             self.close()
@@ -205,19 +206,3 @@ class LiveSession(Session):
     def _stop(self, model: Model, error: StateMachineError) -> None:
         self.running = False
         self._trouble = self._trouble or f"{model.backend}: {error}"
-
-    def close(self) -> None:
-        """Give back what the engines hold. Idempotent."""
-        for _, data in self._arms:
-            data.close()
-
-    def __enter__(self) -> LiveSession:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

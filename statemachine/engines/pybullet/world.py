@@ -118,5 +118,28 @@ def saved_in_a_file(machine: HasClient) -> Iterator[Restore]:
 
 def put_floor(client: int) -> int:
     """A plane that does not move; its number."""
-    plane = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
-    return pb.createMultiBody(0, plane, physicsClientId=client)
+    return put(client, pb.GEOM_PLANE, mass=0)
+
+
+def put(
+    client: int,
+    kind: int,
+    place: Sequence[float] = (0, 0, 0),
+    turn: Sequence[float] = (0, 0, 0, 1),
+    mass: float = 1,
+    **size: Any,
+) -> int:
+    """Put a body of one shape into a world; its number.
+
+    Args:
+        client: The world's number.
+        kind: A number of PyBullet's, as GEOM_BOX.
+        place: Of its centre (3,) [m].
+        turn: Its axes, a quaternion (x, y, z, w).
+        mass: What it weighs [kg]; a body of 0 does not move.
+        **size: As createCollisionShape takes it [m].
+    """
+    shape = pb.createCollisionShape(kind, physicsClientId=client, **size)
+    return pb.createMultiBody(
+        mass, shape, basePosition=place, baseOrientation=turn, physicsClientId=client
+    )
