@@ -60,12 +60,8 @@ class Door:
         """Whether a header Host names this machine: no name that a stranger may point to it."""
         try:
             name = urlsplit(f"//{host}").hostname or ""
-        except ValueError:
-            return False
-        if name in self._names:
-            return True
-        try:
-            ipaddress.ip_address(name)  # in numbers, which nobody can point elsewhere
+            if name not in self._names:
+                ipaddress.ip_address(name)  # in numbers, which nobody can point elsewhere
         except ValueError:
             return False
         return True

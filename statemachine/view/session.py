@@ -122,14 +122,13 @@ class LiveSession(Session, ExitStack):
         )
         self.controls = controls_of(first)
         self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
-        start = None if keyframe is None else first.key_id(keyframe)
         self._arms: list[tuple[Model, Data]] = []
         # The last moment that was good: its time and the poses.
         self._good: tuple[float, tuple[EnginePose, ...]] = 0.0, ()
         try:
             for model in models:
                 self._arms.append((model, self.enter_context(make_data(model))))
-            self._reset(start)
+            self._reset(keyframe)
         except BaseException:
             self.close()
             raise
@@ -139,6 +138,7 @@ class LiveSession(Session, ExitStack):
 
         Raises:
             BadInputError: A value is no number, or out of bounds; nothing is changed then.
+            UnknownNameError: There is no such keyframe; nothing is changed then.
         """
         match command:
             case SetCtrl(index, value):
@@ -195,9 +195,7 @@ class LiveSession(Session, ExitStack):
             poses.append(EnginePose(model.backend, *where))
         self._good = self._arms[0][1].time, tuple(poses)
 
-    def _reset(self, keyframe: int | None) -> None:
-        if keyframe is not None and not 0 <= keyframe < len(self.places):
-            raise BadInputError(f"there is no keyframe {keyframe}")
+    def _reset(self, keyframe: int | str | None) -> None:
         for model, data in self._arms:
             reset(model, data, keyframe)
         self._trouble, self._steps = "", 0

@@ -14,7 +14,7 @@ from typing import cast
 
 import numpy as np
 
-from ...backends._bullet_client import pb
+from ...backends._bullet_client import joint_infos, pb
 from ...backends._bullet_plan import Plan
 from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
@@ -56,8 +56,7 @@ def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
     for index, place in zip(tree.joints, model.compiled.dof_jntid[tree.dofs], strict=False):
         thing, slot = f"joint {model.joint_names[place]}", int(model.jnt_qposadr[place])
         yield Term(thing, f"qpos[{slot}]", f"joint {index} of body {tree.body}")
-    count = pb.getNumJoints(tree.body, world.client)
-    infos = [pb.getJointInfo(tree.body, i, world.client) for i in range(count)]
+    infos = joint_infos(world.client, tree.body)
     fixed = [f"{info[1].decode()} is {info[0]}" for info in infos if info[3] < 0]
     if fixed:
         yield Term("fixed joints", "none", f"take an index too: {', '.join(fixed)}")

@@ -184,9 +184,8 @@ class PybulletWatch(CallWatch):
     def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
         if function != "connect" or result < 0:
             return None
-        world = _World(self._bare, result)
-        self._worlds[result] = world
-        return world
+        self._worlds[result] = _World(self._bare, result)
+        return self._worlds[result]
 
     def name(self, namespace: Mapping[str, Any]) -> None:
         arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()

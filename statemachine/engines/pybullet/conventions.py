@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ...backends._bullet_client import pb
+from ...backends._bullet_client import joint_infos, pb
 from ...interface import Array
 from .. import samples
 from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
@@ -198,8 +198,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
 def joints() -> dict[str, list[str]]:
     """The indices of the joints, from a URDF."""
     with _loaded(samples.TREE_URDF, fixed=True) as (client, body):
-        count = pb.getNumJoints(body, client)
-        return {"URDF": [pb.getJointInfo(body, k, client)[1].decode() for k in range(count)]}
+        return {"URDF": [info[1].decode() for info in joint_infos(client, body)]}
 
 
 def friction() -> dict[str, Sliding]:

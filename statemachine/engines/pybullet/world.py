@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from ...backends._bullet_client import as_file, connect, disconnect, pb
+from ...backends._bullet_client import as_file, connect, disconnect, load_urdf, pb
 from ...silence import silence
 
 
@@ -41,13 +41,9 @@ def fresh_world() -> Iterator[int]:
 
 def load(client: int, text: str, fixed: bool = False) -> int:
     """Put a URDF text, with the inertias that it states, into a world; the body's number."""
-    with as_file(text) as file, silence():
-        return pb.loadURDF(
-            file,
-            useFixedBase=fixed,
-            flags=pb.URDF_USE_INERTIA_FROM_FILE,
-            physicsClientId=client,
-        )
+    with as_file(text) as file:
+        flags = pb.URDF_USE_INERTIA_FROM_FILE
+        return load_urdf(client, file, "this text", useFixedBase=fixed, flags=flags)
 
 
 def limp(body: int, client: int, joint: int = 0) -> None:
