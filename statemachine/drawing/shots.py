@@ -28,7 +28,7 @@ class Shot:
 
 
 class Drawer(Protocol):
-    """Draws the bodies of one model wherever they are told to be."""
+    """Draws the bodies of one model wherever they are told to be, until its process ends."""
 
     def shot(self, xpos: Array, xquat: Array) -> Shot:
         """A picture.
@@ -38,6 +38,3 @@ class Drawer(Protocol):
             xquat: (nbody, 4) their rotations, wxyz.
         """
         ...
-
-    def close(self) -> None:
-        """Give back what it holds."""

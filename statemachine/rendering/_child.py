@@ -11,7 +11,7 @@ import os
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, suppress
+from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -42,20 +42,20 @@ def draw(facts: dict[str, Any], out: Any) -> None:
     width, height = facts["size"]
     sharper = facts["sharper"]
     engine, size = room(facts["renderer"]), (width * sharper, height * sharper)
-    with ExitStack() as stack:
-        drawers = [
-            stack.enter_context(closing(engine.drawer(Path(file), size, camera, ghost=k > 0)))
-            for k, file in enumerate(facts["files"])
+    # What they hold they give back with the end of the process.
+    drawers = [
+        engine.drawer(Path(file), size, camera, ghost=k > 0)
+        for k, file in enumerate(facts["files"])
+    ]
+    for sides in _poses(facts["bodies"]):
+        shots = [
+            drawer.shot(poses[:, :3], poses[:, 3:])
+            for drawer, poses in zip(drawers, sides, strict=True)
         ]
-        for sides in _poses(facts["bodies"]):
-            shots = [
-                drawer.shot(poses[:, :3], poses[:, 3:])
-                for drawer, poses in zip(drawers, sides, strict=True)
-            ]
-            ghost = shots[1] if len(shots) > 1 else None
-            picture = compose(shots[0], ghost, facts["bias"], sharper)
-            out.write(np.ascontiguousarray(halved(picture, sharper)).tobytes())
-            out.flush()
+        ghost = shots[1] if len(shots) > 1 else None
+        picture = compose(shots[0], ghost, facts["bias"], sharper)
+        out.write(halved(picture, sharper).tobytes())
+        out.flush()
 
 
 def _poses(bodies: list[int]) -> Iterator[list[Array]]:

@@ -80,9 +80,3 @@ class MujocoDrawer:
         metres = near * far / (near + depth.astype(np.float64) * (far - near))
         metres[depth == 0] = np.inf
         return Shot(rgb[::-1], metres[::-1])
-
-    def close(self) -> None:
-        """Give OpenGL back."""
-        self._context.make_current()
-        self._pen.free()
-        self._context.free()

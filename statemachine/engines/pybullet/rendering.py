@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...backends import load
-from ...backends._bullet_client import connect, disconnect, pb
+from ...backends._bullet_client import connect, pb
 from ...drawing import Part, drawing_of
 from ...drawing.camera import Camera
 from ...drawing.shots import GHOST, Shot
@@ -71,10 +71,6 @@ class PybulletDrawer:
         sky = ((1 - fade) * _SKY[0] + fade * _SKY[1]).astype(np.uint8)
         rgb[nothing] = np.broadcast_to(sky[:, None], rgb.shape)[nothing]
         return Shot(rgb, depth)
-
-    def close(self) -> None:
-        """Give the world back."""
-        disconnect(self._client)
 
     def _made(self, shape: tuple[Any, Any], rgba: Sequence[float]) -> int:
         """A body that is only seen; its number."""
