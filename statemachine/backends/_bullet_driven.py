@@ -289,11 +289,12 @@ def _distance(raw: mujoco.MjModel, geom: int, turn: Array, point: Array) -> floa
         point: (3,) [m].
     """
     local = dense.times(turn, point - raw.geom_pos[geom])
-    size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
-    middle, half = np.split(raw.geom_aabb[geom], 2)
-    radius, beyond = 0.0, np.abs(local - middle) - half  # a mesh by the box around it
+    size, kind, box = raw.geom_size[geom], int(raw.geom_type[geom]), raw.geom_aabb[geom]
+    if kind in (int(_GEOM.mjGEOM_SPHERE), int(_GEOM.mjGEOM_CAPSULE)):
+        # From the middle, or the middle line; a sphere has no second size.
+        return float(math.hypot(*local[:2], max(abs(local[2]) - size[1], 0.0)) - size[0])
     if kind == int(_GEOM.mjGEOM_CYLINDER):
         beyond = np.array([np.hypot(local[0], local[1]) - size[0], abs(local[2]) - size[1]])
-    elif kind in (int(_GEOM.mjGEOM_SPHERE), int(_GEOM.mjGEOM_CAPSULE)):
-        radius, beyond = size[0], np.abs(local) - [0.0, 0.0, size[1]]  # from its middle line
-    return float(math.hypot(*np.maximum(beyond, 0)) + min(beyond.max(), 0.0) - radius)
+    else:  # a mesh by the box around it
+        beyond = np.abs(local - box[:3]) - box[3:]
+    return float(math.hypot(*np.maximum(beyond, 0)) + min(beyond.max(), 0.0))
