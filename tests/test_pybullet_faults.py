@@ -181,7 +181,7 @@ FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...]]] = {
     "contacts are not observed": (contacts_are_not_observed, {"forces_balance_at_rest"}, ()),
     # With the wrong inertia everything is consistent with itself: only another engine sees it.
     "ghost has the padding": (
-        around("plan.Plan", "described")(
+        around("plan.Plan", "_describe")(
             lambda right, self, root, kind: right(
                 self, root, "stepped" if kind == "ghost" else kind
             )

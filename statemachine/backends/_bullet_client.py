@@ -11,9 +11,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ..errors import EngineError
+from ..errors import EngineError, ModelError
 from ..installed import require
 from ..processes import free_memory
+from ..silence import silence
 
 pb: Any = require("pybullet")
 
@@ -75,6 +76,31 @@ def as_file(text: str, beside: Mapping[str, str] = MappingProxyType({})) -> Iter
         for name, content in {path.name: text, **beside}.items():
             (path.parent / name).write_text(content, encoding="utf-8")
         yield str(path)
+
+
+def load_urdf(client: int, file: str, what: str, **options: Any) -> int:
+    """Put a URDF file into a world; the body's number.
+
+    Args:
+        client: The world's number.
+        file: The file's name.
+        what: What the message of an error calls it.
+        **options: Further arguments of loadURDF.
+
+    Raises:
+        ModelError: PyBullet cannot read it; with what it has to say.
+    """
+    with silence() as said:
+        try:
+            return pb.loadURDF(file, physicsClientId=client, **options)
+        except pb.error as error:
+            refused = str(error)
+    raise ModelError(f"PyBullet cannot read {what}: {'; '.join([*said, refused][-3:])}")
+
+
+def joint_infos(client: int, body: int) -> list[Any]:
+    """What getJointInfo tells of each joint of a body, fixed ones too."""
+    return [pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))]
 
 
 Quat = tuple[float, float, float, float]

@@ -289,16 +289,12 @@ def _distance(raw: mujoco.MjModel, geom: int, turn: Array, point: Array) -> floa
         point: (3,) [m].
     """
     local = dense.times(turn, point - raw.geom_pos[geom])
-    size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
-    if kind == int(_GEOM.mjGEOM_SPHERE):
-        return float(math.hypot(*local) - size[0])
-    if kind == int(_GEOM.mjGEOM_CAPSULE):
-        along = min(max(local[2], -size[1]), size[1])
-        return float(math.hypot(*local[:2], local[2] - along) - size[0])
+    size, kind, box = raw.geom_size[geom], int(raw.geom_type[geom]), raw.geom_aabb[geom]
+    if kind in (int(_GEOM.mjGEOM_SPHERE), int(_GEOM.mjGEOM_CAPSULE)):
+        # From the middle, or the middle line; a sphere has no second size.
+        return float(math.hypot(*local[:2], max(abs(local[2]) - size[1], 0.0)) - size[0])
     if kind == int(_GEOM.mjGEOM_CYLINDER):
         beyond = np.array([np.hypot(local[0], local[1]) - size[0], abs(local[2]) - size[1]])
     else:  # a mesh by the box around it
-        half = size if kind == int(_GEOM.mjGEOM_BOX) else raw.geom_aabb[geom, 3:]
-        middle = np.zeros(3) if kind == int(_GEOM.mjGEOM_BOX) else raw.geom_aabb[geom, :3]
-        beyond = np.abs(local - middle) - half
+        beyond = np.abs(local - box[:3]) - box[3:]
     return float(math.hypot(*np.maximum(beyond, 0)) + min(beyond.max(), 0.0))

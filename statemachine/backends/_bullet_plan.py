@@ -48,6 +48,7 @@ class Plan:
         surfaces: What can touch what; nothing where contacts are off.
         names: What everything is called in a URDF.
         ghost: See `_bullet_ghost`; None until it is needed.
+        described: Gives the text and the files of a tree of bodies; see `_describe`.
     """
 
     def __init__(self, raw: mujoco.MjModel) -> None:
@@ -55,7 +56,7 @@ class Plan:
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
         self.ghost: Any = None
-        self._described: dict[tuple[int, str], tuple[str, dict[str, str]]] = {}
+        self.described = cache(self._describe)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Plan, (self.raw,)
@@ -85,15 +86,6 @@ class Plan:
         weights = np.maximum(raw.body_invweight0[moving, 0], whole)
         return float(_YIELDS * raw.opt.timestep * np.median(weights)) if moving else 0.0
 
-    def described(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
-        """URDF of a tree of bodies as a world of that kind reads it.
-
-        And the files that it names, by their names: the hulls of its geoms.
-        """
-        if (root, kind) not in self._described:
-            self._described[root, kind] = self._describe(root, kind)
-        return self._described[root, kind]
-
     @cached_property
     def hulls(self) -> dict[int, Hull]:
         """Hulls of the geoms that touch and are meshes or ellipsoids."""
@@ -101,6 +93,10 @@ class Plan:
         return {g: Hull(self.raw, g) for g in geoms if int(self.raw.geom_type[g]) in HULLS}
 
     def _describe(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
+        """URDF of a tree of bodies as a world of that kind reads it.
+
+        And the files that it names, by their names: the hulls of its geoms.
+        """
         raw = self.raw
         sites = int(np.count_nonzero(raw.body_rootid[raw.site_bodyid] == root))
         hulls = set(self.hulls if kind != "ghost" else ())

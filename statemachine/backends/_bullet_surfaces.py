@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import mujoco
 import numpy as np
 
 from ..interface import Array
+from ._contact_rules import bodies_meet, masks_meet, mixed
 
 PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -53,8 +53,8 @@ class Surfaces:
         wanted = []  # friction (3,) of each pair that meets
         for (i, one), (j, two) in combinations(enumerate(self.solids), 2):
             meeting = [
-                (a, b) for a in one.geoms for b in two.geoms if _masks_meet(raw, a, b)
-            ] * _bodies_meet(raw, one.body, two.body)
+                (a, b) for a in one.geoms for b in two.geoms if masks_meet(raw, a, b)
+            ] * bodies_meet(raw, one.body, two.body)
             self.pairs[i, j] = bool(meeting)
             self.meeting += meeting
             if meeting and len(meeting) < len(one.geoms) * len(two.geoms):
@@ -134,45 +134,13 @@ def _solids(raw: mujoco.MjModel) -> list[Solid]:
 
 
 def _friction(raw: mujoco.MjModel, a: int, b: int) -> Array:
-    """Sliding, spinning and rolling friction of a pair [manual, Computation, Contact]."""
-    first, second = int(raw.geom_priority[a]), int(raw.geom_priority[b])
-    if first == second:
-        friction = np.maximum(raw.geom_friction[a], raw.geom_friction[b])
-        condim = max(raw.geom_condim[a], raw.geom_condim[b])
-    else:
-        leading = a if first > second else b
-        friction, condim = np.array(raw.geom_friction[leading]), raw.geom_condim[leading]
-    return friction * (int(condim) > np.array([1, 3, 4]))
+    """Sliding, spinning and rolling friction of a pair, zero where its condim leaves it out."""
+    condim, friction, _, _ = mixed(raw, a, b)
+    return friction * (condim > np.array([1, 3, 4]))
 
 
 def damping_ratios(raw: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
-    """Of contacts of geoms (n, 2), by solref mixed as MuJoCo does [manual, Modeling, Contact]."""
-    a, b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    tiny, weight = 1e-15, raw.geom_solmix
-    share = np.where(weight[a] + weight[b] < tiny, 0.5, weight[a] / (weight[a] + weight[b] + tiny))
-    higher = raw.geom_priority[a] - raw.geom_priority[b]
-    share = np.where(higher > 0, 1.0, np.where(higher < 0, 0.0, share))[:, None]
-    one, two = raw.geom_solref[a], raw.geom_solref[b]
-    both = ((one[:, :1] > 0) & (two[:, :1] > 0)) | (higher[:, None] != 0)
-    first, second = np.where(both, share * one + (1 - share) * two, np.minimum(one, two)).T
+    """Of contacts of geoms (n, 2), by their solref."""
+    first, second = np.array([mixed(raw, a, b)[2] for a, b in pairs]).T
     # Negated, they are stiffness and damping.
-    given = first <= 0
-    return np.where(given, -second / (2 * np.sqrt(np.maximum(-first, tiny))), second)
-
-
-def _masks_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:
-    return bool(
-        raw.geom_contype[a] & raw.geom_conaffinity[b]
-        or raw.geom_contype[b] & raw.geom_conaffinity[a]
-    )
-
-
-def _bodies_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:
-    """Not within one rigid piece, nor parent and child, nor excluded."""
-    one, two = int(raw.body_weldid[a]), int(raw.body_weldid[b])
-    if one == two or ((min(a, b) << 16) + max(a, b)) in raw.exclude_signature:
-        return False
-    if raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
-        return True
-    up: Any = raw.body_weldid[raw.body_parentid[[one, two]]]
-    return not ((up[0] == two and two) or (up[1] == one and one))
+    return np.where(first <= 0, -second / (2 * np.sqrt(np.maximum(-first, 1e-15))), second)

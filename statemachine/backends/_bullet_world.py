@@ -13,13 +13,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import ModelError
 from ..interface import Array
 from ..rotations import matrix_from_quat, xyzw_from_wxyz
 from ..silence import silence
 from . import _bullet_urdf as urdf
 from . import _dense as dense
-from ._bullet_client import Quat, as_file, connect, disconnect, pb, times, turned
+from ._bullet_client import (
+    Quat,
+    as_file,
+    connect,
+    disconnect,
+    joint_infos,
+    load_urdf,
+    pb,
+    times,
+    turned,
+)
 from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
 from .compiled import gravity
@@ -48,7 +57,7 @@ class Tree:
         raw, names = plan.raw, plan.names
         self.root, self.body = root, body
         self.free = floats(raw, root)
-        infos = [pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))]
+        infos = joint_infos(client, body)
         indices = {info[12].decode(): info[0] for info in infos}
         bodies = urdf.tree(raw, root)
         self.links = {b: indices.get(names.links[b], -1) for b in bodies}
@@ -163,19 +172,14 @@ class World:
             | pb.URDF_USE_SELF_COLLISION_INCLUDE_PARENT  # which pairs meet, _take_surfaces says
             | pb.URDF_USE_IMPLICIT_CYLINDER  # else a polygon, and a millimetre too large
         )
-        with as_file(text, files) as name, silence() as said:
-            try:
-                body = pb.loadURDF(
-                    name,
-                    useFixedBase=not free,
-                    flags=0 if kind == "engine" else flags,
-                    physicsClientId=self.client,
-                )
-            except pb.error as error:
-                body = -1
-                said.append(str(error))
-        if body < 0:
-            raise ModelError(f"PyBullet cannot read the URDF of this model: {'; '.join(said)}")
+        with as_file(text, files) as name:
+            body = load_urdf(
+                self.client,
+                name,
+                "the URDF of this model",
+                useFixedBase=not free,
+                flags=0 if kind == "engine" else flags,
+            )
         tree = Tree(self._plan, root, body, self.client)
         self.trees.append(tree)
         if kind == "engine":
@@ -258,6 +262,11 @@ class World:
                     body_a, body_b, link_a, link_b, 0, physicsClientId=self.client
                 )
 
+    def meet(self, group: int = 0, mask: int = 0) -> None:
+        """Set the group and the mask of all that can touch; by default nothing meets anything."""
+        for body, link in self._solid_links:
+            pb.setCollisionFilterGroupMask(body, link, group, mask, self.client)
+
     def place(self, qpos: Array, qvel: Array) -> None:
         """Set the state so that what follows depends on nothing that was before.
 
@@ -268,13 +277,11 @@ class World:
         """
         self.put(qpos, qvel)
         # Links of one body cannot be taken apart: for a moment they do not meet.
-        for body, link in self._solid_links:
-            pb.setCollisionFilterGroupMask(body, link, 0, 0, self.client)
+        self.meet(0, 0)
         for i, (body, (_, quat)) in enumerate(self._homes, start=1):
             pb.resetBasePositionAndOrientation(body, (0, 0, _AWAY * i), quat, self.client)
         pb.performCollisionDetection(self.client)
-        for body, link in self._solid_links:
-            pb.setCollisionFilterGroupMask(body, link, 1, -1, self.client)
+        self.meet(1, -1)
         for body, (pos, quat) in self._homes:
             if body not in self._frames:
                 pb.resetBasePositionAndOrientation(body, pos, quat, self.client)

@@ -143,9 +143,8 @@ def _hold(m: mujoco.MjModel, history: Array, ctrl: Array, kept: Ints) -> None:
     for a in np.flatnonzero(kept):
         own, number = int(m.actuator_ctrlnum[a]), int(m.actuator_ctrladr[a])
         first = int(m.actuator_historyadr[a]) + 2 + int(kept[a])
-        for k in range(int(kept[a])):
-            start = first + k * own
-            history[..., start : start + own] = ctrl[..., number : number + own]
+        commands = np.tile(ctrl[..., number : number + own], int(kept[a]))
+        history[..., first : first + commands.shape[-1]] = commands
 
 
 def _needed(delay: Array, timestep: Array | float) -> Array:

@@ -17,7 +17,7 @@ import os
 import re
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, unescape
@@ -189,41 +189,45 @@ def _problems(raw: mujoco.MjModel) -> Iterator[str]:
         array = getattr(raw, name) if not name.startswith("_") and name not in _FREE_USE else None
         if not isinstance(array, np.ndarray) or array.dtype.kind != "f":
             continue
-        # Only a range may be without an end.
-        wrong = np.isnan(array) if "range" in name else ~np.isfinite(array)
-        for row in np.argwhere(wrong)[:1]:
-            kind = "NaN" if np.isnan(array[tuple(row)]) else "infinite"
-            yield f"{name}{_owner(raw, name, row)} is {kind}"
+        yield from _first(raw, name, np.isnan(array), "is NaN")
+        if "range" not in name:  # only a range may be without an end
+            yield from _first(raw, name, np.isinf(array), "is infinite")
         if name in _NEVER_NEGATIVE:
-            for row in np.argwhere(array < 0)[:1]:
-                yield f"{name}{_owner(raw, name, row)} is negative"
+            yield from _first(raw, name, array < 0, "is negative")
         if name == "jnt_axis" or name.endswith("_quat"):  # of a length that overflowed
-            for row in np.argwhere(~array.any(axis=-1))[:1]:
-                yield f"{name}{_owner(raw, name, row)} has no direction"
+            yield from _first(raw, name, ~array.any(axis=-1), "has no direction")
 
 
 def _doubtful(raw: mujoco.MjModel) -> Iterator[str]:
     """What has a sign that engines take, and that is seldom meant."""
     for name in _SELDOM_NEGATIVE:
-        for row in np.argwhere(getattr(raw, name) < 0)[:1]:
-            yield f"{name}{_owner(raw, name, row)} is negative"
+        yield from _first(raw, name, getattr(raw, name) < 0, "is negative")
     affine = raw.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
     for column, gain in ((1, "kp"), (2, "kv")):
-        for row in np.argwhere(affine & (raw.actuator_biasprm[:, column] > 0))[:1]:
-            yield f"{gain}{_owner(raw, 'actuator_biasprm', row)} is negative"
+        pushes = affine & (raw.actuator_biasprm[:, column] > 0)
+        yield from _first(raw, "actuator_biasprm", pushes, "is negative", gain)
 
 
-def _owner(raw: mujoco.MjModel, name: str, row: Array) -> str:
-    """Whose number it is, for a message."""
-    kind, index = name.split("_", maxsplit=1)[0], int(row[0])
-    if kind == "dof":
-        kind, index = "jnt", int(raw.dof_jntid[index])
-    kind = {"jnt": "joint", "cam": "camera", "mat": "material"}.get(kind, kind)
-    try:
-        label = getattr(raw, kind)(index).name
-    except (AttributeError, IndexError, KeyError):
-        return ""
-    return f" of {kind} {label or f'number {index}'}"
+def _first(
+    raw: mujoco.MjModel, name: str, where: Any, says: str, called: str = ""
+) -> Iterator[str]:
+    """A message of the first row of an array for which something holds, if there is one.
+
+    Args:
+        raw: The compiled model.
+        name: Of the array.
+        where: In which of its entries it holds.
+        says: What is to be said.
+        called: What the number is called, if not by the array's name.
+    """
+    for index, *_ in np.argwhere(where)[:1].tolist():
+        kind = name.partition("_")[0]
+        if kind == "dof":
+            kind, index = "jnt", int(raw.dof_jntid[index])  # noqa: PLW2901
+        kind = {"jnt": "joint", "cam": "camera", "mat": "material"}.get(kind, kind)
+        with suppress(AttributeError, IndexError, KeyError):  # it is of the whole model
+            says = f"of {kind} {getattr(raw, kind)(index).name or f'number {index}'} {says}"
+        yield f"{called or name} {says}"
 
 
 def fastest(m: mujoco.MjModel) -> Array:

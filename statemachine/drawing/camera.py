@@ -35,7 +35,10 @@ class Camera:
     @property
     def axes(self) -> tuple[Array, Array, Array]:
         """Unit vectors (3,): right, up and forward in the picture."""
-        return _axes(self.azimuth, self.elevation)
+        a, e = math.radians(self.azimuth), math.radians(self.elevation)
+        right = np.array([math.sin(a), -math.cos(a), 0.0])
+        forward = np.array([math.cos(a) * math.cos(e), math.sin(a) * math.cos(e), math.sin(e)])
+        return right, np.cross(right, forward), forward
 
     @property
     def eye(self) -> Array:
@@ -64,9 +67,7 @@ class Camera:
         )
 
 
-def framed(
-    points: ArrayLike, aspect: float, azimuth: float, elevation: float, fovy: float = FOVY
-) -> Camera:
+def framed(points: ArrayLike, aspect: float, azimuth: float, elevation: float) -> Camera:
     """The nearest camera in a direction that has all points in its picture.
 
     A point at p from the target is seen within the picture if |p·right| ≤ tan(half the
@@ -75,13 +76,12 @@ def framed(
     Args:
         points: (n, 3) [m].
         aspect: Width of the picture by its height.
-        azimuth: As in `Camera`; so elevation and fovy.
+        azimuth: As in `Camera`; so elevation.
         elevation: See azimuth.
-        fovy: See azimuth.
     """
     cloud = np.asarray(points, dtype=float).reshape(-1, 3)
-    right, up, forward = _axes(azimuth, elevation)
-    tangent = math.tan(math.radians(fovy) / 2) * _MARGIN
+    right, up, forward = Camera((0, 0, 0), 1, azimuth, elevation).axes
+    tangent = math.tan(math.radians(FOVY) / 2) * _MARGIN
     target = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
     distance = 0.0
     for k in range(9):
@@ -93,11 +93,4 @@ def framed(
             for axis, along in ((right, x / (distance + depth)), (up, y / (distance + depth))):
                 target = target + distance * ((along.min() + along.max()) / 2 * axis)
     x, y, z = target.tolist()
-    return Camera((x, y, z), distance, azimuth, elevation, fovy)
-
-
-def _axes(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
-    a, e = math.radians(azimuth), math.radians(elevation)
-    right = np.array([math.sin(a), -math.cos(a), 0.0])
-    forward = np.array([math.cos(a) * math.cos(e), math.sin(a) * math.cos(e), math.sin(e)])
-    return right, np.cross(right, forward), forward
+    return Camera((x, y, z), distance, azimuth, elevation)

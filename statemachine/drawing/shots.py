@@ -28,17 +28,13 @@ class Shot:
 
 
 class Drawer(Protocol):
-    """Draws the bodies of one or two models wherever they are told to be."""
+    """Draws the bodies of one model wherever they are told to be, until its process ends."""
 
-    def shot(self, side: int, xpos: Array, xquat: Array) -> Shot:
-        """A picture of one side.
+    def shot(self, xpos: Array, xquat: Array) -> Shot:
+        """A picture.
 
         Args:
-            side: 0 for the solid one, 1 for the ghost.
             xpos: (nbody, 3) origins of the bodies [m].
             xquat: (nbody, 4) their rotations, wxyz.
         """
         ...
-
-    def close(self) -> None:
-        """Give back what it holds."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.metadata
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
@@ -287,13 +287,15 @@ class RawEngine:
         ...
 
     @_needed
-    def drawer(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> Drawer:
-        """Get ready to draw.
+    def drawer(self, file: Path, size: tuple[int, int], camera: Camera, ghost: bool) -> Drawer:
+        """Get ready to draw one side.
 
         Args:
-            files: The model of the solid side, and that of the ghost if there is one.
+            file: Its model.
             size: Width and height of the pictures, `sharper` times as shown.
             camera: Where they are seen from.
+            ghost: Whether it is the side that is drawn over the other one: in one colour,
+                without what belongs to the world.
         """
         ...
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -175,6 +175,7 @@ class Driver(ABC):
         legend: What the names of its ways to save mean.
         several: Whether one call takes several steps.
         resets: Whether a machine can be reset.
+        measure: Gives what a save point is like (`Measured`), looked at once.
     """
 
     layer: Layer
@@ -185,7 +186,7 @@ class Driver(ABC):
 
     def __init__(self, model: Model, seed: int) -> None:
         self.model, self.seed = model, seed
-        self._measured: dict[str, Measured] = {}
+        self.measure = cache(self._measure)  # of each point once
 
     # A machine is taken to have qpos, qvel, ctrl and time, as an MjData and a Data have.
 
@@ -235,19 +236,17 @@ class Driver(ABC):
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         """What should perturb nothing."""
 
-    def measure(self, point: SavePoint) -> Measured:
-        """What a save point is like, looked at once."""
-        if point.name not in self._measured:
-            with self.at(point) as machine:
-                speeds = self.read(machine)[self.coordinates.width :]
-                self._measured[point.name] = Measured(
-                    point.name,
-                    point.how,
-                    float(self.time(machine)),
-                    *self.touching(machine),
-                    float(np.abs(speeds).max(initial=0.0)),
-                )
-        return self._measured[point.name]
+    def _measure(self, point: SavePoint) -> Measured:
+        """What a save point is like."""
+        with self.at(point) as machine:
+            speeds = self.read(machine)[self.coordinates.width :]
+            return Measured(
+                point.name,
+                point.how,
+                float(self.time(machine)),
+                *self.touching(machine),
+                float(np.abs(speeds).max(initial=0.0)),
+            )
 
     def reset(self, machine: Machine) -> None:
         """Put a machine back to its default state, where `resets`."""

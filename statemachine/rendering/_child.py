@@ -41,20 +41,21 @@ def draw(facts: dict[str, Any], out: Any) -> None:
     camera = Camera(**facts["camera"])
     width, height = facts["size"]
     sharper = facts["sharper"]
-    drawer = room(facts["renderer"]).drawer(
-        [Path(file) for file in facts["files"]], (width * sharper, height * sharper), camera
-    )
-    try:
-        for sides in _poses(facts["bodies"]):
-            shots = [
-                drawer.shot(side, poses[:, :3], poses[:, 3:]) for side, poses in enumerate(sides)
-            ]
-            ghost = shots[1] if len(shots) > 1 else None
-            picture = compose(shots[0], ghost, facts["bias"], sharper)
-            out.write(np.ascontiguousarray(halved(picture, sharper)).tobytes())
-            out.flush()
-    finally:
-        drawer.close()
+    engine, size = room(facts["renderer"]), (width * sharper, height * sharper)
+    # What they hold they give back with the end of the process.
+    drawers = [
+        engine.drawer(Path(file), size, camera, ghost=k > 0)
+        for k, file in enumerate(facts["files"])
+    ]
+    for sides in _poses(facts["bodies"]):
+        shots = [
+            drawer.shot(poses[:, :3], poses[:, 3:])
+            for drawer, poses in zip(drawers, sides, strict=True)
+        ]
+        ghost = shots[1] if len(shots) > 1 else None
+        picture = compose(shots[0], ghost, facts["bias"], sharper)
+        out.write(halved(picture, sharper).tobytes())
+        out.flush()
 
 
 def _poses(bodies: list[int]) -> Iterator[list[Array]]:

@@ -37,12 +37,9 @@ def models_of(*traces: Trace) -> tuple[Model, ...]:
     Raises:
         ModelFileError: A trace was recorded with a file that is not here.
     """
-    found: dict[str, Model] = {}
-    for trace in traces:
-        name = trace.header.provenance.model_file
-        if name not in found:
-            found[name] = load(name)
-    return tuple(found[trace.header.provenance.model_file] for trace in traces)
+    names = [trace.header.provenance.model_file for trace in traces]
+    models = {name: load(name) for name in dict.fromkeys(names)}
+    return tuple(models[name] for name in names)
 
 
 def motion_of(trace: Trace, model: Model, times: Array) -> Motion:

@@ -7,6 +7,7 @@ import ipaddress
 import secrets
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -60,12 +61,8 @@ class Door:
         """Whether a header Host names this machine: no name that a stranger may point to it."""
         try:
             name = urlsplit(f"//{host}").hostname or ""
-        except ValueError:
-            return False
-        if name in self._names:
-            return True
-        try:
-            ipaddress.ip_address(name)  # in numbers, which nobody can point elsewhere
+            if name not in self._names:
+                ipaddress.ip_address(name)  # in numbers, which nobody can point elsewhere
         except ValueError:
             return False
         return True
@@ -73,12 +70,8 @@ class Door:
     def _cookies(self, headers: Any, port: int) -> list[str]:
         found = []
         for header in headers.get_all("Cookie"):
-            try:
-                jar = SimpleCookie(header)
-            except CookieError:
-                continue
-            if _name(port) in jar:
-                found.append(jar[_name(port)].value)
+            with suppress(CookieError, KeyError):  # it is none, or has not ours
+                found.append(SimpleCookie(header)[_name(port)].value)
         return found
 
     def guard(self, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:

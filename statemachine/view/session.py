@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import TracebackType
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -81,7 +81,7 @@ class Session:
         )
 
 
-class LiveSession(Session):
+class LiveSession(Session, ExitStack):
     """One or two engines under the same commands, at the same steps.
 
     Whoever makes it is the only one to touch its Data: what other threads want comes as
@@ -91,7 +91,7 @@ class LiveSession(Session):
     def __init__(
         self, models: Sequence[Model], keyframe: int | str | None = None, site: str | None = None
     ) -> None:
-        """Make a Data on each engine and put it to its start; paused.
+        """Make a Data on each engine, until `close`, and put it to its start; paused.
 
         Args:
             models: One Model, or the same file on two engines: the second is the ghost.
@@ -102,6 +102,7 @@ class LiveSession(Session):
             UnknownNameError: There is no such keyframe or site.
             BadInputError: The two are not the same model at the same timestep.
         """
+        ExitStack.__init__(self)
         first = models[0]
         for other in models[1:]:
             if (other.nq, other.nu, other.nbody) != (first.nq, first.nu, first.nbody):
@@ -121,14 +122,13 @@ class LiveSession(Session):
         )
         self.controls = controls_of(first)
         self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
-        start = None if keyframe is None else first.key_id(keyframe)
         self._arms: list[tuple[Model, Data]] = []
         # The last moment that was good: its time and the poses.
         self._good: tuple[float, tuple[EnginePose, ...]] = 0.0, ()
         try:
             for model in models:
-                self._arms.append((model, make_data(model)))
-            self._reset(start)
+                self._arms.append((model, self.enter_context(make_data(model))))
+            self._reset(keyframe)
         except BaseException:
             self.close()
             raise
@@ -138,6 +138,7 @@ class LiveSession(Session):
 
         Raises:
             BadInputError: A value is no number, or out of bounds; nothing is changed then.
+            UnknownNameError: There is no such keyframe; nothing is changed then.
         """
         match command:
             case SetCtrl(index, value):
@@ -194,9 +195,7 @@ class LiveSession(Session):
             poses.append(EnginePose(model.backend, *where))
         self._good = self._arms[0][1].time, tuple(poses)
 
-    def _reset(self, keyframe: int | None) -> None:
-        if keyframe is not None and not 0 <= keyframe < len(self.places):
-            raise BadInputError(f"there is no keyframe {keyframe}")
+    def _reset(self, keyframe: int | str | None) -> None:
         for model, data in self._arms:
             reset(model, data, keyframe)
         self._trouble, self._steps = "", 0
@@ -205,19 +204,3 @@ class LiveSession(Session):
     def _stop(self, model: Model, error: StateMachineError) -> None:
         self.running = False
         self._trouble = self._trouble or f"{model.backend}: {error}"
-
-    def close(self) -> None:
-        """Give back what the engines hold. Idempotent."""
-        for _, data in self._arms:
-            data.close()
-
-    def __enter__(self) -> LiveSession:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

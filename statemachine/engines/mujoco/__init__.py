@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -188,11 +188,11 @@ class MujocoEngine(RawEngine):
         """With the OpenGL that it was told."""
         return f"MuJoCo (MUJOCO_GL={opengl})" if opengl else "MuJoCo"
 
-    def drawer(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> Drawer:
+    def drawer(self, file: Path, size: tuple[int, int], camera: Camera, ghost: bool) -> Drawer:
         """An OpenGL context without a window."""
-        from .rendering import MujocoFrames
+        from .rendering import MujocoDrawer
 
-        return MujocoFrames(files, size, camera)
+        return MujocoDrawer(file, size, camera, ghost)
 
     def drawing_environment(self, opengl: str, known: dict[str, str]) -> dict[str, str]:
         """With MUJOCO_GL."""

@@ -246,43 +246,20 @@ def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
 
 
 def as_geoms(raw: Any, k: Any) -> tuple[Edit, ...]:
-    """What makes a pair of its own touch as its two geoms would without it.
+    """What makes a pair of its own touch as its two geoms would without it."""
+    from ...backends._contact_rules import bodies_meet, masks_meet, mixed
 
-    The rules are those of MuJoCo's documentation, "Computation", "Contact parameters".
-    """
     g, h = int(raw.pair_geom1[k]), int(raw.pair_geom2[k])
-    if not _would_touch(raw, g, h):
+    bodies = int(raw.geom_bodyid[g]), int(raw.geom_bodyid[h])
+    if not (bodies_meet(raw, *bodies) and masks_meet(raw, g, h)):
         return (("pair_margin", (k,), NO_TOUCH),)
-    first, second = (g, h) if raw.geom_priority[g] >= raw.geom_priority[h] else (h, g)
-    weights = raw.geom_solmix[[first, second]].clip(1e-15)
-    mix = float(weights[0] / weights.sum())
-    dim, slide = int(raw.geom_condim[first]), raw.geom_friction[first]
-    if raw.geom_priority[first] > raw.geom_priority[second]:
-        mix = 1.0
-    else:
-        dim = max(dim, int(raw.geom_condim[second]))
-        slide = np.maximum(slide, raw.geom_friction[second])
-    refs = raw.geom_solref[[first, second]]
-    mixed = mix * refs[0] + (1 - mix) * refs[1] if (refs[:, 0] > 0).all() else refs.min(axis=0)
-    imps = raw.geom_solimp[[first, second]]
+    condim, friction, solref, solimp = mixed(raw, g, h)
     return (
-        ("pair_dim", (k,), dim),
-        ("pair_friction", (k,), slide[[0, 0, 1, 2, 2]]),
-        ("pair_solref", (k,), refs[0] if mix == 1.0 else mixed),
+        ("pair_dim", (k,), condim),
+        ("pair_friction", (k,), friction[[0, 0, 1, 2, 2]]),
+        ("pair_solref", (k,), solref),
         ("pair_solreffriction", (k,), np.zeros(2)),
-        ("pair_solimp", (k,), mix * imps[0] + (1 - mix) * imps[1]),
+        ("pair_solimp", (k,), solimp),
         ("pair_margin", (k,), raw.geom_margin[[g, h]].max()),
         ("pair_gap", (k,), raw.geom_gap[[g, h]].max()),
     )
-
-
-def _would_touch(raw: Any, g: int, h: int) -> bool:
-    """Whether two geoms would touch without a pair of their own."""
-    low, high = sorted(int(raw.geom_bodyid[geom]) for geom in (g, h))
-    if (low << 16) + high in raw.exclude_signature:
-        return False
-    masks = raw.geom_contype[[g, h]] & raw.geom_conaffinity[[h, g]]
-    one, two = (int(raw.body_weldid[raw.geom_bodyid[each]]) for each in (g, h))
-    above = [int(raw.body_weldid[raw.body_parentid[each]]) for each in (one, two)]
-    filtered = one and two and (above[0] == two or above[1] == one)
-    return bool(masks.any() and one != two and not filtered)

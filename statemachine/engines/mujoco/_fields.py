@@ -8,6 +8,7 @@ mjModel has and fails for what none of these tables knows.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 
 
 def _words(text: str) -> tuple[str, ...]:
@@ -266,12 +267,6 @@ def known(name: str) -> str:
         ("idle", tuple(IDLE)),
         ("derived", DERIVED),
     ):
-        if any(_fits(name, pattern) for pattern in names):
+        if any(fnmatchcase(name, pattern) for pattern in names):
             return kind
     return ""
-
-
-def _fits(name: str, pattern: str) -> bool:
-    if pattern.startswith("*"):
-        return name.endswith(pattern[1:])
-    return name.startswith(pattern[:-1]) if pattern.endswith("*") else name == pattern

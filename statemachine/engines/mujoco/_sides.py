@@ -6,6 +6,7 @@ What moves as one is compared in one frame: fixed bodies are no difference.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -130,7 +131,7 @@ class Solids:
             body for body in np.flatnonzero(raw.body_mocapid >= 0).tolist() if self._stays(body)
         ]
         self._heads[np.isin(self._heads, [body for body in still if body not in led])] = 0
-        self._places: dict[int, Placement] = {}
+        self._hung = cache(self.hangs)
 
     def _stays(self, body: int) -> bool:
         """Whether no keyframe has a mocap body elsewhere, and nothing moves on it."""
@@ -150,11 +151,7 @@ class Solids:
 
     def place(self, body: int) -> Placement:
         """The frame of a body in that of its rigid part."""
-        if body == self.head(body):
-            return HERE
-        if body not in self._places:
-            self._places[body] = self.hangs(body)
-        return self._places[body]
+        return HERE if body == self.head(body) else self._hung(body)
 
     def hangs(self, body: int) -> Placement:
         """The frame of a body in that of the part that carries it, joints at qpos0."""

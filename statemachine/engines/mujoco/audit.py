@@ -105,16 +105,10 @@ class MujocoDriver(Driver):
 
         @contextmanager
         def save(machine: Any) -> Iterator[Restore]:
-            kept = self.saved(machine, spec)
+            kept = saved(machine, spec)
             yield lambda other: self.mj.mj_setState(other.model, other, kept, spec)
 
         return SaveMethod(name, save, left_out)
-
-    def saved(self, machine: Any, spec: int) -> Array:
-        """The components of a mask, as the engine gives them."""
-        kept = np.empty(self.mj.mj_stateSize(machine.model, spec))
-        self.mj.mj_getState(machine.model, machine, kept, spec)
-        return kept
 
     @contextmanager
     def _copied(self, machine: Any) -> Iterator[Restore]:
@@ -134,7 +128,7 @@ class MujocoDriver(Driver):
         return (
             Disturbance("mj_forward", lambda m: mj.mj_forward(m.model, m)),
             Disturbance("mj_inverse", lambda m: mj.mj_inverse(m.model, m), promised=False),
-            Disturbance("mj_getState", lambda m: self.saved(m, self.whole)),
+            Disturbance("mj_getState", lambda m: saved(m, self.whole)),
             Disturbance("mj_step1, mj_step2 for mj_step", halves, promised=one_stage, instead=True),
         )
 
@@ -147,8 +141,8 @@ class MujocoDriver(Driver):
         state, user = self.mj.mjtState, int(self.mj.mjtState.mjSTATE_USER)
         model = point.model.raw
         with self.at(point) as machine:
-            start = self.saved(machine, int(state.mjSTATE_FULLPHYSICS))
-            inputs = self.saved(machine, user)
+            start = saved(machine, int(state.mjSTATE_FULLPHYSICS))
+            inputs = saved(machine, user)
             warm, first = np.array(machine.qacc_warmstart), self.read(machine)
         out, _ = import_module("mujoco.rollout").rollout(
             model,
@@ -165,8 +159,16 @@ class MujocoDriver(Driver):
     def _batch(self, point: SavePoint, steps: int) -> list[Array]:
         batch = import_module("mujoco.batch").Batch(point.model.raw, _SEVERAL, _THREADS)
         with self.at(point) as machine:
-            batch.state[:] = self.saved(machine, self.whole)
+            batch.state[:] = saved(machine, self.whole)
             first = self.read(machine)
         out = batch.rollout(steps, record=["qpos", "qvel"])
         futures = np.concatenate((out["qpos"], out["qvel"]), axis=2)
         return [np.vstack((first, each)) for each in futures]
+
+
+def saved(machine: Any, spec: int) -> Array:
+    """The components of an MjData that a mask of mjtState names, as the engine gives them."""
+    mj = require("mujoco")
+    state = np.empty(mj.mj_stateSize(machine.model, spec))
+    mj.mj_getState(machine.model, machine, state, spec)
+    return state

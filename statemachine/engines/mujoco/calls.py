@@ -58,22 +58,19 @@ class _MjData(_Object):
 class _MjModel(_Object):
     def __init__(self, kind: str, thing: Any) -> None:
         super().__init__(kind, thing)
-        arrays = {
+        self._sizes = {
             name: value.nbytes
             for name in dir(type(thing))
             if isinstance(value := getattr(thing, name), np.ndarray)
         }
-        self._small = [name for name, size in arrays.items() if size <= _LARGE]
-        self._all = list(arrays)
         self._options = [name for name in dir(thing.opt) if not name.startswith("_")]
 
     def contents(self, thoroughly: bool) -> Contents:
         model = self.thing
         options = model.opt
         contents = {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options}
-        for name in self._all if thoroughly else self._small:
-            contents[name] = getattr(model, name).tobytes()
-        return contents
+        names = [name for name, size in self._sizes.items() if thoroughly or size <= _LARGE]
+        return contents | {name: getattr(model, name).tobytes() for name in names}
 
 
 def _bytes(value: Any) -> bytes:
@@ -104,6 +101,7 @@ class MujocoWatch(CallWatch):
 
     def __init__(self) -> None:
         self.module = mujoco_backend.mujoco
+        self._kinds = self.module.MjModel, self.module.MjData
         self._known: dict[int, _Object] = {}
 
     def functions(self) -> Iterator[tuple[Any, str, str]]:
@@ -123,10 +121,6 @@ class MujocoWatch(CallWatch):
         objects = [self._watched(thing) for thing in things if isinstance(thing, self._kinds)]
         return sorted(objects, key=lambda watched: isinstance(watched, _MjModel))
 
-    @property
-    def _kinds(self) -> tuple[type, type]:
-        return self.module.MjModel, self.module.MjData
-
     def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
         thing = args[0] if function in ("MjModel", "MjData") else result
         return self._watched(thing) if isinstance(thing, self._kinds) else None
@@ -134,11 +128,8 @@ class MujocoWatch(CallWatch):
     def _watched(self, thing: Any) -> _Object:
         known = self._known.get(id(thing))
         if known is None or known.thing is not thing:
-            if isinstance(thing, self.module.MjModel):
-                known = _MjModel("an MjModel", thing)
-            else:
-                known = _MjData("an MjData", thing)
-            self._known[id(thing)] = known
+            kind = _MjModel if isinstance(thing, self.module.MjModel) else _MjData
+            known = self._known[id(thing)] = kind(f"an {type(thing).__name__}", thing)
         return known
 
     def name(self, namespace: Mapping[str, Any]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -105,40 +105,49 @@ def _depth(data: Any) -> float:
     return max((-float(contact.dist) for contact in data.contact), default=0.0)
 
 
+def _tip(data: Any) -> Array:
+    """Where the pendulum's tip is (3,) [m]."""
+    return np.array(data.site("tip").xpos)
+
+
+def _twice(
+    what: str,
+    read: Callable[[Any], Any],
+    loaded: tuple[Any, Any, Any],
+    true: float | tuple[float, float, float],
+) -> ReadTwice:
+    """What is read as it is, and after mj_forward."""
+    mj, model, data = loaded
+    first = read(data)
+    mj.mj_forward(model, data)
+    return what, first, read(data), true
+
+
 def write(angle: float, deep: float) -> list[ReadTwice]:
     """Write qpos of a pendulum, then of a ball that is put into the samples."""
-    mj, model, data = _loaded(samples.PENDULUM_MJCF % "")
+    mj, model, data = loaded = _loaded(samples.PENDULUM_MJCF % "")
     mj.mj_forward(model, data)
     data.qpos[0] = angle
-    read = np.array(data.site("tip").xpos)
-    mj.mj_forward(model, data)
-    tip = ("the tip", read, np.array(data.site("tip").xpos), samples.tip_at(angle))
+    tip = _twice("the tip", _tip, loaded, samples.tip_at(angle))
 
-    mj, model, data = _loaded(samples.BALL)
+    mj, model, data = loaded = _loaded(samples.BALL)
     mj.mj_forward(model, data)
     data.qpos[2] = samples.RADIUS - deep
-    depth = _depth(data)
-    mj.mj_forward(model, data)
-    return [tip, ("the contact", depth, _depth(data), deep)]
+    return [tip, _twice("the contact", _depth, loaded, deep)]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
     """A pendulum on its way, and a ball on its way out of the samples."""
-    mj, model, data = _loaded(samples.PENDULUM_MJCF % "")
+    mj, model, data = loaded = _loaded(samples.PENDULUM_MJCF % "")
     data.qvel[0] = speed
     mj.mj_step(model, data)
-    read = np.array(data.site("tip").xpos)
-    mj.mj_kinematics(model, data)
-    true = samples.tip_at(data.qpos[0])
-    tip = ("the tip", read, np.array(data.site("tip").xpos), true)
+    tip = _twice("the tip", _tip, loaded, samples.tip_at(data.qpos[0]))
 
-    mj, model, data = _loaded(samples.BALL)
+    mj, model, data = loaded = _loaded(samples.BALL)
     data.qpos[2], data.qvel[2] = samples.RADIUS - deep, speed
     mj.mj_step(model, data)
-    depth = _depth(data)
-    mj.mj_forward(model, data)
     now = max(samples.RADIUS - float(data.qpos[2]), 0.0)
-    return [tip, ("the contact", depth, _depth(data), now)]
+    return [tip, _twice("the contact", _depth, loaded, now)]
 
 
 def joints() -> dict[str, list[str]]:

@@ -98,10 +98,8 @@ def _read(raw: Any, edit: Edit) -> Any:
 def _frames(raw: Any, edits: Iterable[Edit]) -> None:
     """What lay in another frame, and was not computed apart, may lie elsewhere now."""
     for name, index, _ in edits:
-        if name in ("geom_pos", "geom_quat"):
-            raw.geom_sameframe[index] = 0
-        elif name in ("site_pos", "site_quat"):
-            raw.site_sameframe[index] = 0
+        if name in ("geom_pos", "geom_quat", "site_pos", "site_quat"):
+            getattr(raw, f"{name[:4]}_sameframe")[index] = 0
         elif name in ("body_ipos", "body_iquat") and not raw.body_simple[index[0]]:
             raw.body_sameframe[index] = 0
             raw.geom_sameframe[raw.geom_bodyid == index[0]] = 0

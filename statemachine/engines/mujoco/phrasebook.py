@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from ..measured import ANGLE, TORQUE, Cell, Phrases, accelerated, near
@@ -12,15 +13,10 @@ def _loaded(n: Any) -> bool:
     return n.m.nq == n.m.nu == 1 and n.d.time == 0
 
 
-def _has_state(n: Any) -> bool:
-    """The engine computes with it."""
+def _accelerates(n: Any, torque: float) -> bool:
+    """The engine computes with the state, and with the command."""
     n.mujoco.mj_forward(n.m, n.d)
-    return near(n.d.qacc[0], acceleration(ANGLE, 0), 1e-9)
-
-
-def _commanded(n: Any) -> bool:
-    n.mujoco.mj_forward(n.m, n.d)
-    return near(n.d.qacc[0], acceleration(ANGLE, TORQUE), 1e-9)
+    return near(n.d.qacc[0], acceleration(ANGLE, torque), 1e-9)
 
 
 def _stepped(n: Any) -> bool:
@@ -63,8 +59,8 @@ _CELLS = {
         "d = mujoco.MjData(m)",
         _loaded,
     ),
-    "state": Cell(f"d.qpos[0], d.qvel[0] = {ANGLE}, 0", _has_state),
-    "command": Cell(f"d.ctrl[0] = {TORQUE}", _commanded),
+    "state": Cell(f"d.qpos[0], d.qvel[0] = {ANGLE}, 0", partial(_accelerates, torque=0.0)),
+    "command": Cell(f"d.ctrl[0] = {TORQUE}", partial(_accelerates, torque=TORQUE)),
     "step": Cell("mujoco.mj_step(m, d)", _stepped),
     "recompute": Cell("mujoco.mj_forward(m, d)", _recomputed),
     "read a site": Cell('tip = d.site("tip").xpos', _read),

@@ -12,6 +12,7 @@ import numpy as np
 from ...installed import require
 from ...interface import Array
 from ..pile import HALF, PLACES, TILT, Pile
+from .audit import saved
 
 MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
 {
@@ -51,8 +52,7 @@ def _copied(scene: MujocoPile) -> Iterator[Callable[[MujocoPile], object]]:
 def _state(scene: MujocoPile, part: str) -> Iterator[Callable[[MujocoPile], object]]:
     """The components of a mask of mjtState."""
     mask = getattr(scene.mj.mjtState, part)
-    state = np.empty(scene.mj.mj_stateSize(scene.model, mask))
-    scene.mj.mj_getState(scene.model, scene.data, state, mask)
+    state = saved(scene.data, int(mask))
     yield lambda other: other.mj.mj_setState(other.model, other.data, state, mask)
 
 

@@ -1,10 +1,8 @@
-"""Drawn by MuJoCo: one view for each side, in one OpenGL context without a window."""
+"""Drawn by MuJoCo, in an OpenGL context without a window."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,40 +14,15 @@ from ...interface import Array
 from ...rotations import matrix_from_quat
 
 
-class MujocoFrames:
-    """Draws the bodies of one or two models wherever they are told to be."""
+class MujocoDrawer:
+    """Draws the bodies of a model wherever they are told to be."""
 
-    def __init__(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> None:
-        """Open an OpenGL context.
-
-        Args:
-            files: The model of the solid side, and that of the ghost if there is one.
-            size: Width and height of the pictures.
-            camera: Where they are seen from.
-        """
-        self._mj = require("mujoco")
-        self._context = self._mj.GLContext(*size)
-        self._context.make_current()
-        self._views = [
-            _View(self._mj, file, size, camera, ghost=k > 0) for k, file in enumerate(files)
-        ]
-
-    def shot(self, side: int, xpos: Array, xquat: Array) -> Shot:
-        """A side with its bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
-        return self._views[side].shot(xpos, xquat)
-
-    def close(self) -> None:
-        """Give OpenGL back."""
-        for view in self._views:
-            view.close()
-        self._context.free()
-
-
-class _View:
-    def __init__(
-        self, mj: Any, file: Path, size: tuple[int, int], camera: Camera, ghost: bool
-    ) -> None:
+    def __init__(self, file: Path, size: tuple[int, int], camera: Camera, ghost: bool) -> None:
+        """Open an OpenGL context; the arguments are those of `RawEngine.drawer`."""
+        mj = require("mujoco")
         self._mj, self._ghost, self._size = mj, ghost, size
+        self._context = mj.GLContext(*size)
+        self._context.make_current()
         self._raw = raw = load(file).raw
         raw.vis.global_.offwidth, raw.vis.global_.offheight = size
         raw.vis.global_.fovy, raw.vis.global_.orthographic = camera.fovy, 0
@@ -82,6 +55,8 @@ class _View:
                 self._scene.flags[flag] = 0
 
     def shot(self, xpos: Array, xquat: Array) -> Shot:
+        """A picture with the bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
+        self._context.make_current()  # there may be another side, with one of its own
         mj, raw, data, scene = self._mj, self._raw, self._data, self._scene
         turn = matrix_from_quat(xquat)
         body = raw.geom_bodyid
@@ -98,7 +73,6 @@ class _View:
         rgb = np.empty((height, width, 3), dtype=np.uint8)
         depth = np.empty((height, width), dtype=np.float32)  # as OpenGL has it
         frame = mj.MjrRect(0, 0, width, height)
-        mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._pen)  # there may be two pens
         mj.mjr_render(frame, scene, self._pen)
         mj.mjr_readPixels(rgb, depth, frame, self._pen)
         # Reversed depth: 1 at the near plane, 0 at the far one, linear in 1/z.
@@ -106,6 +80,3 @@ class _View:
         metres = near * far / (near + depth.astype(np.float64) * (far - near))
         metres[depth == 0] = np.inf
         return Shot(rgb[::-1], metres[::-1])
-
-    def close(self) -> None:
-        self._pen.free()

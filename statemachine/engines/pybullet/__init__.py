@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -138,11 +138,11 @@ class PybulletEngine(RawEngine):
         """It needs no OpenGL."""
         return "PyBullet's software renderer"
 
-    def drawer(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> Drawer:
+    def drawer(self, file: Path, size: tuple[int, int], camera: Camera, ghost: bool) -> Drawer:
         """A world for each side."""
-        from .rendering import BulletFrames
+        from .rendering import PybulletDrawer
 
-        return BulletFrames(files, size, camera)
+        return PybulletDrawer(file, size, camera, ghost)
 
     def backend(self) -> ModuleType:
         """The backend, which takes what MuJoCo's compiler makes of a file."""

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
-from ...backends._bullet_client import pb
+from ...backends._bullet_client import joint_infos, pb
 from ...backends._bullet_plan import Plan
 from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
@@ -28,8 +28,7 @@ from .world import fresh_world, gravity_of, limp, saved_in_memory
 _BEFORE, _AFTER = 10, 100
 
 
-@contextmanager
-def _raw(model: Model, gravity: bool = True, damping: bool = True) -> Iterator[World]:
+def _raw(model: Model, gravity: bool = True, damping: bool = True) -> closing[World]:
     """The model in a fresh client, as loadURDF leaves it, with the model's gravity."""
     plan = cast("PybulletModel", model).plan
     if not damping:
@@ -39,10 +38,7 @@ def _raw(model: Model, gravity: bool = True, damping: bool = True) -> Iterator[W
     world = World(plan, "engine")
     if not gravity:
         pb.setGravity(0, 0, 0, world.client)
-    try:
-        yield world
-    finally:
-        world.close()
+    return closing(world)
 
 
 def terms(model: Model) -> tuple[Term, ...]:
@@ -60,8 +56,7 @@ def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
     for index, place in zip(tree.joints, model.compiled.dof_jntid[tree.dofs], strict=False):
         thing, slot = f"joint {model.joint_names[place]}", int(model.jnt_qposadr[place])
         yield Term(thing, f"qpos[{slot}]", f"joint {index} of body {tree.body}")
-    count = pb.getNumJoints(tree.body, world.client)
-    infos = [pb.getJointInfo(tree.body, i, world.client) for i in range(count)]
+    infos = joint_infos(world.client, tree.body)
     fixed = [f"{info[1].decode()} is {info[0]}" for info in infos if info[3] < 0]
     if fixed:
         yield Term("fixed joints", "none", f"take an index too: {', '.join(fixed)}")
@@ -201,7 +196,7 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
 
     runs = [driver.run(start, _BEFORE + _AFTER).future for _ in range(2)]
     with driver.at(middle) as machine:
-        touching = sum(point[8] <= 0 for point in machine.world.contact_points())
+        touching, _ = driver.touching(machine)
     moment = f"after {_BEFORE} steps, {touching} contacts"
     return (
         WayBack("a new client, loaded again", driver.off(*runs)),

@@ -78,27 +78,21 @@ class _World(WatchedObject):
         bodies = [pb.getBodyUniqueId(i, client) for i in range(pb.getNumBodies(client))]
         poses = [pb.getBasePositionAndOrientation(body, client) for body in bodies]
         speeds = [pb.getBaseVelocity(body, client) for body in bodies]
-        joints: list[Any] = [[], [], [], []]
-        links, dynamics = [], []
-        for body in bodies:
-            numbers = list(range(pb.getNumJoints(body, client)))
-            dynamics += [pb.getDynamicsInfo(body, link, client) for link in (-1, *numbers)]
-            if numbers:
-                for kept, values in zip(
-                    joints,
-                    zip(*pb.getJointStates(body, numbers, client), strict=True),
-                    strict=True,
-                ):
-                    kept.append(values)
-                links.append(pb.getLinkStates(body, numbers, 0, 0, client))
+        numbers = {body: list(range(pb.getNumJoints(body, client))) for body in bodies}
+        jointed = [(body, joints) for body, joints in numbers.items() if joints]
+        states = [state for pair in jointed for state in pb.getJointStates(*pair, client)]
         contents = {
             _BODIES: bodies,
-            **dict(zip(_JOINT, joints, strict=True)),
+            **{name: [state[k] for state in states] for k, name in enumerate(_JOINT)},
             "base poses": poses,
             "base velocities": speeds,
-            "link poses": links,
+            "link poses": [pb.getLinkStates(*pair, 0, 0, client) for pair in jointed],
             "contact points": pb.getContactPoints(physicsClientId=client),
-            "masses, frictions and dampings": dynamics,
+            "masses, frictions and dampings": [
+                pb.getDynamicsInfo(body, link, client)
+                for body in bodies
+                for link in (-1, *numbers[body])
+            ],
             "constraints": pb.getNumConstraints(client),
         }
         contents |= pb.getPhysicsEngineParameters(client)
@@ -190,9 +184,8 @@ class PybulletWatch(CallWatch):
     def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
         if function != "connect" or result < 0:
             return None
-        world = _World(self._bare, result)
-        self._worlds[result] = world
-        return world
+        self._worlds[result] = _World(self._bare, result)
+        return self._worlds[result]
 
     def name(self, namespace: Mapping[str, Any]) -> None:
         arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()

@@ -8,12 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from ...backends._bullet_client import pb
+from ...backends._bullet_client import joint_infos, pb
 from ...interface import Array
 from .. import samples
 from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
 from .pile import BulletPile
-from .world import fresh_world, gravity_of, limp, load, put_floor
+from .world import fresh_world, gravity_of, limp, load, put, put_floor
 from .world import timestep as step_of
 
 
@@ -146,8 +146,7 @@ def _tip(client: int, body: int, compute: bool = False) -> Array:
 def _put_ball(client: int, height: float) -> int:
     """The floor, and the ball at a height [m]; its number."""
     put_floor(client)
-    ball = pb.createCollisionShape(pb.GEOM_SPHERE, radius=samples.RADIUS, physicsClientId=client)
-    return pb.createMultiBody(1, ball, basePosition=(0, 0, height), physicsClientId=client)
+    return put(client, pb.GEOM_SPHERE, (0, 0, height), radius=samples.RADIUS)
 
 
 def _depth(client: int) -> float:
@@ -199,8 +198,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
 def joints() -> dict[str, list[str]]:
     """The indices of the joints, from a URDF."""
     with _loaded(samples.TREE_URDF, fixed=True) as (client, body):
-        count = pb.getNumJoints(body, client)
-        return {"URDF": [pb.getJointInfo(body, k, client)[1].decode() for k in range(count)]}
+        return {"URDF": [info[1].decode() for info in joint_infos(client, body)]}
 
 
 def friction() -> dict[str, Sliding]:
@@ -209,11 +207,8 @@ def friction() -> dict[str, Sliding]:
     def speed(block: float, ground: float, lean: float) -> float:
         with fresh_world() as client:
             below = put_floor(client)
-            box = pb.createCollisionShape(
-                pb.GEOM_BOX, halfExtents=samples.BLOCK, physicsClientId=client
-            )
             at = (0, 0, samples.BLOCK[2])
-            body = pb.createMultiBody(1, box, basePosition=at, physicsClientId=client)
+            body = put(client, pb.GEOM_BOX, at, halfExtents=samples.BLOCK)
             pb.changeDynamics(below, -1, lateralFriction=ground, physicsClientId=client)
             pb.changeDynamics(body, -1, lateralFriction=block, physicsClientId=client)
             step = step_of(client)

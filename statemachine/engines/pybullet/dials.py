@@ -84,7 +84,7 @@ class PybulletDials:
             "damping": partial(_set_damping, body=0.0, joint=joint),
             "limits": partial(_set_limits, ranges=None),
             "surfaces": partial(_set_surfaces, surfaces=self.emulated.plan.surfaces),
-            "contact": _touch_nothing,
+            "contact": World.meet,  # nothing meets anything
         }
         return _dialled(model, [act for name, act in acts.items() if name in dials])
 
@@ -214,8 +214,3 @@ def _fresh_surfaces(world: World, plan: Plan) -> None:
             pb.setCollisionFilterPair(
                 body, other, link, other_link, int(wanted), physicsClientId=world.client
             )
-
-
-def _touch_nothing(world: World) -> None:
-    for body, link, _ in world.solids():
-        pb.setCollisionFilterGroupMask(body, link, 0, 0, world.client)

@@ -19,6 +19,7 @@ from ..samples import GRAVITY, PENDULUM_URDF
 from .world import (
     fresh_world,
     load,
+    put,
     put_floor,
     saved_in_a_file,
     saved_in_memory,
@@ -123,16 +124,8 @@ class BulletPile(Pile):
         """Put the bodies into an empty world; what else is set there stays."""
         self.client = client
         put_floor(client)
-        edges = (HALF, HALF, HALF)
-        shape = pb.createCollisionShape(pb.GEOM_BOX, halfExtents=edges, physicsClientId=client)
         self.bases = tuple(
-            pb.createMultiBody(
-                1,
-                shape,
-                basePosition=place,
-                baseOrientation=turn.tolist(),
-                physicsClientId=client,
-            )
+            put(client, pb.GEOM_BOX, place, turn.tolist(), halfExtents=(HALF, HALF, HALF))
             for place, turn in zip(PLACES, _TURNS, strict=True)
         )
         self.box = self.bases[0]  # the lowest, at which quantities are looked at

@@ -11,15 +11,13 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
-from ...backends._bullet_client import pb
+from ...backends._bullet_client import joint_infos, load_urdf, pb
 from ...backends._bullet_urdf import UNLIMITED
 from ...description import urdf
 from ...description.records import CollisionShape, Inertial, Link, Robot, RobotJoint, Setting
-from ...errors import ModelError
 from ...installed import engine_version
 from ...interface import make_data
 from ...rotations import HERE, Placement, matrix_from_quat, wxyz_from_xyzw
-from ...silence import silence
 from .world import fresh_world
 
 _KINDS = {0: "hinge", 1: "slide", 2: "ball"}  # JOINT_REVOLUTE, JOINT_PRISMATIC, JOINT_SPHERICAL
@@ -44,15 +42,7 @@ def read(path: Path, name: str) -> Robot:
             return _description(client, bodies, name)
     urdf.read(path)  # of some bad files PyBullet makes an end of the process
     with fresh_world() as client:
-        with silence() as said:
-            try:
-                body = pb.loadURDF(str(path), physicsClientId=client)
-            except pb.error as error:
-                body = -1
-                said.append(str(error))
-        if body < 0:
-            raise ModelError(f"PyBullet cannot read {path.name}: {'; '.join(said[-2:])}")
-        return _description(client, [body], name)
+        return _description(client, [load_urdf(client, str(path), path.name)], name)
 
 
 def _description(client: int, bodies: Sequence[int], name: str) -> Robot:
@@ -101,9 +91,7 @@ class _Body:
     def __init__(self, client: int, body: int) -> None:
         self._client, self._body = client, body
         self.base = pb.getBodyInfo(body, physicsClientId=client)[0].decode()
-        self.infos = [
-            pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))
-        ]
+        self.infos = joint_infos(client, body)
         for i in range(len(self.infos)):
             pb.resetJointState(body, i, 0.0, physicsClientId=client)
         self._dynamics = {

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...backends import load
-from ...backends._bullet_client import connect, disconnect, pb
+from ...backends._bullet_client import connect, pb
 from ...drawing import Part, drawing_of
 from ...drawing.camera import Camera
 from ...drawing.shots import GHOST, Shot
@@ -24,37 +24,30 @@ _LIGHT = (0.4, -0.6, 1.5)
 _SKY = np.array([[196.0, 208.0, 220.0], [240.0, 243.0, 246.0]])  # above, and at the horizon
 
 
-class BulletFrames:
-    """Draws the bodies of one or two models wherever they are told to be."""
+class PybulletDrawer:
+    """Draws the bodies of a model wherever they are told to be."""
 
-    def __init__(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> None:
-        """Connect to a world for each side; the arguments are those of `RawEngine.drawer`."""
-        self._size, self._camera = size, camera
-        self._clients: list[int] = []
-        self._placed: list[list[tuple[int, int]]] = []
-        for k, file in enumerate(files):
-            client = connect()
-            self._clients.append(client)
-            parts = [part for part in drawing_of(load(file)).parts if k == 0 or part.body]
-            self._placed.append(
-                [
-                    (self._made(client, shape, colour), part.body)
-                    for part in parts
-                    for shape, colour in _shapes(part, (*GHOST, 1.0) if k else part.rgba)
-                ]
-            )
+    def __init__(self, file: Path, size: tuple[int, int], camera: Camera, ghost: bool) -> None:
+        """Connect to a world; the arguments are those of `RawEngine.drawer`."""
+        self._size, self._camera, self._ghost = size, camera, ghost
+        self._client = connect()
+        parts = [part for part in drawing_of(load(file)).parts if part.body or not ghost]
+        self._placed = [
+            (self._made(shape, colour), part.body)
+            for part in parts
+            for shape, colour in _shapes(part, (*GHOST, 1.0) if ghost else part.rgba)
+        ]
         up = camera.axes[1].tolist()
         self._view = pb.computeViewMatrix(camera.eye.tolist(), list(camera.target), up)
         aspect = size[0] / size[1]
         self._lens = pb.computeProjectionMatrixFOV(camera.fovy, aspect, camera.near, camera.far)
 
-    def shot(self, side: int, xpos: Array, xquat: Array) -> Shot:
-        """A side with its bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
-        client = self._clients[side]
+    def shot(self, xpos: Array, xquat: Array) -> Shot:
+        """A picture with the bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
         turned = xyzw_from_wxyz(xquat)
-        for number, body in self._placed[side]:
+        for number, body in self._placed:
             pb.resetBasePositionAndOrientation(
-                number, xpos[body].tolist(), turned[body].tolist(), physicsClientId=client
+                number, xpos[body].tolist(), turned[body].tolist(), physicsClientId=self._client
             )
         width, height = self._size
         _, _, rgba, window, _ = pb.getCameraImage(
@@ -63,9 +56,9 @@ class BulletFrames:
             self._view,
             self._lens,
             lightDirection=_LIGHT,
-            shadow=side == 0,
+            shadow=not self._ghost,
             renderer=pb.ER_TINY_RENDERER,
-            physicsClientId=client,
+            physicsClientId=self._client,
         )
         rgb = np.array(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3].copy()
         window = np.array(window, dtype=float).reshape(height, width)
@@ -79,12 +72,8 @@ class BulletFrames:
         rgb[nothing] = np.broadcast_to(sky[:, None], rgb.shape)[nothing]
         return Shot(rgb, depth)
 
-    def close(self) -> None:
-        """Give the worlds back."""
-        for client in self._clients:
-            disconnect(client)
-
-    def _made(self, client: int, shape: tuple[Any, Any], rgba: Sequence[float]) -> int:
+    def _made(self, shape: tuple[Any, Any], rgba: Sequence[float]) -> int:
+        """A body that is only seen; its number."""
         vertices, faces = shape
         look = pb.createVisualShape(
             pb.GEOM_MESH,
@@ -92,9 +81,9 @@ class BulletFrames:
             indices=faces.ravel().tolist(),
             rgbaColor=list(rgba),
             specularColor=[0.1, 0.1, 0.1],
-            physicsClientId=client,
+            physicsClientId=self._client,
         )
-        return pb.createMultiBody(0, -1, look, physicsClientId=client)
+        return pb.createMultiBody(0, -1, look, physicsClientId=self._client)
 
 
 def _shapes(

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from ...backends._bullet_client import as_file, connect, disconnect, pb
+from ...backends._bullet_client import as_file, connect, disconnect, load_urdf, pb
 from ...silence import silence
 
 
@@ -41,13 +41,9 @@ def fresh_world() -> Iterator[int]:
 
 def load(client: int, text: str, fixed: bool = False) -> int:
     """Put a URDF text, with the inertias that it states, into a world; the body's number."""
-    with as_file(text) as file, silence():
-        return pb.loadURDF(
-            file,
-            useFixedBase=fixed,
-            flags=pb.URDF_USE_INERTIA_FROM_FILE,
-            physicsClientId=client,
-        )
+    with as_file(text) as file:
+        flags = pb.URDF_USE_INERTIA_FROM_FILE
+        return load_urdf(client, file, "this text", useFixedBase=fixed, flags=flags)
 
 
 def limp(body: int, client: int, joint: int = 0) -> None:
@@ -118,5 +114,28 @@ def saved_in_a_file(machine: HasClient) -> Iterator[Restore]:
 
 def put_floor(client: int) -> int:
     """A plane that does not move; its number."""
-    plane = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
-    return pb.createMultiBody(0, plane, physicsClientId=client)
+    return put(client, pb.GEOM_PLANE, mass=0)
+
+
+def put(
+    client: int,
+    kind: int,
+    place: Sequence[float] = (0, 0, 0),
+    turn: Sequence[float] = (0, 0, 0, 1),
+    mass: float = 1,
+    **size: Any,
+) -> int:
+    """Put a body of one shape into a world; its number.
+
+    Args:
+        client: The world's number.
+        kind: A number of PyBullet's, as GEOM_BOX.
+        place: Of its centre (3,) [m].
+        turn: Its axes, a quaternion (x, y, z, w).
+        mass: What it weighs [kg]; a body of 0 does not move.
+        **size: As createCollisionShape takes it [m].
+    """
+    shape = pb.createCollisionShape(kind, physicsClientId=client, **size)
+    return pb.createMultiBody(
+        mass, shape, basePosition=place, baseOrientation=turn, physicsClientId=client
+    )
