@@ -207,7 +207,7 @@ class ExerciseJudge:
             if not self._key:
                 scenes = Scenes(self.backend, Path(tempfile.mkdtemp(dir=self._folder)))
                 worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
-                self._key = {name: (w, judge_of(name).right(w)) for name, w in worlds.items()}
+                self._key = {n: (w, [*map(judge_of(n).right, w)]) for n, w in worlds.items()}
 
     def _judgement(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
         if recording.refusal:

@@ -19,6 +19,7 @@ from ..interface import Data, Model, make_data, step
 from ..page import Code, Page, Printed
 from ..probes.calls import CallRecording, record, recorded_engines, statements
 from ..runs.drive import steps_in
+from ..runs.provenance import Provenance
 from ..runs.robot import is_the_arm
 from . import module, template
 from .records import Lesson
@@ -113,6 +114,13 @@ class CodeRun:
         return self.names
 
 
+@dataclass(frozen=True, kw_only=True)
+class LessonResult:
+    """What any lesson measures on one backend; `provenance`: what that was computed with."""
+
+    provenance: Provenance
+
+
 @dataclass(frozen=True)
 class Taken:
     """A lesson on one backend.
@@ -124,7 +132,7 @@ class Taken:
         calls: What the engine was made to do by it, if that was to be recorded and can be.
     """
 
-    result: Any
+    result: LessonResult
     code: str
     printed: str
     arm: bool
@@ -185,7 +193,7 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
     blocks = {
         "code": Code(code.splitlines()),
         "printed": Printed({name: run.printed for name, run in taken.items()}),
-        **lesson_module.tables(results),
+        **(lesson_module.tables(results) if hasattr(lesson_module, "tables") else {}),
     }
     return template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
 

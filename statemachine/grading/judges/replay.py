@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Array, Model, make_data, reset
+from ...interface import Array, make_data, reset
 from ...measures.text import count
 from ..answers import Answer, kind
 from ..calls import reason
@@ -65,18 +65,14 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(worlds: list[ExerciseWorld]) -> list[Start]:
-    """Where the runs begin on each."""
-    return [_start(world.model) for world in worlds]
-
-
-def _start(model: Model) -> Start:
-    with make_data(model) as data:
-        reset(model, data, keyframe=0)
+def right(world: ExerciseWorld) -> Start:
+    """Where the runs begin."""
+    with make_data(world.model) as data:
+        reset(world.model, data, keyframe=0)
         return Start(data.qpos.copy(), data.qvel.copy(), data.time, data.ctrl.copy())
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[str] | str:
+def judge(answer: Answer, world: ExerciseWorld, right: Start, _course: Start) -> list[str] | str:
     """Two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")
