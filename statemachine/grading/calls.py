@@ -104,21 +104,18 @@ def answers_of_file(
     """
     with engine_watched(worlds[0].model.backend):
         try:
-            function = find(load_file(path), name, worlds[0].arguments)
+            yield from answers_of(find(load_file(path), name, worlds[0].arguments), worlds)
         except FaultError as fault:
             yield fault
-            return
-        yield from answers_of(function, worlds)
 
 
 def answers_of(function: Function, worlds: Sequence[ExerciseWorld]) -> Iterator[Any | FaultError]:
     """What comes of a function on world after world, until it fails on one; as `encode` has it."""
-    for world in worlds:
-        try:
+    try:
+        for world in worlds:
             yield call(function, world)
-        except FaultError as fault:
-            yield fault
-            return
+    except FaultError as fault:
+        yield fault
 
 
 def call(function: Function, world: ExerciseWorld) -> Any:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -190,14 +191,8 @@ def engine_watched(backend: str) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> Iterator[None]:
-    original = vars(owner)[name]
-    setattr(owner, name, seen(original))
-    try:
-        yield
-    finally:
-        setattr(owner, name, original)
+def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> AbstractContextManager[Any]:
+    return mock.patch.object(owner, name, seen(vars(owner)[name]))
 
 
 def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[..., None]:

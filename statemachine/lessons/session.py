@@ -132,7 +132,7 @@ class Taken:
         calls: What the engine was made to do by it, if that was to be recorded and can be.
     """
 
-    result: LessonResult
+    result: Any
     code: str
     printed: str
     arm: bool

@@ -34,6 +34,7 @@ MEMORY_MOST = 4 * GB
 _FILE_MOST = GB // 2
 _FLOOD = GB // 4  # bytes of output that only a loop without end writes
 _TOKEN = "STATEMACHINE_SANDBOX"
+_NO_MEMORY = ("MemoryError", "bad_alloc", "annot allocate memory")  # at the end of stderr
 _PATIENCE = 2.0  # seconds to end what a command left behind
 _LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 # Where a process cannot limit its computing time, it is watched from outside.
@@ -150,7 +151,7 @@ def run(
     if code < 0:
         code = -code
         end = "cpu" if _is_of_cpu(code, used, cpu) else "signal"
-    if end != "cpu" and code and _speaks_of_memory(texts[1]):
+    if end != "cpu" and code and any(word in texts[1][-2000:] for word in _NO_MEMORY):
         end = "memory"
     words = {
         "code": f"ended the process with code {code}",
@@ -305,11 +306,6 @@ def _relatives(leader: int, token: str) -> set[Path]:
             ):
                 found.add(entry)
     return found
-
-
-def _speaks_of_memory(stderr: str) -> bool:
-    tail = stderr[-2000:]
-    return any(word in tail for word in ("MemoryError", "bad_alloc", "annot allocate memory"))
 
 
 def _start_of(file: Any, most: int) -> str:
