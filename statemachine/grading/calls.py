@@ -26,7 +26,12 @@ _LONGEST = 200  # characters of an error's own text
 
 def reason(*rows: tuple[object, str]) -> str:
     """The text of the first row that holds; "" if none does."""
-    return next((text for holds, text in rows if holds), "")
+    return "".join(first_of(*rows))
+
+
+def first_of(*rows: tuple[object, str]) -> list[str]:
+    """The text of the first row that holds, alone in a list; an empty list if none does."""
+    return [text for holds, text in rows if holds][:1]
 
 
 class FaultError(Exception):

@@ -130,4 +130,5 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
 
 def metadata_of(task: Task) -> dict[str, Any]:
     """What Gymnasium is told of a task: as many pictures a second as commands."""
-    return {"render_modes": list(RENDER_MODES), "render_fps": round(1 / task.dt)}
+    control_step = task.model.timestep * task.frame_skip  # s
+    return {"render_modes": list(RENDER_MODES), "render_fps": round(1 / control_step)}

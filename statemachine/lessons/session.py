@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import io
 import itertools
+import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
@@ -216,9 +217,6 @@ def stepping_loop(model: Model, marks: Sequence[float], seconds: float) -> tuple
 
 def load_line(model: str, backend: str, menagerie: str | None = None) -> str:
     """The call that loads a model, as one types it."""
+    name, engine = (json.dumps(text, ensure_ascii=False) for text in (model, backend))
     folder = f", menagerie={menagerie!r}" if menagerie else ""
-    return f"sm.load({_quoted(model)}, backend={_quoted(backend)}{folder})"
-
-
-def _quoted(text: str) -> str:
-    return f'"{text}"' if '"' not in text and "\\" not in text else repr(text)
+    return f"sm.load({name}, backend={engine}{folder})"

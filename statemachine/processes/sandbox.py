@@ -126,9 +126,6 @@ def run(
         )
         before = 0.0
 
-        def ready() -> str:
-            return "ready" if started() else ""
-
         def exceeded() -> str:
             if WATCHED and cpu_of(process) - before > cpu:
                 return "cpu"
@@ -136,7 +133,7 @@ def run(
             return "flood" if flooded else ""
 
         try:
-            end = _wait(process, began + start, ready, stopped)
+            end = _wait(process, began + start, lambda: "ready" if started() else "", stopped)
             if is_ready := end == "ready":
                 before = cpu_of(process) if WATCHED else 0.0
                 end = _wait(process, time.monotonic() + wall, exceeded, stopped)

@@ -11,7 +11,7 @@ import numpy as np
 from ...interface import Array, Data, Model, forward, make_data
 from ...measures.text import rounded, vector
 from ..answers import Answer
-from ..calls import reason
+from ..calls import first_of, reason
 from ..watch import Inputs
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
@@ -115,7 +115,7 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
     same = near(given, np.tile(given[3], (4, 1)), 0)
     places = tips.others.items() if answer.forwards else ()  # without any, all are at the origin
     names = [name for name, readings in places if near(given, readings, tolerance)]
-    text = reason(
+    return first_of(
         (
             same and (answer.memory[3] == 0 or all(answer.live)),
             f"{last}what you read is the simulator's own memory, which changes. {copies}",
@@ -131,7 +131,6 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
         ),
         (names, f"that is the place of {' and '.join(names[:3])}; site {TIP!r} is asked for"),
     )
-    return [text] if text else []
 
 
 def _why(

@@ -11,7 +11,7 @@ from typing import Any
 from ...interface import JointType, Model, make_data, reset
 from ...measures.text import count
 from ..answers import Answer, kind
-from ..calls import FaultError, reason
+from ..calls import FaultError, first_of, reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import parts
 
@@ -71,7 +71,7 @@ def _names(slots: Any, layout: ExpectedState) -> list[str]:
         )
     missing = [name for name in layout.slots if name not in slots]
     unknown = [name for name in slots if name not in layout.slots]
-    text = reason(
+    return first_of(
         (
             missing,
             f"slots: {len(missing)} of {len(layout.slots)} joints are missing: "
@@ -79,7 +79,6 @@ def _names(slots: Any, layout: ExpectedState) -> list[str]:
         ),
         (unknown, f"slots: no joint is called {[*unknown, ''][0]!r}; see model.joint_names"),
     )
-    return [text] if text else []
 
 
 def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> list[str]:
