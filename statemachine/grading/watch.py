@@ -110,7 +110,7 @@ class StudentWatch:
             RuntimeError: There are too many.
         """
         for number, known in enumerate(self.datas):
-            if data is known or data is _raw(known):
+            if data is known or data is getattr(known, "_raw", None):
                 return number
         if len(self.datas) == _MOST:
             raise RuntimeError(f"more than {_MOST} Data, which no exercise needs")
@@ -236,8 +236,3 @@ def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
         return result
 
     return seen
-
-
-def _raw(data: Any) -> Any:
-    """The engine's object behind a Data that is open; None for one that is none."""
-    return getattr(data, "_raw", None)
