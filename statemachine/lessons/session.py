@@ -8,7 +8,7 @@ import itertools
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import redirect_stdout
+from contextlib import ExitStack, redirect_stdout
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -26,7 +26,7 @@ from . import module, template
 from .records import Lesson
 
 
-class CodeRun:
+class CodeRun(ExitStack):
     """The code of a lesson on one Model, to be run once.
 
         with CodeRun(code, model) as play:
@@ -41,18 +41,12 @@ class CodeRun:
     """
 
     def __init__(self, code: str, model: Model) -> None:
+        super().__init__()
         self.model = model
         self.worlds: list[tuple[Model, Data]] = []
         self.names: dict[str, Any] = {}
         self._code = code
         self._out = io.StringIO()
-
-    def __enter__(self) -> CodeRun:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        for _, data in self.worlds:
-            data.close()
 
     @property
     def printed(self) -> str:
@@ -79,7 +73,7 @@ class CodeRun:
         """
 
         def make(model: Model) -> Data:
-            data = make_data(model)
+            data = self.enter_context(make_data(model))
             self.worlds.append((model, data))
             return data
 
