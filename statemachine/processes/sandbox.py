@@ -14,6 +14,7 @@ from __future__ import annotations
 import faulthandler
 import math
 import os
+import re
 import secrets
 import signal
 import site
@@ -34,7 +35,7 @@ MEMORY_MOST = 4 * GB
 _FILE_MOST = GB // 2
 _FLOOD = GB // 4  # bytes of output that only a loop without end writes
 _TOKEN = "STATEMACHINE_SANDBOX"
-_NO_MEMORY = ("MemoryError", "bad_alloc", "annot allocate memory")  # at the end of stderr
+_NO_MEMORY = "MemoryError|bad_alloc|annot allocate memory"  # at the end of stderr
 _PATIENCE = 2.0  # seconds to end what a command left behind
 _LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 # Where a process cannot limit its computing time, it is watched from outside.
@@ -148,7 +149,7 @@ def run(
     if code < 0:
         code = -code
         end = "cpu" if _is_of_cpu(code, used, cpu) else "signal"
-    if end != "cpu" and code and any(word in texts[1][-2000:] for word in _NO_MEMORY):
+    if end != "cpu" and code and re.search(_NO_MEMORY, texts[1][-2000:]):
         end = "memory"
     words = {
         "code": f"ended the process with code {code}",
