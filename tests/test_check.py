@@ -70,7 +70,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], P
     def prepare(name: str, backend: str) -> Prepared:
         need_engine(backend)
         worlds = judge_of(name).worlds(Scenes(backend, tmp_path_factory.mktemp(name)))
-        return worlds, judge_of(name).right(worlds)
+        return worlds, [*map(judge_of(name).right, worlds)]
 
     return prepare
 
@@ -431,7 +431,7 @@ def test_a_judge_that_is_replaced_is_another_process_s(tmp_path: Path) -> None:
         "from statemachine.grading import judges",
         "for name in judges.JUDGES:",
         "    judges.judge_of(name).judge = lambda *_: 'patched'",
-        "    judges.judge_of(name).right = lambda worlds: [None for _ in worlds]",
+        "    judges.judge_of(name).right = lambda _: None",
         "judges.judged = lambda *_: judges.Judgement('demo_gravity', True, True, ('patched',))",
         *(f"def {name}(*_): return 1" for name in JUDGES),
     )

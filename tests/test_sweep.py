@@ -467,7 +467,7 @@ def test_every_kind_of_factor_has_a_meaning() -> None:
         "contacts=on": ("", "contacts of the model"),
     }
     found = with_kinds(parse_vary(told), ["damping", "contacts"], ["mass"])
-    assert [(vary.unit, vary.meaning) for vary in found] == list(told.values())
+    assert [(vary.unit_on(), vary.meaning) for vary in found] == list(told.values())
 
 
 def test_a_file_of_another_sweep_is_refused(dataset: Path, tmp_path: Path) -> None:

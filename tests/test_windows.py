@@ -37,7 +37,6 @@ GUARDED = {
     ("worlds/_process.py", "POLLIN"),
     ("worlds/_process.py", "poll"),
     ("processes/pipes.py", "register_at_fork"),
-    ("worlds/verbs.py", "sched_getaffinity"),
 }
 
 

@@ -26,7 +26,12 @@ _LONGEST = 200  # characters of an error's own text
 
 def reason(*rows: tuple[object, str]) -> str:
     """The text of the first row that holds; "" if none does."""
-    return next((text for holds, text in rows if holds), "")
+    return "".join(first_of(*rows))
+
+
+def first_of(*rows: tuple[object, str]) -> list[str]:
+    """The text of the first row that holds, alone in a list; an empty list if none does."""
+    return [text for holds, text in rows if holds][:1]
 
 
 class FaultError(Exception):
@@ -104,21 +109,18 @@ def answers_of_file(
     """
     with engine_watched(worlds[0].model.backend):
         try:
-            function = find(load_file(path), name, worlds[0].arguments)
+            yield from answers_of(find(load_file(path), name, worlds[0].arguments), worlds)
         except FaultError as fault:
             yield fault
-            return
-        yield from answers_of(function, worlds)
 
 
 def answers_of(function: Function, worlds: Sequence[ExerciseWorld]) -> Iterator[Any | FaultError]:
     """What comes of a function on world after world, until it fails on one; as `encode` has it."""
-    for world in worlds:
-        try:
+    try:
+        for world in worlds:
             yield call(function, world)
-        except FaultError as fault:
-            yield fault
-            return
+    except FaultError as fault:
+        yield fault
 
 
 def call(function: Function, world: ExerciseWorld) -> Any:

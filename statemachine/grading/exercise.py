@@ -19,7 +19,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from .. import __version__, errors
 from ..backends import backend_engine
@@ -104,7 +104,7 @@ def run(
         return judge.judge(path, progress)
 
 
-class ExerciseJudge:
+class ExerciseJudge(ExitStack):
     """Judges files on one backend. What is right is worked out once, for all of them.
 
         with ExerciseJudge("mujoco") as judge:
@@ -125,6 +125,7 @@ class ExerciseJudge:
         `own` has for a submission all files that belong to it, by their names in its folder; for
         others these are what they name beside them.
         """
+        super().__init__()
         if not 0 < time_limit <= 3600:
             raise BadInputError(
                 f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
@@ -137,21 +138,17 @@ class ExerciseJudge:
         self.limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
         self.stop = threading.Event()
         self._own = own or {}
-        self._cleanup = ExitStack()
         self._lock = threading.Lock()
         self._key: dict[str, tuple[list[ExerciseWorld], list[Any]]] = {}
 
-    def __enter__(self) -> ExerciseJudge:
-        self._cleanup.enter_context(unwinding())
-        name = self._cleanup.enter_context(
+    def __enter__(self) -> Self:
+        self.enter_context(unwinding())
+        name = self.enter_context(
             tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True)
         )
         self._folder = Path(name)
+        self.callback(self.stop.set)  # called first
         return self
-
-    def __exit__(self, *exc: Any) -> bool | None:
-        self.stop.set()
-        return self._cleanup.__exit__(*exc)
 
     def judge(
         self, file: str | os.PathLike[str], progress: Callable[[float], None] = lambda _: None
@@ -207,7 +204,7 @@ class ExerciseJudge:
             if not self._key:
                 scenes = Scenes(self.backend, Path(tempfile.mkdtemp(dir=self._folder)))
                 worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
-                self._key = {name: (w, judge_of(name).right(w)) for name, w in worlds.items()}
+                self._key = {n: (w, [*map(judge_of(n).right, w)]) for n, w in worlds.items()}
 
     def _judgement(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
         if recording.refusal:

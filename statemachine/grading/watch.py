@@ -9,9 +9,10 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -109,7 +110,7 @@ class StudentWatch:
             RuntimeError: There are too many.
         """
         for number, known in enumerate(self.datas):
-            if data is known or data is _raw(known):
+            if data is known or data is getattr(known, "_raw", None):
                 return number
         if len(self.datas) == _MOST:
             raise RuntimeError(f"more than {_MOST} Data, which no exercise needs")
@@ -190,14 +191,8 @@ def engine_watched(backend: str) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> Iterator[None]:
-    original = vars(owner)[name]
-    setattr(owner, name, seen(original))
-    try:
-        yield
-    finally:
-        setattr(owner, name, original)
+def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> AbstractContextManager[Any]:
+    return mock.patch.object(owner, name, seen(vars(owner)[name]))
 
 
 def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[..., None]:
@@ -241,8 +236,3 @@ def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
         return result
 
     return seen
-
-
-def _raw(data: Any) -> Any:
-    """The engine's object behind a Data that is open; None for one that is none."""
-    return getattr(data, "_raw", None)

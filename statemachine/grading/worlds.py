@@ -6,7 +6,6 @@ taken from the course's own model shows.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from ..backends import load
 from ..errors import UnsupportedError
 from ..interface import Model
 from ..models import resolve
+from ..witness.mjcf_text import parse, with_includes
 from .watch import Nudge
 
 ELSEWHERE = "on a scene with a crate before the arm"
@@ -92,24 +92,13 @@ class Scenes:
     def _load(self, name: str, kind: str, edit: Callable[[ElementTree.Element], None]) -> Model:
         file = self._folder / f"{kind}_{name.rpartition('/')[2]}.xml"
         if file.name not in self._made:
-            root = _merged(resolve(name))
+            path = resolve(name)
+            root, _ = with_includes(parse(path), path)
             _bare(root)
             edit(root)
             ElementTree.ElementTree(root).write(file)
             self._made[file.name] = load(file, backend=self._backend)
         return self._made[file.name]
-
-
-def _merged(path: Path) -> ElementTree.Element:
-    """A model's file with those that it includes in their places."""
-    root = ElementTree.parse(path).getroot()
-    for place, child in reversed(list(enumerate(root))):
-        if child.tag == "include":
-            root.remove(child)
-            inner = _merged(path.parent / child.attrib["file"])
-            for part in reversed(list(inner)):
-                root.insert(place, copy.deepcopy(part))
-    return root
 
 
 def _bare(root: ElementTree.Element) -> None:

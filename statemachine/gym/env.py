@@ -10,14 +10,13 @@ from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
-from ..errors import BadInputError, DivergedError, EngineError, check_name
+from ..errors import BadInputError, DivergedError, EngineError
 from ..installed import DEFAULT
 from ..interface import Array, forward, make_data, reset, step
-from .render import TaskPictures
+from .render import RENDER_MODES, TaskPictures
 from .tasks import Task, make_task
 
 FRAME_SKIP = 4  # timesteps of 5 ms: 50 commands a second
-RENDER_MODES = ("rgb_array",)
 
 
 class ArmEnv(gymnasium.Env[Array, ArrayLike]):
@@ -59,14 +58,13 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
             MissingEngineError: The engine is not installed here.
             BadInputError: `frame_skip` is no whole number of at least 1.
         """
-        check_render_mode(render_mode)
         self.task = make_task(task, backend, frame_skip)
         self.model, self.data = self.task.model, make_data(self.task.model)
         self.render_mode = render_mode
         self.metadata = metadata_of(self.task)
         self.observation_space = Box(self.task.low, self.task.high, dtype=np.float64)
         self.action_space = Box(-1, 1, (self.model.nu,), dtype=np.float32)
-        self._pictures = TaskPictures(self.task)
+        self._pictures = TaskPictures(self.task, render_mode)
         self._target: Array | None = None
 
     def reset(
@@ -107,11 +105,8 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
 
     def render(self) -> Any:
         """A picture (height, width, 3) uint8 of the present moment; None without a render mode."""
-        if self.render_mode is None:
-            return None
-        if self._target is None:
-            raise ResetNeeded("call reset before render: no episode has begun")
-        return self._pictures.of(self.data.qpos[None], self._target)[0]
+        pictures = self._pictures.of(self.data.qpos[None], self._target)
+        return None if pictures is None else pictures[0]
 
     def close(self) -> None:
         """Give back what the engine holds. Idempotent."""
@@ -133,12 +128,7 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
         return (float(outcome.reward[0]), bool(outcome.terminated[0])), info
 
 
-def check_render_mode(render_mode: str | None) -> None:
-    """Raise UnknownNameError for a render mode that there is not."""
-    if render_mode is not None:
-        check_name("render mode", render_mode, RENDER_MODES)
-
-
 def metadata_of(task: Task) -> dict[str, Any]:
     """What Gymnasium is told of a task: as many pictures a second as commands."""
-    return {"render_modes": list(RENDER_MODES), "render_fps": round(1 / task.dt)}
+    control_step = task.model.timestep * task.frame_skip  # s
+    return {"render_modes": list(RENDER_MODES), "render_fps": round(1 / control_step)}

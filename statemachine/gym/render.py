@@ -6,14 +6,16 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from ..drawing.camera import Camera
-from ..errors import ClosedDataError
+from ..errors import ClosedDataError, check_name
 from ..interface import Array
 from ..rendering import LivePictures, motion_through, renderer_here
 from .tasks import Task
 
+RENDER_MODES = ("rgb_array",)
 SIZE = (480, 360)  # pixels
 CAMERA = Camera((0.16, 0.0, 0.16), 1.15, 140.0, -20.0)
 _BALL = """
@@ -30,22 +32,34 @@ class TaskPictures:
     success. What stands in front of it hides it.
     """
 
-    def __init__(self, task: Task) -> None:
-        self._model, self._radius = task.model, task.near
+    def __init__(self, task: Task, mode: str | None) -> None:
+        """Draw in a render mode; None for no pictures.
+
+        Raises:
+            UnknownNameError: There is no such render mode.
+        """
+        if mode is not None:
+            check_name("render mode", mode, RENDER_MODES)
+        self._model, self._radius, self._mode = task.model, task.near, mode
         self._closed = False
         self._live: LivePictures | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
-    def of(self, qpos: Array, targets: Array) -> tuple[NDArray[np.uint8], ...]:
-        """Pictures (height, width, 3) uint8.
+    def of(self, qpos: Array, targets: Array | None) -> tuple[NDArray[np.uint8], ...] | None:
+        """Pictures (height, width, 3) uint8; None without a render mode.
 
         Args:
             qpos: (n, nq), of each world.
-            targets: (n, 3) [m].
+            targets: (n, 3) [m]; None where no episode has begun.
 
         Raises:
+            ResetNeeded: No episode has begun.
             ClosedDataError: They are closed.
         """
+        if self._mode is None:
+            return None
+        if targets is None:
+            raise ResetNeeded("call reset before render: no episode has begun")
         if self._closed:
             raise ClosedDataError("this environment is closed: make another")
         motion = motion_through(self._model, qpos)

@@ -79,11 +79,6 @@ class Task(ABC):
         self._poses = _Poses()
         self.low, self.high = self._bounds()
 
-    @property
-    def dt(self) -> float:
-        """Simulated time of a control step [s]."""
-        return self.model.timestep * self.frame_skip
-
     def ctrl(self, action: ArrayLike, shape: tuple[int, ...]) -> Array:
         """Commands [rad] for actions of a shape (…, nu); beyond -1 to 1 the nearest counts.
 
@@ -156,7 +151,7 @@ class Reach(Task):
         while True:
             pose = rng.uniform(low, high)
             pose[-1] = 0.0
-            tip, touching = self._poses(pose)[0], self._poses.touching
+            tip, _, touching = self._poses(pose)
             if not touching and tip[2] > 0.03:
                 return EpisodeStart(qpos, tip)
 
@@ -195,7 +190,7 @@ class HeldBox(Task):
         held = keyframe.qpos
         self._arm = held[: self.box]
         self._from = held[self.box : self.box + 3]
-        tip, turn = self._poses(self._arm)
+        tip, turn, _ = self._poses(self._arm)
         self._in_hand = turn.T @ (self._from - tip)
 
     def point(self, qpos: Array, tip: Array) -> Array:
@@ -207,10 +202,10 @@ class HeldBox(Task):
         spread, (low, high) = np.array(self.spread), self.model.jnt_range[: len(self.spread)].T
         while True:
             pose = np.clip(self._arm + rng.uniform(-spread, spread), low, high)
-            tip, turn = self._poses(pose)
+            tip, turn, touching = self._poses(pose)
             target = tip + turn @ self._in_hand
             far = np.linalg.norm(target - self._from)
-            if not self._poses.touching and target[2] > self._from[2] and far > 2 * self.near:
+            if not touching and target[2] > self._from[2] and far > 2 * self.near:
                 return EpisodeStart(None, target)
 
     def outcome(self, observations: Array) -> StateWorth:
@@ -243,17 +238,12 @@ class _Poses:
         self._data = make_data(self._model)
         self._tip = self._model.site_id(TIP)
 
-    def __call__(self, qpos: Array) -> tuple[Array, Array]:
-        """Position (3,) and axes (3, 3) of the fingertip for the joints (6,)."""
+    def __call__(self, qpos: Array) -> tuple[Array, Array, bool]:
+        """Position (3,) and axes (3, 3) of the fingertip for the joints (6,); does it touch?"""
         self._data.qpos[:] = qpos
         forward(self._model, self._data)
         tip, turn = self._data.site_xpos[self._tip], self._data.site_xmat[self._tip]
-        return tip.copy(), turn.reshape(3, 3).copy()
-
-    @property
-    def touching(self) -> bool:
-        """Whether anything touches in the last pose."""
-        return len(self._data.contacts.geom) > 0
+        return tip.copy(), turn.reshape(3, 3).copy(), len(self._data.contacts) > 0
 
 
 def _length(way: Array) -> Array:

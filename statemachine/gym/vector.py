@@ -19,7 +19,7 @@ from ..installed import DEFAULT
 from ..interface import Array
 from ..interface.checks import as_count
 from ..worlds import forward, make_worlds, reset, step
-from .env import FRAME_SKIP, check_render_mode, metadata_of
+from .env import FRAME_SKIP, metadata_of
 from .render import TaskPictures
 from .tasks import make_task
 
@@ -68,7 +68,6 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
             MissingEngineError: The engine is not installed here.
             BadInputError: A number is no whole number of at least 1.
         """
-        check_render_mode(render_mode)
         modes = [mode.value for mode in AutoresetMode]
         if not isinstance(autoreset_mode, AutoresetMode):
             check_name("autoreset mode", autoreset_mode, modes)
@@ -77,6 +76,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         self._most = np.inf if most is None else as_count(most, "max_episode_steps")
         self.task = make_task(task, backend, frame_skip)
         self.model = self.task.model
+        self._pictures = TaskPictures(self.task, render_mode)
         self.worlds = make_worlds(self.model, self.num_envs, workers=workers, derived=(_SEEN,))
         self.render_mode = render_mode
         self.autoreset_mode = AutoresetMode(autoreset_mode)
@@ -89,7 +89,6 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         made = [seeding.np_random() for _ in range(self.num_envs)]
         self._np_random: Any = [rng for rng, _ in made]
         self._np_random_seed: Any = [drawn for _, drawn in made]
-        self._pictures = TaskPictures(self.task)
         self._targets = np.zeros((self.num_envs, 3))
         self._seen = np.zeros((self.num_envs, len(self.task.low)))
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
@@ -171,11 +170,8 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         Raises:
             ResetNeeded: `reset` was never called.
         """
-        if self.render_mode is None:
-            return None
-        if not self._begun.all():
-            raise ResetNeeded("call reset before render: no episode has begun")
-        return self._pictures.of(self.worlds.qpos, self._targets)
+        targets = self._targets if self._begun.all() else None
+        return self._pictures.of(self.worlds.qpos, targets)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Give back threads, processes and memory."""

@@ -99,8 +99,5 @@ def random_qpos(model: Model, joints: Sequence[int], count: int, seed: int) -> A
 
 def slots(model: Model, joints: Sequence[int]) -> list[int]:
     """Slots of qpos that belong to these joints, in their order."""
-    found: list[int] = []
-    for joint in joints:
-        start = int(model.jnt_qposadr[joint])
-        found += range(start, start + JointType(int(model.jnt_type[joint])).nq)
-    return found
+    starts, kinds = model.jnt_qposadr.tolist(), model.jnt_type.tolist()
+    return [starts[j] + k for j in joints for k in range(JointType(kinds[j]).nq)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..installed import WITNESS
@@ -12,9 +12,18 @@ from ..page import Items, Page, Table
 from ..witness import OWN_READING
 from . import template
 from .fingertip import Certificate, Offset
-from .template import differences
+from .template import by_engine, differences
 
 _SHOWN = 12  # rows of a table of tips
+_ROWS: Mapping[str, Callable[[Certificate], str]] = {
+    "grade": lambda r: r.grade,
+    "frames apart": lambda r: _offset(r.frames),
+    "default pose [m]": lambda r: vector(r.default_pose),
+    "position, worst [m]": lambda r: _figure(r.position_worst),
+    "position, median [m]": lambda r: _figure(r.position_median),
+    "rotation matrix, worst": lambda r: _figure(r.rotation_worst),
+    "rotation matrix, median": lambda r: _figure(r.rotation_median),
+}
 
 
 def page(results: Mapping[str, Certificate]) -> Page:
@@ -25,7 +34,9 @@ def page(results: Mapping[str, Certificate]) -> Page:
     apart = {"default pose": lambda a, b: f"{math.dist(a.default_pose, b.default_pose):.1e} m"}
     blocks = {
         "prepared": Items(first.prepared),
-        "tips": _table(results) if one else [_tips(*each) for each in results.items()],
+        "tips": by_engine(results, _ROWS, "Engine against witness")
+        if one
+        else [_tips(*each) for each in results.items()],
         "differences": differences(results, apart) if same_site else [],
     }
     return template.page("certificate", results, {n: _slots(r) for n, r in results.items()}, blocks)
@@ -53,23 +64,6 @@ def _slots(result: Certificate) -> dict[str, Any]:
         "within": f"{result.tolerance:g}",
         "grade": result.grade,
     }
-
-
-def _table(results: Mapping[str, Certificate]) -> Table:
-    every = results.values()
-    return Table(
-        ("", *results),
-        [
-            ("grade", *(r.grade for r in every)),
-            ("frames apart", *(_offset(r.frames) for r in every)),
-            ("default pose [m]", *(vector(r.default_pose) for r in every)),
-            ("position, worst [m]", *(_figure(r.position_worst) for r in every)),
-            ("position, median [m]", *(_figure(r.position_median) for r in every)),
-            ("rotation matrix, worst", *(_figure(r.rotation_worst) for r in every)),
-            ("rotation matrix, median", *(_figure(r.rotation_median) for r in every)),
-        ],
-        title="Engine against witness",
-    )
 
 
 def _tips(name: str, result: Certificate) -> Table:

@@ -207,9 +207,7 @@ def _asked(
         if witness_frame is not None or model.compiled is None:
             raise
         reason = str(error)
-    joints = list(range(model.njnt))
-    frames: list[tuple[str, Kind]] = [(tip.name, tip.kind) for tip in tips]
-    return _Asked(Kinematics.same_reading(model), joints, tips, frames), reason
+    return _matched(model, tips, Kinematics.same_reading(model), None), reason
 
 
 def _matched(model: Model, tips: list[Tip], known: Kinematics, witness_frame: str | None) -> _Asked:
@@ -254,21 +252,20 @@ def _gap(
     name, kind = frame
     theirs = kinematics.poses(qpos, name, kind)
     offset = _declared_offset(model, tip, kinematics, name, kind) or _steady_offset(ours, theirs)
-    moved = rotated = None
-    if offset is None or offset.same:
-        moved = np.linalg.norm(ours.pos - theirs.pos, axis=1)
-        rotated = np.abs(ours.mat - theirs.mat).max(axis=(1, 2))
-    first = ours.pos[0]
+    moved = np.linalg.norm(ours.pos - theirs.pos, axis=1)
+    rotated = np.abs(ours.mat - theirs.mat).max(axis=(1, 2))
+    compared = offset is None or offset.same
+    x, y, z = ours.pos[0].tolist()
     return TipGap(
         site=tip.name,
         witness_frame=name,
         body=labels("body", model.body_names)[tip.body],
         frames=offset,
-        position_worst=None if moved is None else float(moved.max()),
-        position_median=None if moved is None else float(np.median(moved)),
-        rotation_worst=None if rotated is None else float(rotated.max()),
-        rotation_median=None if rotated is None else float(np.median(rotated)),
-        default_pose=(float(first[0]), float(first[1]), float(first[2])),
+        position_worst=float(moved.max()) if compared else None,
+        position_median=float(np.median(moved)) if compared else None,
+        rotation_worst=float(rotated.max()) if compared else None,
+        rotation_median=float(np.median(rotated)) if compared else None,
+        default_pose=(x, y, z),
     )
 
 

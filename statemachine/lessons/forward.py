@@ -17,7 +17,7 @@ from ..measures import largest
 from ..measures.text import count, millimetres, short_time, vector
 from ..page import Table
 from ..runs.drive import Progress, steps_in
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ._robot import coordinate, tip_of, usual_tip, with_joint
 from ._stages import (
     ArrayChanges,
@@ -30,7 +30,7 @@ from ._stages import (
     own_answers,
     own_tables,
 )
-from .session import CodeRun
+from .session import CodeRun, LessonResult
 from .template import differences, emulated
 
 _SECONDS = 2.0  # under a command, long enough to touch something
@@ -80,7 +80,7 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False)
-class Forward:
+class Forward(LessonResult):
     """The four readings.
 
     Attributes:
@@ -105,7 +105,6 @@ class Forward:
     itself: tuple[OwnAnswer, ...]
     changes: tuple[ArrayChanges, ...]
     lag: Lag | None
-    provenance: Provenance
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forward:

@@ -19,12 +19,12 @@ from ..measures.text import NONE, apart, position, short_time, signed
 from ..page import Table, Traces
 from ..runs.commands import start_keyframe
 from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ..runs.robot import is_the_arm
 from ..runs.scenarios import SCENARIOS
 from ._falling import BALANCE, PARTS, Droop, Falling, milestones
 from ._robot import check_servos, coordinate, start_line, with_joint
-from .session import CodeRun, stepping_loop
+from .session import CodeRun, LessonResult, stepping_loop
 from .template import differences, emulated, where
 
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
@@ -74,7 +74,7 @@ for variant in (model, limp):
 
 
 @dataclass(frozen=True, eq=False)
-class Gravity:
+class Gravity(LessonResult):
     """The same run with the servos on and off.
 
     Attributes:
@@ -89,7 +89,6 @@ class Gravity:
     servos_off: Droop
     longer: dict[str, Droop]
     alone: tuple[LeftAlone, ...]
-    provenance: Provenance
 
     @property
     def unit(self) -> str:

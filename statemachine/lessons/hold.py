@@ -15,10 +15,10 @@ from ..measures.text import apart, position, short_time
 from ..page import Table, Traces
 from ..runs.commands import hold_ctrl, is_servo, start_keyframe
 from ..runs.drive import Progress, steps_in
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ..runs.robot import command, touching, trees_of_actuators
 from ._robot import check_servos, start_line
-from .session import CodeRun, stepping_loop
+from .session import CodeRun, LessonResult, stepping_loop
 from .template import differences, where
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -47,7 +47,7 @@ data = sm.make_data(model)
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
+class Hold(LessonResult):
     """The response to one command from the start, of the k joints that position servos drive.
 
     Attributes:
@@ -78,7 +78,6 @@ class Hold:
     joints: tuple[str, ...]
     slides: tuple[bool, ...]
     keyframe: str | None
-    provenance: Provenance
 
     @property
     def error(self) -> Array:

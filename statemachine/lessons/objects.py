@@ -15,12 +15,11 @@ from ..errors import BadInputError
 from ..interface import Array, Data, Model, make_data, step
 from ..interface.checks import as_count
 from ..measures.text import count, duration
-from ..page import Table
 from ..runs.drive import Progress, part_of
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from .in_turns import in_turns
-from .session import CodeRun
-from .template import differences
+from .session import CodeRun, LessonResult
+from .template import by_engine, differences
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 _TIMES = 5  # repetitions; the median counts
@@ -30,7 +29,9 @@ _WORLDS_MOST = 100
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """Two Data of one Model, of which one is stepped."""
-    _worlds(options)
+    worlds = as_count(options["worlds"], "worlds")
+    if not 2 <= worlds <= _WORLDS_MOST:
+        raise BadInputError(f"worlds must be from 2 to {_WORLDS_MOST}; got {worlds}")
     return f"""\
 import statemachine as sm
 
@@ -43,16 +44,8 @@ print(round(data.time, 6), round(other.time, 6))
 """
 
 
-def _worlds(options: Mapping[str, Any]) -> int:
-    """How many Data step in turn."""
-    worlds = as_count(options["worlds"], "worlds")
-    if not 2 <= worlds <= _WORLDS_MOST:
-        raise BadInputError(f"worlds must be from 2 to {_WORLDS_MOST}; got {worlds}")
-    return worlds
-
-
 @dataclass(frozen=True)
-class Objects:
+class Objects(LessonResult):
     """Costs, and who shares what.
 
     Attributes:
@@ -77,7 +70,6 @@ class Objects:
     arrays: int
     constant: bool
     shared: bool
-    provenance: Provenance
 
     @property
     def ratio(self) -> float:
@@ -87,7 +79,7 @@ class Objects:
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Objects:
     """Time the parts, then let several Data of the Model step in turn."""
-    model, worlds = play.model, _worlds(options)
+    model, worlds = play.model, options["worlds"]
     before = _arrays(model)
     play()
     extra: list[Data] = []
@@ -160,20 +152,19 @@ def slots(result: Objects) -> dict[str, Any]:
 
 def tables(results: Mapping[str, Objects]) -> dict[str, Any]:
     """What each part costs."""
-    columns = results.values()
-    costs = Table(
-        ("", *results),
-        [
-            ("load: the file, once", *(duration(r.loading) for r in columns)),
-            ("make_data", *(duration(r.making) for r in columns)),
-            ("step: one timestep", *(duration(r.stepping) for r in columns)),
-            ("a load costs as much as", *(f"{r.ratio:,.0f} steps" for r in columns)),
-        ],
-        title="What each costs on this machine, now (median of five)",
-    )
+    costs = {
+        "load: the file, once": lambda r: duration(r.loading),
+        "make_data": lambda r: duration(r.making),
+        "step: one timestep": lambda r: duration(r.stepping),
+        "a load costs as much as": lambda r: f"{r.ratio:,.0f} steps",
+    }
     against = {
         "a load takes": lambda a, b: f"{b.loading / a.loading:.1f} ×",
         "a Data takes": lambda a, b: f"{b.making / a.making:.1f} ×",
         "a step takes": lambda a, b: f"{b.stepping / a.stepping:.1f} ×",
     }
-    return {"costs": costs, "differences": differences(results, against)}
+    title = "What each costs on this machine, now (median of five)"
+    return {
+        "costs": by_engine(results, costs, title),
+        "differences": differences(results, against),
+    }

@@ -6,7 +6,7 @@ a browser.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..backends import load
-from ..interface import Array, Data, Model, forward, make_data, reset, step
+from ..interface import Array, forward, make_data, reset, step
 from ..page import Page, Printed, RobotPicture
 from ..runs.commands import TARGET
 from ..runs.scenarios import SCENARIOS
@@ -38,39 +38,31 @@ def with_picture(page: Page, lesson: str) -> Page:
 def _poses(
     name: str,
     pictures: int,
-    ctrl: Sequence[float] | None = None,
+    ctrl: Sequence[float] | Array | None = None,
     keyframe: int | None = None,
-    change: Callable[[Model, Data], None] = lambda _model, _data: None,
     options: Mapping[str, Any] | None = None,
     every: int = _EVERY,
+    **qpos: float,
 ) -> Array:
-    """Rows of qpos (pictures, nq) of a run, from its start on, so many steps apart."""
+    """Rows of qpos (pictures, nq) of a run, so many steps apart; `qpos`: where joints start."""
     model = load(name).replace(**(options or {}))
-    found = np.empty((pictures, model.nq))
+    rows = np.empty((pictures, model.nq))
     with make_data(model) as data:
         reset(model, data, keyframe=keyframe)
         if ctrl is not None:
             data.ctrl[:] = ctrl
-        change(model, data)
-        for k in range(pictures):
-            found[k] = data.qpos
-            step(model, data, every)
-    return found
-
-
-def _still(name: str, keyframe: int | None = None, **qpos: float) -> Array:
-    """One row of qpos (1, nq): a keyframe, with joints put elsewhere."""
-
-    def put(model: Model, data: Data) -> None:
         for joint, value in qpos.items():
             data.qpos[model.jnt_qposadr[model.joint_id(joint)]] = value
+        for k in range(pictures):
+            rows[k] = data.qpos
+            step(model, data, every)
+    return rows
 
-    return _poses(name, 1, keyframe=keyframe, change=put)
 
-
-def _two_data() -> tuple[Array, Array]:
-    moved = _poses(_ARM, 16, ctrl=TARGET, every=_SLOW)
-    return moved, np.repeat(moved[:1], len(moved), axis=0)
+def _to_the_goal(beside: Sequence[float] | None = None) -> tuple[Array, Array]:
+    """The arm on its way, and a pose that stays; by default that of the start."""
+    run = _poses(_ARM, 16, ctrl=TARGET, every=_SLOW)
+    return run, np.tile(run[0] if beside is None else beside, (len(run), 1))
 
 
 def _lag() -> tuple[Array, Array]:
@@ -85,21 +77,9 @@ def _lag() -> tuple[Array, Array]:
         return before, data.qpos[None].copy()
 
 
-def _to_the_goal() -> tuple[Array, Array]:
-    run = _poses(_ARM, 16, ctrl=TARGET, every=_SLOW)
-    return run, np.repeat(np.array([TARGET]), len(run), axis=0)
-
-
-def _limp() -> tuple[Array, Array]:
-    off = SCENARIOS["gravity"].options
-    return _poses(_ARM, 22, options=off), _poses(_ARM, 22)
-
-
 def _twice() -> tuple[Array, Array]:
-    def swing(_model: Model, data: Data) -> None:
-        data.ctrl[:2] += (0.4, -0.2)
-
-    run = partial(_poses, _BOX, 16, keyframe=0, change=swing)
+    ctrl = load(_BOX).keyframes[0].ctrl + np.array((0.4, -0.2, 0, 0, 0, 0))
+    run = partial(_poses, _BOX, 16, ctrl, keyframe=0)
     return run(), run()
 
 
@@ -111,14 +91,14 @@ PICTURES: Mapping[str, RobotPicture] = {
         "stretched out where both began, for nobody advances it.",
         "statemachine view --model so101/scene",
         _ARM,
-        _two_data,
+        _to_the_goal,
     ),
     "state": RobotPicture(
         "Six hinges and a box that nothing holds but the jaws: 13 positions, 12 velocities.",
         "The arm with a small box between its jaws, above the floor.",
         "statemachine view --keyframe held",
         _BOX,
-        lambda: (_still(_BOX, 0), None),
+        lambda: (_poses(_BOX, 1, keyframe=0), None),
     ),
     "write": RobotPicture(
         "What xpos still says, and in violet what was written into qpos.",
@@ -126,7 +106,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "shoulder_lift by 0.8 rad, where qpos says that it is, part of it below the floor.",
         "statemachine view --model so101/scene --paused",
         _ARM,
-        lambda: (_still(_ARM), _still(_ARM, shoulder_lift=0.8)),
+        lambda: (_poses(_ARM, 1), _poses(_ARM, 1, shoulder_lift=0.8)),
     ),
     "forward": RobotPicture(
         "After the step from 0.250 s: the arm by site_xpos, and in violet by qpos, 9.95 mm on.",
@@ -143,7 +123,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "with a finger, and stays a degree short of it.",
         "statemachine trace record hold && statemachine view hold.mujoco.npz",
         _ARM,
-        _to_the_goal,
+        lambda: _to_the_goal(TARGET),
     ),
     "gravity": RobotPicture(
         "Nobody writes ctrl: the servos off, and in violet on.",
@@ -151,7 +131,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "with servos, in violet, it stays stretched out above it.",
         "statemachine trace record gravity && statemachine view gravity.mujoco.npz",
         _ARM,
-        _limp,
+        lambda: (_poses(_ARM, 22, options=SCENARIOS["gravity"].options), _poses(_ARM, 22)),
     ),
     "reset": RobotPicture(
         "The keyframe 'held', and in violet the default state of the arm.",
@@ -159,7 +139,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "joints at zero, and the box stands away from it.",
         "statemachine view --keyframe held",
         _BOX,
-        lambda: (_still(_BOX, 0), _still(_BOX)),
+        lambda: (_poses(_BOX, 1, keyframe=0), _poses(_BOX, 1)),
     ),
     "replay": RobotPicture(
         "Two runs in one picture. The second would be violet wherever it parts from the first.",
@@ -181,6 +161,6 @@ PICTURES: Mapping[str, RobotPicture] = {
         "The arm with a small box between its jaws, above the floor.",
         "statemachine view --keyframe held --speed 4",
         _BOX,
-        lambda: (_still(_BOX, 0), None),
+        lambda: (_poses(_BOX, 1, keyframe=0), None),
     ),
 }

@@ -10,10 +10,10 @@ from ..errors import BadInputError
 from ..interface import Model
 from ..measures.text import degrees, duration
 from ..runs.drive import Progress, part_of
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ..runs.robot import is_the_arm
 from . import LESSONS, module
-from .session import CodeRun, take
+from .session import CodeRun, LessonResult, take
 
 # The lessons that answer, one for each question, with options for little to do.
 ASKED: dict[str, dict[str, Any]] = {
@@ -27,11 +27,10 @@ ASKED: dict[str, dict[str, Any]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Answers:
+class Answers(LessonResult):
     """What the lessons that answer measured, by their names."""
 
     answers: dict[str, Any]
-    provenance: Provenance
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -48,7 +47,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Answer
     for number, (name, values) in enumerate(ASKED.items()):
         share = part_of(progress, number / len(ASKED), 1 / len(ASKED))
         answers[name] = take(LESSONS[name], model, model.backend, values, progress=share).result
-    return Answers(answers, provenance(model))
+    return Answers(answers, provenance=provenance(model))
 
 
 def slots(result: Answers) -> dict[str, Any]:
@@ -81,8 +80,3 @@ def slots(result: Answers) -> dict[str, Any]:
         "unpaced": duration(time["free"]),
         "paced": f"{time['paced']:.3f} s",
     }
-
-
-def tables(results: Mapping[str, Answers]) -> dict[str, Any]:
-    """There are none."""
-    return {}

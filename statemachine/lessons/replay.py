@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,14 +16,13 @@ from ..interface import Array, Ints, JointType, Model, get_state
 from ..interface.checks import as_count
 from ..measures import largest
 from ..measures.text import count, degrees, millimetres
-from ..page import Table
 from ..runs.drive import Progress, part_of
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ..runs.robot import command, is_the_arm
 from ._restore import of_its_own, through_us, ways_back
 from ._two_runs import BREAKS, Broken, Paths, broken_table, growth
-from .session import CodeRun
-from .template import differences
+from .session import CodeRun, LessonResult
+from .template import by_engine, differences
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -85,7 +85,7 @@ class Finer:
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
+class Replay(LessonResult):
     """Two runs, step by step.
 
     Attributes:
@@ -127,7 +127,6 @@ class Replay:
     state: tuple[str, ...]
     ways: tuple[WayBack, ...]
     own_ways: tuple[WayBack, ...]
-    provenance: Provenance
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay:
@@ -208,19 +207,28 @@ def slots(result: Replay) -> dict[str, Any]:
 
 def tables(results: Mapping[str, Replay]) -> dict[str, Any]:
     """Equal or not, what touched on the way, and the ways back."""
-    first, columns = next(iter(results.values())), results.values()
+    first = next(iter(results.values()))
     gaps = {name: result.difference for name, result in results.items()}
     bodies = {name: result.apart for name, result in results.items()}
-    outcome = [
-        ("np.array_equal", *(str(r.identical) for r in columns)),
-        ("np.allclose", *(str(r.close) for r in columns)),
-        ("difference at the end", *(f"{r.difference[-1]:.1e}" for r in columns)),
-        ("largest on the way", *(f"{r.difference.max():.1e}" for r in columns)),
-        ("a hinge moves by", *(degrees(r.travel, 1) for r in columns)),
-    ]
+    outcome = {
+        "np.array_equal": lambda r: str(r.identical),
+        "np.allclose": lambda r: str(r.close),
+        "difference at the end": lambda r: f"{r.difference[-1]:.1e}",
+        "largest on the way": lambda r: f"{r.difference.max():.1e}",
+        "a hinge moves by": lambda r: degrees(r.travel, 1),
+    }
+    touched = {
+        "fewest contacts in a step": lambda r: str(r.contacts.min()),
+        "most": lambda r: str(r.contacts.max()),
+        "on average": lambda r: f"{r.contacts.mean():.1f}",
+        **{
+            pair: partial(_touched, pair)
+            for pair in dict.fromkeys(pair for r in results.values() for pair in r.pairs)
+        },
+    }
     return {
-        "outcome": Table(("", *results), outcome, title="Two runs compared"),
-        "touched": _touched(results),
+        "outcome": by_engine(results, outcome, "Two runs compared"),
+        "touched": by_engine(results, touched, "What touched, in the first run"),
         "growth": growth(gaps, bodies) if first.broken_by else [],
         "ways": through_us({name: result.ways for name, result in results.items()})
         if first.ways
@@ -232,25 +240,16 @@ def tables(results: Mapping[str, Replay]) -> dict[str, Any]:
             {
                 "hinges at the end, worst": _hinges_apart,
                 "free body at the end": _bodies_apart,
-                "contacts a step, on average": _contacts_apart,
+                "contacts a step, on average": lambda a, b: (
+                    f"{b.contacts.mean():.1f} instead of {a.contacts.mean():.1f}"
+                ),
             },
         ),
     }
 
 
-def _touched(results: Mapping[str, Replay]) -> Table:
-    columns = results.values()
-    pairs = dict.fromkeys(pair for r in columns for pair in r.pairs)
-    rows = [
-        ("fewest contacts in a step", *(str(r.contacts.min()) for r in columns)),
-        ("most", *(str(r.contacts.max()) for r in columns)),
-        ("on average", *(f"{r.contacts.mean():.1f}" for r in columns)),
-        *(
-            (pair, *(f"{r.pairs.get(pair, 0)} of {len(r.contacts)} steps" for r in columns))
-            for pair in pairs
-        ),
-    ]
-    return Table(("", *results), rows, title="What touched, in the first run")
+def _touched(pair: str, result: Replay) -> str:
+    return f"{result.pairs.get(pair, 0)} of {len(result.contacts)} steps"
 
 
 def _hinges_apart(left: Replay, right: Replay) -> str:
@@ -262,7 +261,3 @@ def _bodies_apart(left: Replay, right: Replay) -> str:
     if left.free is None:
         return "there is none"
     return millimetres(float(np.linalg.norm((left.qpos - right.qpos)[list(left.free)])))
-
-
-def _contacts_apart(left: Replay, right: Replay) -> str:
-    return f"{right.contacts.mean():.1f} instead of {left.contacts.mean():.1f}"

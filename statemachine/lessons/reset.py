@@ -13,10 +13,10 @@ from ..interface import INPUTS, Data, JointType, Model, forward, make_data, rese
 from ..measures.text import count, millimetres
 from ..page import Table
 from ..runs.drive import Progress
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ..runs.robot import body_pairs, carried_by, moved_by_actuators
 from ._robot import read_derived, read_stored
-from .session import CodeRun
+from .session import CodeRun, LessonResult
 from .template import differences, emulated
 
 _STEPS = 100  # before the reset, and after it
@@ -76,7 +76,7 @@ class KeyframeScene:
 
 
 @dataclass(frozen=True)
-class Reset:
+class Reset(LessonResult):
     """What a reset takes back.
 
     Attributes:
@@ -92,7 +92,6 @@ class Reset:
     same_future: bool
     steps: int
     scenes: tuple[KeyframeScene, ...]
-    provenance: Provenance
 
     @property
     def simulated(self) -> float:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import builtins
 import io
 import itertools
+import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import redirect_stdout
+from contextlib import ExitStack, redirect_stdout
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -19,12 +20,13 @@ from ..interface import Data, Model, make_data, step
 from ..page import Code, Page, Printed
 from ..probes.calls import CallRecording, record, recorded_engines, statements
 from ..runs.drive import steps_in
+from ..runs.provenance import Provenance
 from ..runs.robot import is_the_arm
 from . import module, template
 from .records import Lesson
 
 
-class CodeRun:
+class CodeRun(ExitStack):
     """The code of a lesson on one Model, to be run once.
 
         with CodeRun(code, model) as play:
@@ -39,18 +41,12 @@ class CodeRun:
     """
 
     def __init__(self, code: str, model: Model) -> None:
+        super().__init__()
         self.model = model
         self.worlds: list[tuple[Model, Data]] = []
         self.names: dict[str, Any] = {}
         self._code = code
         self._out = io.StringIO()
-
-    def __enter__(self) -> CodeRun:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        for _, data in self.worlds:
-            data.close()
 
     @property
     def printed(self) -> str:
@@ -77,7 +73,7 @@ class CodeRun:
         """
 
         def make(model: Model) -> Data:
-            data = make_data(model)
+            data = self.enter_context(make_data(model))
             self.worlds.append((model, data))
             return data
 
@@ -111,6 +107,13 @@ class CodeRun:
                 if line is not None:
                     line(source, self.names)
         return self.names
+
+
+@dataclass(frozen=True, kw_only=True)
+class LessonResult:
+    """What any lesson measures on one backend; `provenance`: what that was computed with."""
+
+    provenance: Provenance
 
 
 @dataclass(frozen=True)
@@ -185,7 +188,7 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
     blocks = {
         "code": Code(code.splitlines()),
         "printed": Printed({name: run.printed for name, run in taken.items()}),
-        **lesson_module.tables(results),
+        **(lesson_module.tables(results) if hasattr(lesson_module, "tables") else {}),
     }
     return template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
 
@@ -208,9 +211,6 @@ def stepping_loop(model: Model, marks: Sequence[float], seconds: float) -> tuple
 
 def load_line(model: str, backend: str, menagerie: str | None = None) -> str:
     """The call that loads a model, as one types it."""
+    name, engine = (json.dumps(text, ensure_ascii=False) for text in (model, backend))
     folder = f", menagerie={menagerie!r}" if menagerie else ""
-    return f"sm.load({_quoted(model)}, backend={_quoted(backend)}{folder})"
-
-
-def _quoted(text: str) -> str:
-    return f'"{text}"' if '"' not in text and "\\" not in text else repr(text)
+    return f"sm.load({name}, backend={engine}{folder})"

@@ -11,12 +11,11 @@ from ..engines import room
 from ..interface import Data, Model
 from ..interface.checks import as_count
 from ..measures.text import count, duration
-from ..page import Table
 from ..runs.drive import Progress
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from .in_turns import Ratio, in_turns
-from .session import CodeRun
-from .template import differences
+from .session import CodeRun, LessonResult
+from .template import by_engine, differences
 
 _ROUNDS = 20
 _MOST = 20_000  # steps of a call or a round; between two the progress moves and Ctrl-C is heard
@@ -56,7 +55,7 @@ for name, seconds in (
 
 
 @dataclass(frozen=True)
-class Speed:
+class Speed(LessonResult):
     """Wall-clock times of the same simulated time, its rounds taken in turns.
 
     Attributes:
@@ -78,7 +77,6 @@ class Speed:
     loop: Ratio
     null: Ratio
     bulk_rounds: tuple[float, ...]
-    provenance: Provenance
 
     @property
     def bulk_factor(self) -> float:
@@ -126,15 +124,9 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Speed:
 
 def _way(
     wall: Callable[..., float], model: Model, data: Data, rounds: Sequence[int], bulk: bool
-) -> Callable[[], None]:
+) -> Callable[[], float]:
     """What takes a Data through the rounds, one at each call: together they are one run."""
-    remaining = iter(rounds)
-
-    def advance() -> None:
-        size = next(remaining)
-        wall(model, data, [size] if bulk else [1] * size)
-
-    return advance
+    return (wall(model, data, [n] if bulk else [1] * n) for n in rounds).__next__
 
 
 def slots(result: Speed) -> dict[str, Any]:
@@ -155,26 +147,21 @@ def slots(result: Speed) -> dict[str, Any]:
 
 def tables(results: Mapping[str, Speed]) -> dict[str, Any]:
     """Times and factors; they are this machine's, now."""
-    columns = results.values()
-    rows = [
-        ("in bulk", *(_cell(r, r.bulk) for r in columns)),
-        ("step by step", *(_cell(r, r.one_by_one) for r in columns)),
-        ("one step, in bulk", *(f"{r.bulk / r.nstep * 1e6:.1f} µs" for r in columns)),
-    ]
-    if any(r.as_it_comes is not None for r in columns):
-        rows.append(("in bulk, as the engine comes", *(_cell(r, r.as_it_comes) for r in columns)))
-    relative = [
-        ("step by step", *(r.loop.spread() for r in columns)),
-        ("in bulk again", *(r.null.spread() for r in columns)),
-    ]
+    times: dict[str, Callable[[Speed], str]] = {
+        "in bulk": lambda r: _cell(r, r.bulk),
+        "step by step": lambda r: _cell(r, r.one_by_one),
+        "one step, in bulk": lambda r: f"{r.bulk / r.nstep * 1e6:.1f} µs",
+    }
+    if any(result.as_it_comes is not None for result in results.values()):
+        times["in bulk, as the engine comes"] = lambda r: _cell(r, r.as_it_comes)
+    relative = {
+        "step by step": lambda r: r.loop.spread(),
+        "in bulk again": lambda r: r.null.spread(),
+    }
     return {
-        "times": Table(
-            ("", *results), rows, title="Wall time, and × real time, on this machine, now"
-        ),
-        "relative": Table(
-            ("", *results),
-            relative,
-            title="Cost relative to bulk: median of the rounds, and their middle half",
+        "times": by_engine(results, times, "Wall time, and × real time, on this machine, now"),
+        "relative": by_engine(
+            results, relative, "Cost relative to bulk: median of the rounds, and their middle half"
         ),
         "differences": differences(results, {"time of a step, in bulk": _against}),
     }

@@ -12,8 +12,8 @@ from ..interface import JointType, Model, make_data, reset
 from ..measures.text import listed
 from ..page import Slots, Table
 from ..runs.drive import Progress
-from ..runs.provenance import Provenance, provenance
-from .session import CodeRun
+from ..runs.provenance import provenance
+from .session import CodeRun, LessonResult
 from .template import differences
 
 NO_NAME = "(no name)"
@@ -45,7 +45,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Layout:
+class Layout(LessonResult):
     """Sizes and addresses of a model's state.
 
     Attributes:
@@ -64,15 +64,6 @@ class Layout:
     keyframe: str | None
     keyframe_time: float | None
     terms: tuple[Term, ...]
-    provenance: Provenance
-
-    def shifted(self) -> tuple[Joint, ...]:
-        """Joints whose slots differ between qpos and qvel."""
-        return tuple(
-            joint
-            for joint in self.joints
-            if (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
-        )
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout:
@@ -111,8 +102,13 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout
 
 def slots(result: Layout) -> dict[str, Any]:
     """What the page says."""
+    shifted = [
+        joint.name or NO_NAME
+        for joint in result.joints
+        if (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
+    ]
     return {
-        "shifted": ", ".join(joint.name or NO_NAME for joint in result.shifted()),
+        "shifted": ", ".join(shifted),
         "right": 0 if result.nv == result.nq else 2,
     }
 

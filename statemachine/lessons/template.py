@@ -129,6 +129,20 @@ def where(results: Mapping[str, Any], engine: str) -> str:
     return f"{engine}: " if len(results) > 1 else ""
 
 
+def by_engine(
+    results: Mapping[str, Any], rows: Mapping[str, Callable[[Any], str]], title: str
+) -> Table:
+    """A table with a column for each engine.
+
+    Args:
+        results: By backend.
+        rows: By what is shown, the words for it from a result.
+        title: Of the table.
+    """
+    lines = [(row, *map(words, results.values())) for row, words in rows.items()]
+    return Table(("", *results), lines, title)
+
+
 def differences(
     results: Mapping[str, Any], rows: Mapping[str, Callable[[Any, Any], str]]
 ) -> list[Table]:

@@ -12,10 +12,10 @@ import numpy as np
 from ..errors import BadInputError
 from ..interface import Data, Model
 from ..measures.text import count, duration
-from ..page import Table
 from ..runs.drive import Progress, steps_in
-from ..runs.provenance import Provenance, provenance
-from .session import CodeRun
+from ..runs.provenance import provenance
+from .session import CodeRun, LessonResult
+from .template import by_engine
 
 _NAP = 0.2  # s
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
@@ -68,7 +68,7 @@ print(f"{{data.time:.3f}} s simulated in {{wall:.3f}} s")
 
 
 @dataclass(frozen=True)
-class Pace:
+class Pace(LessonResult):
     """The same steps, as fast as they come, and paced by a clock.
 
     Attributes:
@@ -97,7 +97,6 @@ class Pace:
     moved: bool
     end: float
     exact: bool
-    provenance: Provenance
 
     @property
     def factor(self) -> float:
@@ -172,17 +171,13 @@ def slots(result: Pace) -> dict[str, Any]:
 
 def tables(results: Mapping[str, Pace]) -> dict[str, Any]:
     """Both loops by the clock."""
-    columns, first = results.values(), next(iter(results.values()))
-    rows = [
-        ("not waiting", *(f"{duration(r.free)}, {_times(r.factor)}" for r in columns)),
-        ("paced", *(f"{r.paced:.3f} s, {_times(r.paced_factor)}" for r in columns)),
-        ("of that waiting", *(f"{r.waited / r.paced:.0%}" for r in columns)),
-        ("latest step, late by", *(duration(r.latest) for r in columns)),
-    ]
+    first = next(iter(results.values()))
+    rows = {
+        "not waiting": lambda r: f"{duration(r.free)}, {r.factor:.3g} × real time",
+        "paced": lambda r: f"{r.paced:.3f} s, {r.paced_factor:.3g} × real time",
+        "of that waiting": lambda r: f"{r.waited / r.paced:.0%}",
+        "latest step, late by": lambda r: duration(r.latest),
+    }
     steps = count(first.nstep, "step")
     title = f"{first.simulated:g} s of simulated time, {steps}, by the clock"
-    return {"paces": Table(("", *results), rows, title=title)}
-
-
-def _times(factor: float) -> str:
-    return f"{factor:.3g} × real time"
+    return {"paces": by_engine(results, rows, title)}

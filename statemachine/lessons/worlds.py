@@ -18,10 +18,11 @@ from ..measures.text import count, duration
 from ..page import Table, Traces
 from ..processes import free_memory, resident_memory
 from ..runs.drive import Progress, part_of
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ..worlds import make_worlds, reset, step
 from .in_turns import Ratio, in_turns
-from .session import CodeRun
+from .session import CodeRun, LessonResult
+from .template import by_engine
 
 _ROUNDS = 5
 _ROUND = 0.04  # s that each way takes in a round, about
@@ -74,7 +75,7 @@ class WorldsCost:
 
 
 @dataclass(frozen=True)
-class WorldsSpeed:
+class WorldsSpeed(LessonResult):
     """What is made once, what for each world, and what a step of a world costs.
 
     Attributes:
@@ -93,7 +94,6 @@ class WorldsSpeed:
     shared: bool
     costs: tuple[WorldsCost, ...]
     limit: str
-    provenance: Provenance
 
     @property
     def ratio(self) -> float:
@@ -220,17 +220,16 @@ def slots(result: WorldsSpeed) -> dict[str, Any]:
 
 def tables(results: Mapping[str, WorldsSpeed]) -> dict[str, Any]:
     """What is made once, what each world costs, and how that goes with their number."""
-    columns = results.values()
-    made = [
-        ("load a model", *(duration(r.load) for r in columns)),
-        ("make a Data of it", *(duration(r.make_data) for r in columns)),
-        ("Data for the time of a load", *(f"{r.ratio:,.0f}" for r in columns)),
-        ("memory of a Data", *(_memory(r.data_bytes) for r in columns)),
-        ("memory of a world", *(_memory(r.world_bytes) for r in columns)),
-    ]
+    made = {
+        "load a model": lambda r: duration(r.load),
+        "make a Data of it": lambda r: duration(r.make_data),
+        "Data for the time of a load": lambda r: f"{r.ratio:,.0f}",
+        "memory of a Data": lambda r: _memory(r.data_bytes),
+        "memory of a world": lambda r: _memory(r.world_bytes),
+    }
     title = "What is made once, and what for each world, on this machine, now"
     return {
-        "made": Table(("", *results), made, title=title),
+        "made": by_engine(results, made, title),
         "costs": [_costs(name, result) for name, result in results.items()],
         "curves": Traces(
             "What a step of one world costs",
@@ -249,19 +248,18 @@ def tables(results: Mapping[str, WorldsSpeed]) -> dict[str, Any]:
 
 
 def _costs(name: str, result: WorldsSpeed) -> Table:
-    rows = [
-        (
-            f"{cost.n:,}",
-            f"{cost.workers}",
-            duration(cost.made),
-            duration(cost.step),
-            cost.faster.spread(" ×"),
-        )
-        for cost in result.costs
-    ]
     return Table(
         ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
-        rows,
+        [
+            (
+                f"{cost.n:,}",
+                f"{cost.workers}",
+                duration(cost.made),
+                duration(cost.step),
+                cost.faster.spread(" ×"),
+            )
+            for cost in result.costs
+        ],
         title=f"Wall time with the number of worlds: {name}",
         words=frozenset(),
     )

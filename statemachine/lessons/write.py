@@ -25,9 +25,9 @@ from ..interface.checks import as_scalar
 from ..measures.text import count, position
 from ..page import Table
 from ..runs.drive import Progress
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ._robot import coordinate, read_derived, with_joint
-from .session import CodeRun
+from .session import CodeRun, LessonResult
 from .template import emulated
 
 fit = with_joint  # a joint of this robot, and a value in its range
@@ -52,7 +52,7 @@ print(data.qpos[slot], copy[slot], view is data.qpos)
 
 
 @dataclass(frozen=True)
-class Write:
+class Write(LessonResult):
     """What a write does, and what it does not.
 
     Attributes:
@@ -83,7 +83,6 @@ class Write:
     speed_change: float
     contacts: int
     contacts_without: int
-    provenance: Provenance
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:

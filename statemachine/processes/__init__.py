@@ -47,13 +47,14 @@ def end_with_parent() -> None:
 
 
 def checked_jobs(jobs: int | None, processors: int = 1) -> int:
-    """How many at once: as asked for, or one for so many processors.
+    """How many at once: as asked for, or one for so many processors that this process may use.
 
     Raises:
         BadInputError: It is less than 1.
     """
     if jobs is None:
-        return max(1, (os.cpu_count() or 1) // processors)
+        usable = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
+        return max(1, len(usable) // processors)
     if jobs < 1:
         raise BadInputError(f"jobs must be at least 1; got {jobs}")
     return jobs

@@ -14,6 +14,7 @@ from __future__ import annotations
 import faulthandler
 import math
 import os
+import re
 import secrets
 import signal
 import site
@@ -34,6 +35,7 @@ MEMORY_MOST = 4 * GB
 _FILE_MOST = GB // 2
 _FLOOD = GB // 4  # bytes of output that only a loop without end writes
 _TOKEN = "STATEMACHINE_SANDBOX"
+_NO_MEMORY = "MemoryError|bad_alloc|annot allocate memory"  # at the end of stderr
 _PATIENCE = 2.0  # seconds to end what a command left behind
 _LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 # Where a process cannot limit its computing time, it is watched from outside.
@@ -125,9 +127,6 @@ def run(
         )
         before = 0.0
 
-        def ready() -> str:
-            return "ready" if started() else ""
-
         def exceeded() -> str:
             if WATCHED and cpu_of(process) - before > cpu:
                 return "cpu"
@@ -135,7 +134,7 @@ def run(
             return "flood" if flooded else ""
 
         try:
-            end = _wait(process, began + start, ready, stopped)
+            end = _wait(process, began + start, lambda: "ready" if started() else "", stopped)
             if is_ready := end == "ready":
                 before = cpu_of(process) if WATCHED else 0.0
                 end = _wait(process, time.monotonic() + wall, exceeded, stopped)
@@ -150,7 +149,7 @@ def run(
     if code < 0:
         code = -code
         end = "cpu" if _is_of_cpu(code, used, cpu) else "signal"
-    if end != "cpu" and code and _speaks_of_memory(texts[1]):
+    if end != "cpu" and code and re.search(_NO_MEMORY, texts[1][-2000:]):
         end = "memory"
     words = {
         "code": f"ended the process with code {code}",
@@ -305,11 +304,6 @@ def _relatives(leader: int, token: str) -> set[Path]:
             ):
                 found.add(entry)
     return found
-
-
-def _speaks_of_memory(stderr: str) -> bool:
-    tail = stderr[-2000:]
-    return any(word in tail for word in ("MemoryError", "bad_alloc", "annot allocate memory"))
 
 
 def _start_of(file: Any, most: int) -> str:

@@ -204,20 +204,17 @@ def facts_of(
             continue
         kinds = zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True)
         hinges = tuple(place for kind, place in kinds if kind == JointType.HINGE)
+        with make_data(model) as data:
+            reset(model, data)
+            forward(model, data)
+            foot = tuple(data.xpos[min(1, model.nbody - 1)].tolist())
         return ModelFacts(
             hinges or None,
-            _foot(model),
+            foot,
             {v.label: own_value(v, model) for v in factors},
             {v.label: v.unit_on(_joints(model, v)) for v in factors},
         )
     return ModelFacts()
-
-
-def _foot(model: Model) -> tuple[float, ...]:
-    with make_data(model) as data:
-        reset(model, data)
-        forward(model, data)
-        return tuple(data.xpos[min(1, model.nbody - 1)].tolist())
 
 
 def _joints(model: Model, vary: Vary) -> set[int]:

@@ -77,13 +77,8 @@ class Vary:
         """Its column in the dataset."""
         return f"vary.{self.label}"
 
-    @property
-    def unit(self) -> str:
-        """What its column is in; "" of what is no number or has none."""
-        return self.unit_on({JointType.HINGE, JointType.SLIDE})
-
-    def unit_on(self, joints: Collection[int]) -> str:
-        """The same on joints of some `JointType`s alone."""
+    def unit_on(self, joints: Collection[int] = (JointType.HINGE, JointType.SLIDE)) -> str:
+        """What it is in on joints of some `JointType`s; "" of what is no number or has none."""
         if self.times or self.kind == "parameter" or self.name not in UNITS:
             return ""
         hinge, slide = UNITS[self.name]

@@ -87,7 +87,7 @@ def schema_of(factors: Sequence[Vary], provenance: Mapping[str, Any]) -> Any:
 
 def columns_of(factors: Sequence[Vary]) -> list[tuple[str, str, str, str]]:
     """Every column, as in `COLUMNS`."""
-    varied = [(vary.column, vary.type, vary.unit, vary.meaning) for vary in factors]
+    varied = [(vary.column, vary.type, vary.unit_on(), vary.meaning) for vary in factors]
     return [*COLUMNS[:3], *varied, *COLUMNS[3:]]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import faulthandler
+import functools
 import os
 import signal
 import sys
@@ -185,15 +186,9 @@ def _limited(seconds: float, own: bool) -> Iterator[None]:
         faulthandler.cancel_dump_traceback_later()
 
 
-_settled = False
-
-
+@functools.cache
 def _settle() -> None:
     """Once in a process of our own: nothing it prints is shown, and it ends with its driver."""
-    global _settled  # noqa: PLW0603
-    if _settled:
-        return
-    _settled = True
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(nowhere, stream)

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import pickle
 import struct
-from typing import Any
+from typing import Any, TypeVar
 
 from ..errors import EngineError, shown
+
+T = TypeVar("T")
 
 # Number of the command, place in `VERBS`, argument, bytes, whether of ids.
 COMMAND = struct.Struct("<qqqqq")
@@ -35,10 +37,14 @@ def packed(answer: dict[str, Any]) -> bytes:
     return pickle.dumps({"error": EngineError(f"an answer of {len(blob)} bytes is too large")})
 
 
-def portable(error: Exception) -> Exception:
-    """An error that another process can read: itself, or its text."""
+def portable(value: T, otherwise: T) -> T:
+    """A value that another process can read; if it cannot, the other."""
     try:
-        pickle.loads(pickle.dumps(error))
+        return pickle.loads(pickle.dumps(value))
     except Exception:
-        return EngineError(f"{type(error).__name__}: {shown(str(error))}")
-    return error
+        return otherwise
+
+
+def portable_error(error: Exception) -> Exception:
+    """An error that another process can read: itself, or its text."""
+    return portable(error, EngineError(f"{type(error).__name__}: {shown(str(error))}"))

@@ -25,7 +25,7 @@ import numpy as np
 from .. import backends
 from ..interface import INPUTS, Data, Model, forward, get_state, make_data, reset, set_state, step
 from ..processes import resident_memory
-from ._protocol import ANSWER, ANSWER_MOST, COMMAND, VERBS, packed, portable
+from ._protocol import ANSWER, ANSWER_MOST, COMMAND, VERBS, packed, portable, portable_error
 from ._shared import arrays_in, open_block
 
 _ENDS_IN = 1.0  # seconds in which Python code may clean up
@@ -108,12 +108,12 @@ class Holder:
         except StepStopped:
             pass
         except Exception as error:
-            answer["error"] = portable(error)
+            answer["error"] = portable_error(error)
         if self._errors:
             errors = self._errors.items()
-            answer["errors"] = {self._world(k): portable(error) for k, error in errors}
+            answer["errors"] = {self._world(k): portable_error(error) for k, error in errors}
         if self._told:
-            answer["warnings"] = [(_known(kind), text) for kind, text in self._told]
+            answer["warnings"] = [(portable(kind, UserWarning), text) for kind, text in self._told]
             self._told.clear()
         return answer
 
@@ -262,13 +262,6 @@ class Holder:
             if self._inbox.stopped:
                 return
             rows[self._world(place)] = getattr(self._data[place], name)
-
-
-def _known(kind: type[Warning]) -> type[Warning]:
-    """A kind of warning that another process knows, too."""
-    with suppress(Exception):
-        return pickle.loads(pickle.dumps(kind))
-    return UserWarning
 
 
 def main(handle: str, size: str, number: str) -> None:

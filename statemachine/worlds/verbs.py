@@ -24,7 +24,7 @@ from ..interface.checks import as_count, as_vector, check_state, kind_of
 from ..interface.options import checked_options
 from ..interface.turns import alone
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world
-from ..processes import free_memory
+from ..processes import checked_jobs, free_memory
 
 _SHOWN = 5  # diverged worlds that a warning names
 
@@ -57,7 +57,7 @@ def make_worlds(
     if not isinstance(model, Model):
         raise TypeError(f"make_worlds wants a Model, from statemachine.load; got {kind_of(model)}")
     n = as_count(n, "n")
-    workers = min(_processors() if workers is None else as_count(workers, "workers"), n)
+    workers = min(checked_jobs(None) if workers is None else as_count(workers, "workers"), n)
     names = _names(derived, "derived array", BATCHED)
     each = _options(model, n, options)
     worlds = model._make_worlds(n, workers, names, each)
@@ -334,10 +334,3 @@ def _options(model: Model, n: int, options: Mapping[str, Any]) -> dict[str, list
             except BadInputError as error:
                 raise in_world(world, error) from None
     return checked
-
-
-def _processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -3,9 +3,10 @@
 A judge is a module with
 
 - `worlds(scenes)`: the worlds to call the function on, the course's own first;
-- `right(worlds)`: what is right on each, worked out by us;
-- `judge(answer, world, right)`: what is wrong with what it did there, a line each, or, in one text,
-  what is right. It raises FaultError where there is nothing to look at.
+- `right(world)`: what is right on one, worked out by us;
+- `judge(answer, world, right, course)`: what is wrong with what it did there, a line each, or, in
+  one text, what is right; `course` is what is right on the course's own world. It raises FaultError
+  where there is nothing to look at.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ def judged(
             if isinstance(answer, FaultError):
                 raise answer
             with np.errstate(all="ignore"):
-                found = judge_of(function).judge(answer, world, right)
+                found = judge_of(function).judge(answer, world, right, rights[0])
         except FaultError as fault:
             found = [str(fault)]
             if not fault.written:

@@ -11,7 +11,7 @@ import numpy as np
 from ...interface import Array, Data, Model, forward, make_data
 from ...measures.text import rounded, vector
 from ..answers import Answer
-from ..calls import reason
+from ..calls import first_of, reason
 from ..watch import Inputs
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
@@ -41,12 +41,10 @@ class Tips:
     Attributes:
         readings: (4, 3) the four readings [m].
         others: (4, 3) those of each other site and body, by what it is [m].
-        course: (4, 3) the readings on the course's own model [m].
     """
 
     readings: Array
     others: dict[str, Array]
-    course: Array
 
 
 def worlds(scenes: Scenes) -> list[ExerciseWorld]:
@@ -57,13 +55,9 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(worlds: list[ExerciseWorld]) -> list[Tips]:
-    """The readings on each."""
-    first = _tips(worlds[0].model, None)
-    return [first, *(_tips(world.model, first.readings) for world in worlds[1:])]
-
-
-def _tips(model: Model, course: Array | None) -> Tips:
+def right(world: ExerciseWorld) -> Tips:
+    """The readings."""
+    model = world.model
     with make_data(model) as data:
         moments = [_places(model, data)]
         forward(model, data)
@@ -72,8 +66,7 @@ def _tips(model: Model, course: Array | None) -> Tips:
         forward(model, data)
         moments.append(_places(model, data))
     places = {name: np.array([moment[name] for moment in moments]) for name in moments[0]}
-    tip = places.pop(f"site {TIP!r}")
-    return Tips(tip, places, tip if course is None else course)
+    return Tips(places.pop(f"site {TIP!r}"), places)
 
 
 def _places(model: Model, data: Data) -> dict[str, Array]:
@@ -82,7 +75,7 @@ def _places(model: Model, data: Data) -> dict[str, Array]:
     return sites | {f"body {n!r}": data.xpos[k].copy() for k, n in enumerate(model.body_names)}
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[str] | str:
+def judge(answer: Answer, world: ExerciseWorld, right: Tips, course: Tips) -> list[str] | str:
     """The four readings, and that no time passed."""
     short = short_float(answer.result)
     tolerance = _SINGLE if short == "float32" else TOLERANCE
@@ -104,7 +97,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[str] | str:
     wrong = [k for k in range(4) if not near(given[k], right.readings[k], tolerance)]
     if wrong and not (remarks and not passed):
         # A first fault explains what comes after it, more often than not.
-        why = _why(wrong[0], given, world, right, answer)
+        why = _why(wrong[0], given, world, right, course, answer)
         more = f"; {short} keeps few digits, leave the conversion out" if short else ""
         remarks.append(f"reading {_READINGS[wrong[0]]}: {why}{more}")
     if remarks:
@@ -122,7 +115,7 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
     same = near(given, np.tile(given[3], (4, 1)), 0)
     places = tips.others.items() if answer.forwards else ()  # without any, all are at the origin
     names = [name for name, readings in places if near(given, readings, tolerance)]
-    text = reason(
+    return first_of(
         (
             same and (answer.memory[3] == 0 or all(answer.live)),
             f"{last}what you read is the simulator's own memory, which changes. {copies}",
@@ -138,10 +131,11 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
         ),
         (names, f"that is the place of {' and '.join(names[:3])}; site {TIP!r} is asked for"),
     )
-    return [text] if text else []
 
 
-def _why(k: int, given: Array, world: ExerciseWorld, tips: Tips, answer: Answer) -> str:
+def _why(
+    k: int, given: Array, world: ExerciseWorld, tips: Tips, course: Tips, answer: Answer
+) -> str:
     """What reading k is, as far as the run shows it."""
     right, found = tips.readings[k], given[k]
     away = f"{rounded(float(np.linalg.norm(found - right)), 'm')} away"
@@ -154,7 +148,7 @@ def _why(k: int, given: Array, world: ExerciseWorld, tips: Tips, answer: Answer)
     return reason(
         (not np.isfinite(found).all(), f"you return {vector(found)} m"),
         (
-            world.where and near(found, tips.course[k], slack),
+            world.where and near(found, course.readings[k], slack),
             "that belongs to the course's own scene, not to the model that you got",
         ),
         (

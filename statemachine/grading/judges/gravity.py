@@ -45,7 +45,6 @@ class Fall:
         speed: (2, steps + 1) that of the joint [rad/s].
         time: (steps + 1,) of the Data [s].
         marks: (seconds + 1,) the steps at which whole seconds are over.
-        course: (2, …) what is right on the course's own model, if this is another [degrees].
     """
 
     place: int
@@ -53,7 +52,6 @@ class Fall:
     speed: Array
     time: Array
     marks: Ints
-    course: Array | None = None
 
     def degrees(self, limp: bool) -> Array:
         """(seconds + 1,) the joint at whole seconds."""
@@ -71,14 +69,8 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(worlds: list[ExerciseWorld]) -> list[Fall]:
-    """The fall on each."""
-    first = _fall(worlds[0])
-    usual = first.angles[:, first.marks, first.place]
-    return [first, *(_fall(world, usual) for world in worlds[1:])]
-
-
-def _fall(world: ExerciseWorld, course: Array | None = None) -> Fall:
+def right(world: ExerciseWorld) -> Fall:
+    """The fall, with servos and without."""
     model, (seconds,) = world.model, world.arguments
     each, dof = round(1 / model.timestep), int(model.jnt_dofadr[model.joint_id(LIFT)])
     size = (2, (seconds + 1) * each + 1)
@@ -90,10 +82,10 @@ def _fall(world: ExerciseWorld, course: Array | None = None) -> Fall:
                     step(variant, data)
                 qpos[limp, k], speed[limp, k], time[k] = data.qpos, data.qvel[dof], data.time
     marks = np.arange(seconds + 1) * each
-    return Fall(address(model), np.degrees(qpos), speed, time, marks, course)
+    return Fall(address(model), np.degrees(qpos), speed, time, marks)
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[str] | str:
+def judge(answer: Answer, world: ExerciseWorld, right: Fall, course: Fall) -> list[str] | str:
     """Both traces in degrees; ctrl as a new Data has it; the Model as it was."""
     remarks = _left(answer)
     pair = parts(answer.result, 2, "(on, off), two lists of degrees,")
@@ -108,7 +100,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[str] | str:
         return [*remarks, "the two lists are swapped: (on, off) is the order"]
     for limp, name in enumerate(_NAMES):
         if not near(given[limp], falls[limp], TOLERANCE):
-            text = _why(given, bool(limp), world, right, answer)
+            text = _why(given, bool(limp), world, right, course, answer)
             remarks.append(f"{name}: {text}")
         elif text := _by_the_clock(given[limp], bool(limp), world, right):
             remarks.append(f"{name}: {text}")
@@ -127,7 +119,9 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[str] | str:
     )
 
 
-def _why(given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer) -> str:
+def _why(
+    given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, course: Fall, answer: Answer
+) -> str:
     """What a wrong list is, where one mistake gives all of its numbers."""
     mine, other = given[limp], given[not limp]
     right = fall.degrees(limp)
@@ -140,7 +134,7 @@ def _why(given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, answe
     nothing = float(abs(mine).max()) <= TOLERANCE < float(abs(right).max())
     mistakes = (
         (_is(mine, mistaken, right), text)
-        for mistaken, text in _mistakes(limp, world, fall, answer)
+        for mistaken, text in _mistakes(limp, world, fall, course, answer)
     )
     why = reason(
         (text := _goes_on(mine, other, world, answer), text),
@@ -171,7 +165,7 @@ def _is(given: Array, mistaken: Array, right: Array) -> bool:
 
 
 def _mistakes(
-    limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer
+    limp: bool, world: ExerciseWorld, fall: Fall, course: Fall, answer: Answer
 ) -> Iterator[tuple[Array, str]]:
     """What typical mistakes give, and what to say of them."""
     model, place, marks = world.model, fall.place, fall.marks
@@ -186,10 +180,10 @@ def _mistakes(
         )
     for unit in _UNITS:
         yield unit(fall.speed[int(limp), marks]), _SPEED
-    if fall.course is not None:
+    if world.where:
         loaded = "" if all(run.own for run in answer.runs) else " (it steps a model of its own)"
         yield (
-            fall.course[int(limp), : len(marks)],
+            course.degrees(limp)[: len(marks)],
             f"that belongs to the course's own scene, not to the model that you got{loaded}",
         )
     how = "still on" if limp else "off already"

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Array, Model, make_data, reset
+from ...interface import Array, make_data, reset
 from ...measures.text import count
 from ..answers import Answer, kind
-from ..calls import reason
+from ..calls import first_of, reason
 from ..watch import EngineRun, Nudge
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
@@ -65,18 +65,14 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(worlds: list[ExerciseWorld]) -> list[Start]:
-    """Where the runs begin on each."""
-    return [_start(world.model) for world in worlds]
-
-
-def _start(model: Model) -> Start:
-    with make_data(model) as data:
-        reset(model, data, keyframe=0)
+def right(world: ExerciseWorld) -> Start:
+    """Where the runs begin."""
+    with make_data(world.model) as data:
+        reset(world.model, data, keyframe=0)
         return Start(data.qpos.copy(), data.qvel.copy(), data.time, data.ctrl.copy())
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[str] | str:
+def judge(answer: Answer, world: ExerciseWorld, right: Start, _course: Start) -> list[str] | str:
     """Two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")
@@ -124,7 +120,7 @@ def _memory(answer: Answer) -> list[str]:
     """Whether what was returned is the simulator's own memory, or one array twice."""
     first, second = answer.live[1:]
     name, live = ("first", first) if first else ("second", second)
-    text = reason(
+    return first_of(
         (
             answer.memory[2] == 1 and live,
             "first and second are one array: both show the last run. Keep a copy of each, "
@@ -140,13 +136,12 @@ def _memory(answer: Answer) -> list[str]:
             f"return a copy, data.{live}.copy()",
         ),
     )
-    return [text] if text else []
 
 
 def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> list[str]:
     """Whether there were two runs, each as it was asked for; the first fault of each kind."""
     _, nstep = world.arguments
-    text = reason(
+    fault = first_of(
         (not runs, f"no step was taken: two runs of {nstep} steps are asked for"),
         (
             not any(run.own for run in runs),
@@ -168,14 +163,13 @@ def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> li
             "into qpos, qvel or time between their steps",
         ),
     )
-    if text:
-        return [text]
-    found: dict[str, str] = {}
-    for name, run in zip(_COUNT, runs, strict=True):
-        for concept, text in _faults(run, world, start).items():
-            if text:
-                found.setdefault(concept, f"{name} run: {text}")
-    return list(found.values())
+    if fault:
+        return fault
+    first, second = (_faults(run, world, start) for run in runs)
+    remarks = {kind: f"first run: {text}" for kind, text in first.items() if text}
+    others = {kind: f"second run: {text}" for kind, text in second.items() if text}
+    # Of each kind the first run's, where both have one.
+    return [*(remarks | others | remarks).values()]
 
 
 def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str]:

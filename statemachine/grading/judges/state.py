@@ -11,7 +11,7 @@ from typing import Any
 from ...interface import JointType, Model, make_data, reset
 from ...measures.text import count
 from ..answers import Answer, kind
-from ..calls import FaultError, reason
+from ..calls import FaultError, first_of, reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import parts
 
@@ -22,14 +22,10 @@ Slot = tuple[int, int]  # from, and up to but not with
 
 @dataclass(frozen=True)
 class ExpectedState:
-    """What is right on one world: slots of qpos and of qvel by joint, time at keyframe 0 [s].
-
-    `course_time` is that of the course's own scene.
-    """
+    """What is right on one world: slots of qpos and of qvel by joint, time at keyframe 0 [s]."""
 
     slots: dict[str, tuple[Slot, Slot]]
     time: float
-    course_time: float
 
 
 def worlds(scenes: Scenes) -> list[ExerciseWorld]:
@@ -40,32 +36,27 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(worlds: list[ExerciseWorld]) -> list[ExpectedState]:
-    """The layout of each."""
-    usual = _time(worlds[0].model)
-    return [ExpectedState(_slots(world.model), _time(world.model), usual) for world in worlds]
-
-
-def _slots(model: Model) -> dict[str, tuple[Slot, Slot]]:
+def right(world: ExerciseWorld) -> ExpectedState:
+    """The layout, and the time."""
+    model = world.model
     # A joint's slots end where the next one's begin: without a table of what a joint has.
     owned = [
         list(pairwise([*starts.tolist(), total]))
         for starts, total in ((model.jnt_qposadr, model.nq), (model.jnt_dofadr, model.nv))
     ]
-    return dict(zip(model.joint_names, zip(*owned, strict=True), strict=True))
-
-
-def _time(model: Model) -> float:
+    slots = dict(zip(model.joint_names, zip(*owned, strict=True), strict=True))
     with make_data(model) as data:
         reset(model, data, keyframe=0)
-        return data.time
+        return ExpectedState(slots, data.time)
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: ExpectedState) -> list[str] | str:
+def judge(
+    answer: Answer, world: ExerciseWorld, right: ExpectedState, course: ExpectedState
+) -> list[str] | str:
     """A pair of slices for every joint, and the time."""
     slots, time = parts(answer.result, 2, "(slots, time)")
     remarks = [*_names(slots, right), *_first_wrong(slots, right, world.model)]
-    remarks += _clock(time, right, world.model, bool(answer.runs))
+    remarks += _clock(time, right.time, course.time, world.model, bool(answer.runs))
     if remarks:
         return remarks
     frees = [name for name, (one, two) in right.slots.items() if one[1] - one[0] != two[1] - two[0]]
@@ -80,7 +71,7 @@ def _names(slots: Any, layout: ExpectedState) -> list[str]:
         )
     missing = [name for name in layout.slots if name not in slots]
     unknown = [name for name in slots if name not in layout.slots]
-    text = reason(
+    return first_of(
         (
             missing,
             f"slots: {len(missing)} of {len(layout.slots)} joints are missing: "
@@ -88,7 +79,6 @@ def _names(slots: Any, layout: ExpectedState) -> list[str]:
         ),
         (unknown, f"slots: no joint is called {[*unknown, ''][0]!r}; see model.joint_names"),
     )
-    return [text] if text else []
 
 
 def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> list[str]:
@@ -160,8 +150,7 @@ def _why(name: str, given: list[Slot], which: int, layout: ExpectedState, model:
     )
 
 
-def _clock(time: Any, layout: ExpectedState, model: Model, stepped: bool) -> list[str]:
-    right = layout.time
+def _clock(time: Any, right: float, course: float, model: Model, stepped: bool) -> list[str]:
     if not isinstance(time, Real) or isinstance(time, bool):
         return [f"time: a number of seconds is asked for; got {kind(time)}"]
     if float(time) == right:
@@ -171,7 +160,7 @@ def _clock(time: Any, layout: ExpectedState, model: Model, stepped: bool) -> lis
         (time == 0, ": that is a new Data, or a reset without keyframe=0"),
         (others, f": that is keyframe {[*others, 0][0]}"),
         (
-            time == layout.course_time,
+            time == course,
             ": that is the course's own scene; ask the model that you got",
         ),
         (stepped, ": read it right after the reset, before any step"),

@@ -25,7 +25,7 @@ class Mutant:
 
 
 # From what is read, over what forward and step do, to what a replay is worth.
-_ALL = (
+_MUTANTS = (
     Mutant(
         "xyzw",
         "quaternions read x y z w",
@@ -98,6 +98,6 @@ _ALL = (
         "nothing runs the same commands twice from the same start and asks for the same bits",
     ),
 )
-MUTANTS = {mutant.name: mutant for mutant in _ALL}
+MUTANTS = {mutant.name: mutant for mutant in _MUTANTS}
 FAULT = "STATEMACHINE_FAULT"  # the variable that names a fault to the plugin
 IMPORT = "the import of the file"  # where that failed, in place of a test's name

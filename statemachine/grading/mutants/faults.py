@@ -152,6 +152,19 @@ def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Faul
     return fault
 
 
+def scaled(factor: float, *arrays: Callable[[Any], Array]) -> Fault:
+    """A fault in some arrays of the compiled model, which are multiplied.
+
+    By -1 or a power of two, so that undoing it gives back the same bits.
+    """
+
+    def scale(raw: Any, by: float) -> None:
+        for array in arrays:
+            array(raw)[...] *= by
+
+    return compiled(partial(scale, by=factor), partial(scale, by=1 / factor))
+
+
 @reading("xquat")
 def xyzw(_data: Data, right: Array) -> Array:
     """The order of another engine."""
@@ -237,30 +250,18 @@ def _turn_spin(data: Data, from_world: bool) -> None:
         spin[:] = (turn.T if from_world else turn) @ spin
 
 
-def _turn_gravity(raw: Any) -> None:
-    raw.opt.gravity[:] = -raw.opt.gravity
-
-
-def _scale_gains(raw: Any, by: float) -> None:
-    raw.actuator_gainprm[:, 0] *= by
-    raw.actuator_biasprm[:, 1] *= by
-
-
-def _scale_friction(raw: Any, by: float) -> None:
-    raw.dof_frictionloss[:] *= by
-
-
 joints_shifted = misreading(partial(_shift, by=1), partial(_shift, by=-1))
 degrees = misreading(partial(_scale_angles, by=np.pi / 180), partial(_scale_angles, by=180 / np.pi))
 spin_in_world = misreading(
     partial(_turn_spin, from_world=True), partial(_turn_spin, from_world=False)
 )
-gravity_up = compiled(_turn_gravity, _turn_gravity)
-# By powers of two, so that undoing it gives back the same bits.
-gains_doubled = compiled(partial(_scale_gains, by=2), partial(_scale_gains, by=1 / 2))
+gravity_up = scaled(-1, lambda raw: raw.opt.gravity)
+gains_doubled = scaled(
+    2, lambda raw: raw.actuator_gainprm[:, 0], lambda raw: raw.actuator_biasprm[:, 1]
+)
 # A motor that aims at velocity 0 with a limited torque is dry friction: here 0.83 N·m a joint
 # of the SO-101, more than its weight and less than its servos.
-motor_left_on = compiled(partial(_scale_friction, by=16), partial(_scale_friction, by=1 / 16))
+motor_left_on = scaled(16, lambda raw: raw.dof_frictionloss)
 
 FAULTS: dict[str, Fault] = {
     "xyzw": xyzw,
