@@ -27,7 +27,7 @@ from statemachine.runs import record_scenario
 from statemachine.runs.commands import hold_ctrl, is_servo
 from statemachine.runs.scenarios import SCENARIOS, fitting
 
-from .conftest import written
+from .conftest import assert_not_in, opened, refused, written
 
 # A slide with a servo whose gear is 2, a hinge with a motor of gear 3 that holds a load, and a
 # hinge that a velocity servo drives.
@@ -292,8 +292,7 @@ def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
     assert np.flatnonzero(np.isfinite(robot.actuator_gain)).tolist() == [5]
     assert robot.actuator_gear[5] == 3
     assert robot.actuator_forcerange[6].tolist() == [-7, 7]
-    with sm.make_data(robot) as data:
-        sm.reset(robot, data, keyframe="home")
+    with opened(robot, "home") as (_, data):
         data.ctrl[robot.actuator_id("m")] = 2.0
         sm.forward(robot, data)
         assert data.raw.actuator_force[-3] == 2.0  # its gain is 1
@@ -309,8 +308,7 @@ def test_no_filler_of_ours_is_shown(model: Any, capsys: pytest.CaptureFixture[st
     # The robots are the same; a motor whose ctrl has a range may differ in what it can exert.
     main(["compare", "--models", file, "--backends", "mujoco", "pybullet"])
     said = capsys.readouterr().out
-    assert "e+09" not in said
-    assert "e+12" not in said
+    assert_not_in(said, "e+09", "e+12")
 
 
 class _Registry(types.ModuleType):
@@ -357,10 +355,14 @@ def test_a_robot_by_name(menagerie_package: _Registry) -> None:
     assert models.resolve("menagerie:unitree_g1/g1") == folder / "g1.xml"
     assert models.resolve("menagerie:unitree_g1/g1", menagerie="elsewhere") == folder / "g1.xml"
     assert sm.load("menagerie:unitree_g1").joint_names == ("swing",)
-    with pytest.raises(errors.UnknownNameError, match="Did you mean 'unitree_g1'"):
-        models.resolve("menagerie:unitre_g1")
-    with pytest.raises(errors.UnknownNameError, match="scene, g1"):
-        models.resolve("menagerie:unitree_g1/nope")
+    refused(
+        (
+            errors.UnknownNameError,
+            "Did you mean 'unitree_g1'",
+            lambda: models.resolve("menagerie:unitre_g1"),
+        ),
+        (errors.UnknownNameError, "scene, g1", lambda: models.resolve("menagerie:unitree_g1/nope")),
+    )
 
 
 def test_a_robot_by_name_without_a_network(
@@ -440,10 +442,10 @@ def test_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         monkeypatch.setitem(sys.modules, module.__name__, module)
     assert models.resolve("a_mj_description") == tmp_path / "a.xml"
     assert models.resolve("robot_descriptions:a_mj_description") == tmp_path / "a.xml"
-    with pytest.raises(errors.ModelFileError, match="neither MJCF nor URDF"):
-        models.resolve("b_description")
-    with pytest.raises(errors.UnknownNameError, match="a_mj_description"):
-        models.resolve("c_description")
+    refused(
+        (errors.ModelFileError, "neither MJCF nor URDF", lambda: models.resolve("b_description")),
+        (errors.UnknownNameError, "a_mj_description", lambda: models.resolve("c_description")),
+    )
 
 
 # Two links whose balls are 50 mm apart at the start and 200 mm thick: 150 mm of the one are in the

@@ -36,7 +36,7 @@ from statemachine.probes.audit.points import points
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
-from .conftest import Cli, Patch, around, need_engine, registered, written
+from .conftest import Cli, Patch, around, assert_in, need_engine, registered, written
 
 SCENE = "so101/scene_box"
 
@@ -151,8 +151,7 @@ def test_pybullet_forgets_its_contacts(of_pybullet: audit.Audit) -> None:
     assert set(found.in_contact) >= {"keyframe"}
     assert "motion" not in found.in_contact
     for way in ("written", "saveState", "saveBullet"):
-        assert "motor targets" in found.forgotten[way]
-        assert "a waiting force" in found.forgotten[way]
+        assert_in(found.forgotten[way], "motor targets", "a waiting force")
     exact = {
         each.point
         for each in engine.findings

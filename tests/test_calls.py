@@ -36,7 +36,7 @@ from statemachine.report import calls as words
 from statemachine.report import terminal
 from statemachine.report.as_json import dumps
 
-from .conftest import need_engine
+from .conftest import assert_in, need_engine
 
 # A little of everything: a keyframe in mid-contact, a write, both verbs, each kind of
 # derived array, a State, a variant of the model, two Data.
@@ -400,13 +400,15 @@ def test_the_still_copy_is_never_stepped() -> None:
 def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
     from statemachine.engines.pybullet import calls as watched
 
-    found = watched.client_of
-    assert found("stepSimulation", (7,), {}) == 7
-    assert found("stepSimulation", (), {}) == 0
-    assert found("anything", (1, 2), {"physicsClientId": 5}) == 5
-    assert found("anything", (1, 2), {}) is None
-    assert found("getJointStates", (1, [2], 9), {}) == 9
-    assert found("getJointStates", (1, [2]), {}) == 0
+    for function, given, named, client in (
+        ("stepSimulation", (7,), {}, 7),
+        ("stepSimulation", (), {}, 0),
+        ("anything", (1, 2), {"physicsClientId": 5}, 5),
+        ("anything", (1, 2), {}, None),
+        ("getJointStates", (1, [2], 9), {}, 9),
+        ("getJointStates", (1, [2]), {}, 0),
+    ):
+        assert watched.client_of(function, given, named) == client, function
     pb: Any = installed.require("pybullet")
     nowhere = pb.connect(pb.DIRECT)
     pb.disconnect(nowhere)
@@ -566,15 +568,17 @@ def test_a_page_shows_the_same_line_in_both_engines_words() -> None:
     for words_ in ("pybullet: No call yet. All that is derived", "Changed: data.qpos[1], and"):
         assert words_ in text
     assert "pybullet: No call. Nothing changed." not in text
-    assert 'backend="mujoco"' in text
-    assert 'backend="pybullet"' in text
+    assert_in(text, 'backend="mujoco"', 'backend="pybullet"')
     assert "import statemachine" not in text
     last = [block for block in page.blocks if isinstance(block, Table)][-1]
     assert ("  stepSimulation", "7") in [tuple(row[:2]) for row in last.rows]
     flat = " ".join(text.split())
-    assert "In this run it was never stepped." in flat
-    assert "In this run it was stepped once." in flat
-    assert "Its own step was never called there." in flat
+    assert_in(
+        flat,
+        "In this run it was never stepped.",
+        "In this run it was stepped once.",
+        "Its own step was never called there.",
+    )
 
 
 def test_a_page_says_why_the_run_ended() -> None:

@@ -20,7 +20,7 @@ from rich.cells import cell_len
 from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import ROOT, Cli, need_engine, one_line, written
+from .conftest import ROOT, Cli, assert_in, assert_not_in, need_engine, one_line, written
 from .small_models import NAMED_PENDULUM, mjcf
 
 QUICK = {
@@ -45,8 +45,7 @@ def test_every_lesson_runs_and_reads_well_piped(cli: Cli, lesson: str, backend: 
     assert len(lines) > 8
     assert max(map(cell_len, lines)) <= 80
     assert all(line == line.rstrip() for line in lines)
-    assert "\x1b" not in done.stdout
-    assert "✗" not in done.stdout
+    assert_not_in(done.stdout, "\x1b", "✗")
     assert "nan" not in done.stdout.lower().split()
 
 
@@ -149,8 +148,7 @@ def test_fingertip_of_other_models_and_frames(cli: Cli, pinocchio: None) -> None
     assert cli("fingertip", "--site", "baseframe").returncode == 0
     scene = ("fingertip", "--model", "so101/scene_box")
     page = cli(*scene, code=0)
-    assert "included files read in: 2" in page.stdout
-    assert "own reading" in page.stdout
+    assert_in(page.stdout, "included files read in: 2", "own reading")
     assert cli(*scene, "--witness", "so101").returncode == 0
 
 
@@ -336,8 +334,7 @@ def test_gravity_of_a_slide_and_of_an_equality(cli: Cli, tmp_path: Path) -> None
     file = _model(tmp_path, body, rest)
     page = cli("lesson", "gravity", "--model", file, "--joint", "j")
     assert re.search(r"held by +equality +equality", page.stdout)
-    assert "[N]" in page.stdout
-    assert "mm" in page.stdout
+    assert_in(page.stdout, "[N]", "mm")
     assert page.returncode == 0
 
 

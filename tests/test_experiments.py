@@ -51,8 +51,7 @@ def test_forces_sum_with_the_bias_on_the_other_side() -> None:
 def test_gravity_is_read_at_the_moment_of_the_end() -> None:
     model = sm.load("so101/scene")
     found = lesson_result("gravity", model, seconds=1.0)
-    with sm.make_data(model) as data:
-        sm.step(model, data, 200)
+    with opened(model, nstep=200) as (_, data):
         sm.forward(model, data)
         assert found.servos_on.forces["actuator"] == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()

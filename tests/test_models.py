@@ -16,7 +16,7 @@ from statemachine.engines.mujoco.description import read_file
 from statemachine.models import models_dir, resolve
 from statemachine.robots import find
 
-from .conftest import registered, written
+from .conftest import opened, registered, written
 from .small_models import MOTORS, PACKAGED_URDF, model_of
 
 
@@ -116,9 +116,7 @@ def test_a_model_survives_a_pickle(backend: str) -> None:
     assert not copy.keyframes[0].qpos.flags.writeable
     ends = []
     for each in (model, copy):
-        with sm.make_data(each) as data:
-            sm.reset(each, data, keyframe=0)
-            sm.step(each, data, 20)
+        with opened(each, 0, nstep=20) as (_, data):
             ends.append(sm.get_state(each, data))
     assert ends[0] == ends[1]
 

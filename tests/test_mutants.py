@@ -118,8 +118,7 @@ def test_rounding_does_not_give_a_fault_away(
     model = sm.load("so101/scene_box", backend=backend)
     runs = []
     for calls, steps in ((1, 12), (12, 1)):
-        with sm.make_data(model) as data:
-            sm.reset(model, data, keyframe="pickup")
+        with opened(model, "pickup") as (_, data):
             data.qpos[8] += 0.5
             data.qvel[:] = np.linspace(-0.7, 0.9, model.nv)
             before = data.qpos.tobytes(), data.qvel.tobytes(), data.ctrl.tobytes()
@@ -135,8 +134,7 @@ def test_the_short_step_keeps_the_clock_right(
     backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     FAULTS["one-step-short"](monkeypatch)
-    with opened(sm.load("so101", backend=backend)) as (model, data):
-        sm.step(model, data, 7)
+    with opened(sm.load("so101", backend=backend), nstep=7) as (model, data):
         assert math.isclose(data.time, 7 * model.timestep)
 
 

@@ -19,6 +19,7 @@ from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
 from statemachine.interface import Array
 
+from .conftest import opened, refused
 from .small_models import CART, model_of
 
 SERVO = '<position name="servo" joint="rail" kp="100" kv="20"/>'
@@ -123,10 +124,14 @@ def test_friction_without_effect_is_refused(tmp_path: Path) -> None:
     model = model_of(
         tmp_path, CART.format(actuators="").replace("<worldbody>", option + "<worldbody>")
     )
-    with pytest.raises(UnsupportedError, match="overrides the friction"):
-        model.replace(friction=0.5)
-    with pytest.raises(UnsupportedError, match="overrides the friction"):
-        worlds.make_worlds(model, 2, friction=[0.5, 0.6])
+    refused(
+        (UnsupportedError, "overrides the friction", lambda: model.replace(friction=0.5)),
+        (
+            UnsupportedError,
+            "overrides the friction",
+            lambda: worlds.make_worlds(model, 2, friction=[0.5, 0.6]),
+        ),
+    )
 
 
 DELAYED = CART.format(
@@ -170,8 +175,7 @@ def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, back
     model = model_of(tmp_path, LATE, "late.xml", backend=backend)
 
     def ours(model: sm.Model) -> Array:
-        with sm.make_data(model) as own:
-            sm.reset(model, own, keyframe="home")
+        with opened(model, "home") as (_, own):
             return run_rows(model, own, 30)
 
     assert np.abs(ours(model) - path).max() < (1e-9 if backend == "pybullet" else 1e-15)

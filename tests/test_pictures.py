@@ -41,7 +41,7 @@ from statemachine.report.plot import (
 from statemachine.runs import Trace, record, shipped, write
 from statemachine.runs.header import INPUTS
 
-from .conftest import ROOT, Cli, need_engine, one_line, written
+from .conftest import ROOT, Cli, assert_in, need_engine, one_line, refused, written
 from .rendering import rendering_environment, silhouettes
 from .small_models import mjcf
 
@@ -337,8 +337,7 @@ def test_without_opengl_pybullet_draws_and_it_is_said(cli: Cli, tmp_path: Path) 
         **_without_opengl(tmp_path),
     )
     first, second = done.stderr.splitlines()
-    assert "no OpenGL here" in first
-    assert "PyBullet's software" in first
+    assert_in(first, "no OpenGL here", "PyBullet's software")
     assert second.endswith("drawn by PyBullet's software renderer")
     with image_of.open(tmp_path / "a.webp") as image:
         assert image.n_frames == 6
@@ -353,10 +352,10 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(_opengl, "offscreen_opengl", lambda: "egl")
     assert probe.renderer_here() == probe.Renderer("mujoco", "egl")
     monkeypatch.setattr(_opengl, "offscreen_opengl", lambda: None)
-    with pytest.raises(MissingEngineError, match=r"apt-get|driver"):
-        probe.renderer_here("mujoco")
-    with pytest.raises(UnknownNameError, match="Did you mean 'mujoco'"):
-        probe.renderer_here("mujcoo")
+    refused(
+        (MissingEngineError, r"apt-get|driver", lambda: probe.renderer_here("mujoco")),
+        (UnknownNameError, "Did you mean 'mujoco'", lambda: probe.renderer_here("mujcoo")),
+    )
 
     def require(name: str) -> None:
         if name == "pybullet":
@@ -435,8 +434,7 @@ def test_compare_writes_what_it_is_asked_for(
     json.loads(done.stdout)
     plotted, filmed = done.stderr.splitlines()
     assert "a.svg: a figure" in plotted
-    assert "a.webp: a film of 0.5 s, 5 pictures" in filmed
-    assert "drawn by MuJoCo" in filmed
+    assert_in(filmed, "a.webp: a film of 0.5 s, 5 pictures", "drawn by MuJoCo")
     assert sorted(path.name for path in tmp_path.glob("a.*")) == ["a.svg", "a.webp"]
 
 

@@ -30,8 +30,7 @@ def _swing(model: sm.Model, data: sm.Data, steps: int) -> sm.State:
 
 
 def _mid_contact(backend: str) -> tuple[sm.Model, sm.State]:
-    with opened(sm.load("so101/scene_box", backend=backend), keyframe=0) as (model, data):
-        sm.step(model, data, 37)
+    with opened(sm.load("so101/scene_box", backend=backend), 0, nstep=37) as (model, data):
         assert len(data.contacts) > 0
         return model, sm.get_state(model, data)
 

@@ -51,7 +51,7 @@ from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
-from .conftest import ROOT, Cli
+from .conftest import ROOT, Cli, assert_in
 
 LIMIT = 2_000_000  # bytes
 Made = tuple[Comparison, Trace, Trace, SideDrawing]
@@ -465,8 +465,7 @@ def test_between_compared_moments_the_figures_are_of_the_last_one() -> None:
     scenario = SCENARIOS["hold"]
     one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
     text = page_of(of(one, shipped("hold", "pybullet", "engine")))
-    assert "at the first common moment already, 0.025\u00a0s" in text
-    assert "meet every 25\u00a0ms" in text
+    assert_in(text, "at the first common moment already, 0.025\u00a0s", "meet every 25\u00a0ms")
     data = re.search(r'id="data">(.*?)</script>', text, re.S)
     assert data
     data = json.loads(data[1])
@@ -1084,5 +1083,4 @@ def test_any_page_can_be_drawn() -> None:
         assert part in text
     assert not page.holds
     written = markdown(page, lambda _: "")
-    assert "## More" in written
-    assert "<details><summary>Deep</summary>" in written
+    assert_in(written, "## More", "<details><summary>Deep</summary>")

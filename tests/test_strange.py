@@ -110,8 +110,7 @@ def test_a_negative_number_that_engines_take_is_told(
 
 @pytest.mark.parametrize("text", UNUSUAL)
 def test_an_unusual_number_is_taken(text: str, backend: str, tmp_path: Path) -> None:
-    with opened(model_of(tmp_path, text, backend=backend)) as (model, data):
-        sm.step(model, data, 20)
+    with opened(model_of(tmp_path, text, backend=backend), nstep=20) as (_, data):
         assert np.isfinite(data.qpos).all()
 
 
@@ -153,8 +152,7 @@ for each in caught:
     print(each.category.__name__, each.message)
 """
     done = in_its_own_python(code, tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("EngineWarning MuJoCo")
+    assert (done.stdout[:20], done.stderr) == ("EngineWarning MuJoCo", "")
     assert "contains a 'NaN'" in done.stdout
     assert backend == "mujoco" or "m.xml" in done.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["m.xml"]
@@ -220,8 +218,7 @@ class Lines:
     ],
 )
 def test_a_repr_of_many_lines_is_one_line_of_a_message(call: Any) -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data, pytest.raises(StateMachineError) as caught:
+    with opened(sm.load("so101")) as (model, data), pytest.raises(StateMachineError) as caught:
         call(model, data, Lines())
     assert len(str(caught.value).splitlines()) == 1
     assert "\x1b" not in str(caught.value)

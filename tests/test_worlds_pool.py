@@ -39,7 +39,7 @@ from statemachine.worlds import (
 )
 
 from . import faulty_world as faulty
-from .conftest import ROOT, lives, registered
+from .conftest import ROOT, lives, opened, registered
 from .test_worlds import follow
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
@@ -207,8 +207,7 @@ def test_ctrl_c_ends_a_step_at_once_and_each_world_is_whole(
     worlds.ctrl[:] = 0
     step(worlds, 2)
     assert worlds.time == pytest.approx(times + 0.01)
-    with sm.make_data(model) as data:
-        sm.step(model, data, 2)
+    with opened(model, nstep=2) as (_, data):
         assert bits(worlds.qpos[2]) == bits(data.qpos)
 
 
