@@ -6,6 +6,7 @@ import linecache
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Container, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -51,6 +52,24 @@ def lives(pid: int) -> bool:
         return False
 
 
+def soon(so: Callable[[], object], seconds: float = 30.0) -> bool:
+    """Whether something is so within some seconds."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until and not so():
+        time.sleep(0.05)
+    return bool(so())
+
+
+def processes_with(part: object) -> list[int]:
+    """Processes in whose command line something stands."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if str(part).encode() in (entry / "cmdline").read_bytes():
+                found.append(int(entry.name))
+    return found
+
+
 def need_engine(name: str) -> None:
     """Skip without an engine, or fail where STATEMACHINE_REQUIRE names it."""
     try:
@@ -76,7 +95,7 @@ def refused(
 ) -> None:
     """Every call raises its error, with a text in which its pattern is."""
     for error, says, call in cases:
-        with pytest.raises(error, match=says):  # noqa: PT012
+        with pytest.raises(error, match=says or None):  # noqa: PT012
             call()
             pytest.fail(f"nothing was refused, where {error} was to say: {says}")
 
@@ -276,6 +295,7 @@ def one_line(done: subprocess.CompletedProcess[str], says: str, code: int = 2) -
     """A command was refused, in one line that says why."""
     assert (done.returncode, done.stdout) == (code, ""), done.stderr
     (line,) = done.stderr.splitlines()
+    assert line.startswith("statemachine")
     assert says in line
 
 

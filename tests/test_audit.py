@@ -292,8 +292,7 @@ def test_a_backend_without_a_driver_is_audited_through_the_interface() -> None:
         result = audit.run(sm.load(SCENE, backend=name), steps=10)
     assert [each.layer for each in result.audited] == ["interface"]
     assert result.holds
-    page = report.page({name: result})
-    assert page.holds
+    assert report.page({name: result}).holds
 
 
 # Faults. Each is put into an engine or a backend, and one question must notice it.
@@ -491,8 +490,7 @@ def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.Monk
     monkeypatch.setattr(World, "place", World.put)
     found = asked("restore", "pybullet", only=("keyframe", "limp"))
     assert broken(found) == {("interface", STATE)}
-    among = {each.into for each in found if not each.holds}
-    assert among == {"each other"}
+    assert {each.into for each in found if not each.holds} == {"each other"}
     engine = conclude([each for each in found if each.layer == "engine"])
     assert "taken apart + targets" not in engine.agree
 
@@ -564,8 +562,7 @@ def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch
     engine, interface = result.audited
     assert {each.experiment for each in engine.findings if not each.holds} == {"process"}
     assert "pickled State" in {each.experiment for each in interface.findings if not each.holds}
-    page = report.page({"mujoco": result})
-    assert not page.holds
+    assert not report.page({"mujoco": result}).holds
 
 
 def test_a_process_that_fails_is_one_line() -> None:

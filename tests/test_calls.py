@@ -163,8 +163,7 @@ def test_every_call_is_recorded(engine: str) -> None:
 def is_a_look(frame: Any) -> bool:
     """Whether code is the recorder's own, or that with which an engine's room looks."""
     file = Path(frame.f_code.co_filename)
-    of_a_room = file.parts[-3::2] == ("engines", "calls.py")
-    return of_a_room or file == Path(calls.__file__)
+    return (file.parts[-3::2] == ("engines", "calls.py")) or file == Path(calls.__file__)
 
 
 def around(engine: str, run: Callable[[], object]) -> set[str]:
@@ -247,8 +246,7 @@ def test_everything_is_put_back(engine: str, ending: str) -> None:
     for owner, attributes in zip(owners(engine), before, strict=True):
         assert vars(owner).keys() == attributes.keys()
         assert all(vars(owner)[name] is value for name, value in attributes.items())
-    model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    assert isinstance(mujoco.MjData(model), mujoco.MjData)
+    assert isinstance(mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>")), mujoco.MjData)
     assert record(SHORT.format(engine=engine, code=""), engine).error is None  # and again
 
 

@@ -391,8 +391,7 @@ def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> 
         table.write_bytes(content)
         assert again(time_limit=7.0) == []
     # A table that ended in the middle of a file is one with fewer rows.
-    rows = text.splitlines(keepends=True)
-    table.write_text("".join(rows[:2]))
+    table.write_text("".join(text.splitlines(keepends=True)[:2]))
     assert again()
     table.write_text("name,mark\nann,1\n")
     with pytest.raises(BadInputError, match="not the columns of a table of grades"):

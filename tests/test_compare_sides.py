@@ -222,8 +222,7 @@ def test_an_mjcf_against_its_own_urdf() -> None:
     root = Path(sm.__file__).parent.parent / "models"
     if not root.is_dir():
         pytest.skip("no checkout")
-    request = asked("fall", Side("so101"), Side(str(root / "so101" / "so101.urdf")))
-    run = run_sides(request)
+    run = run_sides(asked("fall", Side("so101"), Side(str(root / "so101" / "so101.urdf"))))
     names = {each.name for each in compare(run.left, run.right).agreements}
     assert {"shoulder_pan", "elbow_flex", "gripper", "energy"} <= names
     (line,) = run.unmatched
@@ -253,8 +252,7 @@ def test_permuted_joints_and_actuators_are_the_same_robot(files: Path) -> None:
 
 def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
     sides = Side(str(files / "arm.xml")), Side(str(files / "renamed.xml"))
-    names = {"shoulder": "Gelenk_1", "elbow": "Gelenk_2"}
-    for given in ({}, names):
+    for given in ({}, {"shoulder": "Gelenk_1", "elbow": "Gelenk_2"}):
         run, found = ran("hold", *sides, names=given)
         assert largest(found) == 0
         assert {"shoulder", "elbow"} <= {each.name for each in found.agreements}
@@ -418,8 +416,7 @@ def test_feedback_that_makes_the_difference_and_a_machine_that_is_the_same(files
     closed, opened = compare(run.left, run.right), compare(run.left, run.played)
     assert not closed.agrees
     assert largest(opened) == 0
-    page = report.page(closed, run.left, run.right, run=run, played=opened)
-    assert not page.holds
+    assert not report.page(closed, run.left, run.right, run=run, played=opened).holds
 
 
 def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
@@ -547,8 +544,7 @@ def test_what_a_side_has_nothing_of_is_said_first_and_its_switch_shows_the_rest(
     assert found["missing"] == []
     assert [row["name"] for row in found["shares"]] == ["damping of swing"]
     assert found["explained"] == pytest.approx(1.0)
-    run = json.loads(cli(*words, *both).stdout)
-    assert run["commands"] == "the same"
+    assert json.loads(cli(*words, *both).stdout)["commands"] == "the same"
 
 
 def test_parts_that_cannot_be_given_are_one_clear_line(

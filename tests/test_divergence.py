@@ -108,8 +108,7 @@ def test_an_explosion_is_raised_early(tmp_path: Path) -> None:
 
 def test_the_bound_can_be_set(tmp_path: Path) -> None:
     """At load and by replace, one number or one of each; a variant keeps what was set."""
-    text = ROTOR.format(timestep=0.002, actuator="")
-    model = loaded(tmp_path, text, max_qvel=500)
+    model = loaded(tmp_path, ROTOR.format(timestep=0.002, actuator=""), max_qvel=500)
     assert np.array_equal(bound(model), np.full(8, 500.0))
     assert np.array_equal(bound(model.replace(timestep=0.001)), bound(model))
     each = model.replace(max_qvel=[1000, *[1e5] * 7])

@@ -49,8 +49,7 @@ def test_a_picture_is_the_same_each_time(picture: Traces) -> None:
 
 def test_markdown_takes_nothing_for_its_own() -> None:
     table = Table(("a|b", "n"), [("x*y", "[1]")], title="t", emphasis=frozenset({0}))
-    text = md.block_as_markdown(table, lambda _: "")
-    assert_in(text, r"a\|b", r"**x\*y**", ":-- | --:")
+    assert_in(md.block_as_markdown(table, lambda _: ""), r"a\|b", r"**x\*y**", ":-- | --:")
     assert md.block_as_markdown(Text("data.qpos[1] <b>"), lambda _: "") == r"data.qpos\[1\] \<b\>"
 
 

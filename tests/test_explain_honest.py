@@ -76,8 +76,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def file(folder: Path, name: str, **changed: str) -> str:
-    text = ARM.format(**{**USUAL, **changed})
-    (folder / name).write_text(text, encoding="utf-8")
+    (folder / name).write_text(ARM.format(**{**USUAL, **changed}), encoding="utf-8")
     return name
 
 
@@ -189,8 +188,7 @@ def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
         '<sensor><jointpos name="p" joint="j1"/>'
         '<framepos name="q" objtype="body" objname="a"/></sensor>'
     )
-    left = file(folder, "l.xml", sensor=sensor)
-    text = (folder / left).read_text(encoding="utf-8")
+    text = (folder / file(folder, "l.xml", sensor=sensor)).read_text(encoding="utf-8")
     for name, other in (("j1", "hinge"), ("a", "arm")):
         text = text.replace(f'"{name}"', f'"{other}"')
     (folder / "r.xml").write_text(text, encoding="utf-8")

@@ -360,8 +360,7 @@ def test_six_questions_are_answered_by_runs(backend: str) -> None:
     asked = [block for block in page.blocks if isinstance(block, Question)]
     assert len(asked) == 6
     assert all(question.right is not None for question in asked)
-    verdicts = [block for block in page.blocks if isinstance(block, Verdict)]
-    assert len(verdicts) == 6
+    assert len([block for block in page.blocks if isinstance(block, Verdict)]) == 6
     assert page.holds
 
 
@@ -379,11 +378,9 @@ def test_six_questions_are_answered_by_runs(backend: str) -> None:
 def test_an_answer_that_its_run_belies_is_none(part: str, change: Change) -> None:
     result = _take("questions", "mujoco")[1].result
     answers = {**result.answers, part: change(result.answers[part])}
-    belied = dataclasses.replace(result, answers=answers)
-    page = _repage("questions", "mujoco", belied)
+    page = _repage("questions", "mujoco", dataclasses.replace(result, answers=answers))
     assert not page.holds
-    wrong = [b for b in page.blocks if isinstance(b, Question) and b.right is None]
-    assert len(wrong) == 1
+    assert len([b for b in page.blocks if isinstance(b, Question) and b.right is None]) == 1
 
 
 @pytest.mark.slow
@@ -448,8 +445,7 @@ def test_of_which_moment_a_step_leaves_what(backend: str) -> None:
 
 def test_what_keyframe_0_of_the_public_scene_is(cli: Cli, menagerie: Path) -> None:
     done = cli("lesson", "reset", "--menagerie", str(menagerie), code=0)
-    said = " ".join(done.stdout.split())
-    assert_in(said, "the robot does not touch the box", "is mistaken")
+    assert_in(" ".join(done.stdout.split()), "the robot does not touch the box", "is mistaken")
 
 
 _SLIDE = """<mujoco><option timestep="0.001"/><worldbody><body><joint name="s" type="slide"/>
@@ -497,8 +493,7 @@ def test_a_reset_of_a_model_that_lacks_something(cli: Cli, tmp_path: Path, body:
 @pytest.mark.slow
 def test_calls_beside_a_lesson(cli: Cli, backend: str) -> None:
     done = cli("lesson", "forward", "--backend", backend, "--calls", code=0)
-    words = {"mujoco": "mj_forward", "pybullet": "getLinkStates"}
-    assert words[backend] in done.stdout
+    assert {"mujoco": "mj_forward", "pybullet": "getLinkStates"}[backend] in done.stdout
     assert max(map(cell_len, done.stdout.splitlines())) <= 80
     assert "own words" not in cli("lesson", "questions", "--calls").stdout
 
@@ -828,8 +823,7 @@ def test_the_code_runs_with_the_smallest_options(name: str) -> None:
 @pytest.mark.parametrize("way", ["extra-step", "late-ctrl"])
 def test_broken_code_differs_as_its_page_says(way: str, steps: int) -> None:
     _, taken = _take("replay", "mujoco", steps=steps, **{"break": way})
-    printed = float(taken.printed.split()[-1])
-    assert printed == taken.result.difference[-1] > 0
+    assert float(taken.printed.split()[-1]) == taken.result.difference[-1] > 0
     assert max(map(cell_len, taken.code.splitlines())) <= 76
 
 

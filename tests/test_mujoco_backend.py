@@ -150,8 +150,7 @@ def test_bad_entries_are_called_by_their_joint() -> None:
 
 
 def test_closing_gives_the_memory_back_and_keeps_the_last_values() -> None:
-    model = sm.load("so101")
-    data = sm.make_data(model)
+    data = sm.make_data(sm.load("so101"))
     view = data.qpos
     data.qpos[1] = 0.25
     data.close()

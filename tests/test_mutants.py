@@ -320,8 +320,7 @@ def test_another_pytests_settings_do_not_disturb(
     odd = path.parent.rename(path.parent.with_name("with [brackets] and blanks")) / path.name
     monkeypatch.setenv("PYTEST_ADDOPTS", "--no-such-option")
     monkeypatch.setenv("PYTEST_PLUGINS", "no_such_plugin")
-    found = examine(odd, only=["xyzw"])
-    assert found.failures == ()
+    assert examine(odd, only=["xyzw"]).failures == ()
     assert {entry.name for entry in odd.parent.iterdir()} == {path.name, *beside}
 
 
@@ -339,8 +338,7 @@ def test_the_page_keeps_to_its_columns(capsys: pytest.CaptureFixture[str]) -> No
     page = report.page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
     assert not page.holds
     terminal.show(page)
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(cell_len, lines)) <= 80
+    assert max(map(cell_len, capsys.readouterr().out.splitlines())) <= 80
 
 
 @pytest.mark.slow

@@ -98,8 +98,7 @@ def test_options_add_up_and_their_order_does_not_count(backend: str) -> None:
 
 
 def test_load_takes_them_too(backend: str) -> None:
-    model = sm.load("so101", backend=backend, kp=500)
-    assert (model.actuator_kp == 500).all()
+    assert (sm.load("so101", backend=backend, kp=500).actuator_kp == 500).all()
 
 
 @pytest.mark.usefixtures("bullet")

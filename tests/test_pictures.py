@@ -41,7 +41,17 @@ from statemachine.report.plot import (
 from statemachine.runs import Trace, record, shipped, write
 from statemachine.runs.header import INPUTS
 
-from .conftest import ROOT, Cli, assert_in, need_engine, one_line, refused, written
+from .conftest import (
+    ROOT,
+    Cli,
+    assert_in,
+    need_engine,
+    one_line,
+    processes_with,
+    refused,
+    soon,
+    written,
+)
 from .rendering import rendering_environment, silhouettes
 from .small_models import mjcf
 
@@ -455,9 +465,7 @@ def test_ctrl_c_leaves_no_half_film_and_no_process(
         start_new_session=True,  # a group of its own, as a terminal's foreground job
     )
     try:
-        deadline = time.monotonic() + 60
-        while not _drawing(tmp_path) and time.monotonic() < deadline and child.poll() is None:
-            time.sleep(0.05)
+        soon(lambda: _drawing(tmp_path) or child.poll() is not None, 60)
         time.sleep(1)
         os.killpg(child.pid, signal.SIGINT)
         _, said = child.communicate(timeout=60)
@@ -469,18 +477,10 @@ def test_ctrl_c_leaves_no_half_film_and_no_process(
     assert not _drawing(tmp_path)
 
 
-def _drawing(place: Path) -> list[str]:
+def _drawing(place: Path) -> list[int]:
     """Processes that draw or encode in a folder."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            there = (folder / "cwd").readlink() == place
-            command = (folder / "cmdline").read_bytes()
-        except OSError:
-            continue
-        if there and (b"rendering._child" in command or b"ffmpeg" in command):
-            found.append(command.decode())
-    return found
+    pids = [*processes_with("rendering._child"), *processes_with("ffmpeg")]
+    return [pid for pid in pids if Path(f"/proc/{pid}/cwd").resolve() == place]
 
 
 # Figures.
@@ -490,8 +490,7 @@ def _drawing(place: Path) -> list[str]:
 def compared() -> tuple[Trace, Trace, Any]:
     """Hold on MuJoCo, and as PyBullet was recorded."""
     two = shipped("hold", "pybullet")
-    model = sm.load("so101/scene")
-    one = record(model, lambda _t, _d: np.array(FIRST), 2.0, experiment="hold")
+    one = record(sm.load("so101/scene"), lambda _t, _d: np.array(FIRST), 2.0, experiment="hold")
     return one, two, compare(one, two)
 
 

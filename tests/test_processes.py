@@ -37,8 +37,7 @@ def _mid_contact(backend: str) -> tuple[sm.Model, sm.State]:
 
 def test_other_processes_continue_with_the_same_bits(backend: str) -> None:
     model, state = _mid_contact(backend)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, mp_context=context) as pool:
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         jobs = [pool.submit(_continue, backend, pickle.dumps(state), 200) for _ in range(2)]
         futures = [pickle.loads(job.result(timeout=60)) for job in jobs]
     with sm.make_data(model) as data:

@@ -267,8 +267,7 @@ def test_two_free_bodies_are_two(tmp_path: Path) -> None:
         data,
     ):
         free = [tree.body for tree in data.raw.trees if tree.free]
-        masses = [pb.getDynamicsInfo(body, -1, data.raw.client)[0] for body in free]
-        assert masses == [1.0, 3.0]
+        assert [pb.getDynamicsInfo(body, -1, data.raw.client)[0] for body in free] == [1.0, 3.0]
         sm.step(model, data, 200)
         # A millimetre into the floor is more than either sinks.
         assert np.abs(data.qpos[[2, 9]] - (0.1, 0.2)).max() < 0.001
@@ -504,8 +503,7 @@ def test_engine_defaults_are_pybullets() -> None:
         sm.step(model, data, 240)
         assert not data.qpos.any()  # no gravity, and the targets are where the arm is
     with sm.make_data(model.replace(gravity=[0, 0, -9.81])) as data:
-        parameters = pb.getPhysicsEngineParameters(data.raw.client)
-        assert parameters["gravityAccelerationZ"] == -9.81
+        assert pb.getPhysicsEngineParameters(data.raw.client)["gravityAccelerationZ"] == -9.81
 
 
 def test_engine_motors_hold_an_arm_that_nobody_drives() -> None:
@@ -696,8 +694,7 @@ while True:
             assert child.stdout is not None
             assert child.stdout.readline() == b"went\n"
             time.sleep(delay)
-            process = Path("/proc") / str(child.pid)
-            assert "/dev/shm" not in (process / "maps").read_text()
+            assert "/dev/shm" not in ((Path("/proc") / str(child.pid)) / "maps").read_text()
             rows = Path("/proc/sysvipc/shm").read_text().splitlines()[1:]
             assert str(child.pid) not in [row.split()[4] for row in rows]
         finally:

@@ -227,8 +227,7 @@ def test_friction_of_a_pair_is_the_models(
     with opened(model, nstep=500) as (_, data):
         moved = float(data.qpos[0])
     friction = 0.1 if "priority" in floor else 0.0
-    expected = (1.96 - friction * 9.81) / 2 if slides else 0.0
-    assert moved == pytest.approx(expected, abs=0.01)
+    assert moved == pytest.approx((1.96 - friction * 9.81) / 2 if slides else 0.0, abs=0.01)
 
 
 def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:

@@ -428,8 +428,7 @@ def test_what_was_commanded(hold: Made) -> None:
 def test_a_link_only_to_what_is_there(hold: Made) -> None:
     models = Page("models", "", [Verdict("1 figure differs", False)])
     for header in (hold[2].header, dataclasses.replace(hold[2].header, defaults="engine")):
-        two = Trace(header, hold[2].columns)
-        text = page_of(of_look(hold[1], two, hold[3]), models=models)
+        text = page_of(of_look(hold[1], Trace(header, hold[2].columns), hold[3]), models=models)
         targets = set(re.findall(r'id="([^"]+)"', text))
         links = set(re.findall(r'href="#([^"]+)"', text))
         assert links <= targets
@@ -470,8 +469,7 @@ def test_between_compared_moments_the_figures_are_of_the_last_one() -> None:
     assert data
     data = json.loads(data[1])
     shown, compared = (np.frombuffer(base64.b64decode(data[name])) for name in ("time", "compared"))
-    step = 0.025 * np.floor(shown / 0.025 + 1e-6)
-    assert compared == pytest.approx(step, abs=1e-9)
+    assert compared == pytest.approx(0.025 * np.floor(shown / 0.025 + 1e-6), abs=1e-9)
 
 
 @pytest.mark.slow
@@ -563,8 +561,7 @@ def test_each_side_is_drawn_and_can_be_left_out(tab: Tab) -> None:
     before = picture(tab)
     for name in ("solid", "ghost", "marks", "trails"):
         tab.locator(f"#{name}").uncheck()
-        without = picture(tab)
-        assert changed(before, without) > 150, name
+        assert changed(before, picture(tab)) > 150, name
         tab.locator(f"#{name}").check()
         assert changed(before, picture(tab)) == 0, name
 
@@ -686,8 +683,7 @@ def test_the_view_turns_and_comes_back(tab: Tab) -> None:
     tab.mouse.up()
     assert changed(before, picture(tab)) > 2000
     tab.locator("#view-near").click()
-    near = picture(tab)
-    assert changed(before, near) > 2000
+    assert changed(before, picture(tab)) > 2000
     tab.locator("#view-all").click()
     assert changed(before, picture(tab)) == 0
 
@@ -832,8 +828,7 @@ def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
         tab.evaluate("dispatchEvent(new Event('afterprint'))")
         assert tab.locator("#printed").count() == 0
         assert not tab.locator("#curves > details").evaluate("(e) => e.open")
-        pdf = tab.page.pdf(format="A4")
-        assert len(re.findall(rb"/Type\s*/Page\b", pdf)) >= 3
+        assert len(re.findall(rb"/Type\s*/Page\b", tab.page.pdf(format="A4"))) >= 3
         tab.nothing_wrong()
 
 
@@ -959,8 +954,7 @@ def test_a_mesh_keeps_its_surface() -> None:
     assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0, abs=1e-5)
     corners = mesh.vertices[mesh.faces].astype(float)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = (normal[:, None] * mesh.normals[mesh.faces]).sum(axis=2)
-    assert (facing > 0).mean() > 0.999
+    assert ((normal[:, None] * mesh.normals[mesh.faces]).sum(axis=2) > 0).mean() > 0.999
 
 
 def area(vertices: Any, faces: Any) -> float:
@@ -980,8 +974,7 @@ def test_too_many_triangles_are_made_fewer() -> None:
 
 
 def test_folded_normals_unfold() -> None:
-    random = np.random.default_rng(0)
-    n = random.normal(size=(1000, 3))
+    n = np.random.default_rng(0).normal(size=(1000, 3))
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     f = octahedral(n) / 32767
     z = 1 - np.abs(f).sum(axis=1)

@@ -80,8 +80,7 @@ def mended(model, data, gain=1.0):
 @pytest.fixture
 def policy(tmp_path: Path) -> str:
     """A file of functions."""
-    file = written(tmp_path / "policy.py", POLICY)
-    return str(file)
+    return str(written(tmp_path / "policy.py", POLICY))
 
 
 def small(what: str, *vary: str, **others: Any) -> Sweep:
@@ -267,8 +266,7 @@ def test_a_cell_is_the_run_of_a_trace(backend: str) -> None:
     site = model.site_id("gripperframe")
     assert np.allclose(row["sample_tip"], trace["site_xpos"][rows, site], atol=1e-9)
     assert np.isclose(row["energy"], trace["energy"][-1].sum(), atol=1e-9)
-    touches = trace["contact_row"]
-    assert row["first_touch"] == trace.time[touches[0]]
+    assert row["first_touch"] == trace.time[trace["contact_row"][0]]
     assert row["touch"]
 
 
@@ -351,8 +349,7 @@ def test_two_drivers_are_refused(tmp_path: Path) -> None:
             "from pathlib import Path; from statemachine.sweep.folder import locked\n"
             f"with locked(Path({str(tmp_path)!r})): pass"
         )
-        done = in_its_own_python(code, tmp_path)
-        assert "another sweep runs in" in done.stderr
+        assert "another sweep runs in" in in_its_own_python(code, tmp_path).stderr
     with locked(tmp_path):  # it was let go
         pass
 
@@ -443,8 +440,7 @@ def test_other_readers_can_verify_the_pages(dataset: Path) -> None:
 
 
 def test_a_file_says_what_it_is_without_the_manifest(dataset: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
-    schema = parquet.read_schema(_part(dataset))
+    schema = pytest.importorskip("pyarrow.parquet").read_schema(_part(dataset))
     facts = {field.name: field.metadata for field in schema}
     assert all(facts.values())
     assert b"multiple of the model's own" in facts["vary.damping"][b"meaning"]

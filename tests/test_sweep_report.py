@@ -163,8 +163,7 @@ def test_sobol_indices_are_those_of_the_ishigami_function(tmp_path: Path) -> Non
 def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> None:
     factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
     design = Design(factors, samples=256, indices=True, seed=1)
-    points = list(design.points())
-    gone = points[300].values
+    gone = list(design.points())[300].values
     folder = made_up(
         tmp_path / "s", design, nowhere, ishigami, fails=lambda b, v, _: b == "mujoco" and v == gone
     )
@@ -173,8 +172,7 @@ def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> 
     assert found.quantity.counts["no runs"] == 1
     assert the(found.sensitivity).samples == 128
     assert "1 of 256 samples" in the(found.sensitivity).notes[0]
-    said = text(page(found))
-    assert "failed with DivergedError: 1" in said
+    assert "failed with DivergedError: 1" in text(page(found))
     assert shares(found)["y"][0] == pytest.approx(ISHIGAMI["y"][0], abs=0.15)
 
 
@@ -268,8 +266,7 @@ def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
     found, settings = agreement_of(data, "tip", width, ModelFacts(), tolerances)
     verdicts = {each.values[0]: each.verdict for each in settings if each.values[1] == 0}
     assert verdicts == {0: "agrees", 1: "agrees", 2: "chaos", 3: "no runs", 4: "differs"}
-    chart = gap_map(data, "tip", width, None)
-    assert the(chart).inside[0] == (True, True, True, False, False)
+    assert the(gap_map(data, "tip", width, None)).inside[0] == (True, True, True, False, False)
     assert found.counts["chaos"] == 2
 
 
@@ -280,8 +277,7 @@ def fitted(
     design = Design((grid("gain", 0, 2, 9, kind="parameter"), grid("y", 0, 1, 2)))
 
     def right(gain: float, _y: float, seed: int) -> list[float]:
-        shift = best + spread * (seed - (seeds - 1) / 2)
-        return [5e-3 * (gain - shift), least, 0.0]
+        return [5e-3 * (gain - (best + spread * (seed - (seeds - 1) / 2))), least, 0.0]
 
     folder = made_up(folder, design, nowhere, right, seeds)
     return of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])

@@ -127,8 +127,7 @@ def test_a_short_run_is_the_beginning_of_a_long_one(
 
 
 def test_energies_of_a_pendulum_are_those_on_paper(tmp_path: Path) -> None:
-    model = model_of(tmp_path, ROTOR_PENDULUM)
-    trace = record(model, None, 0.5, qpos=[1.0], qvel=[0.7])
+    trace = record(model_of(tmp_path, ROTOR_PENDULUM), None, 0.5, qpos=[1.0], qvel=[0.7])
     angle, speed = trace.qpos[:, 0], trace.qvel[:, 0]
     inertia = 0.1 + 2 * 0.5**2 + 0.3  # body about the joint, and rotor
     assert np.allclose(trace["energy"][:, 0], 0.5 * inertia * speed**2, rtol=1e-12)
@@ -246,8 +245,7 @@ def test_a_run_that_diverges_keeps_its_rows(tmp_path: Path) -> None:
     trace = record(model, wild, 0.5)
     assert trace.header.ended
     assert 10 < len(trace) < 101
-    again = read(write(trace, tmp_path / "wild.npz"))
-    assert same(trace, again)
+    assert same(trace, read(write(trace, tmp_path / "wild.npz")))
 
 
 def test_it_starts_where_it_is_told() -> None:
@@ -257,8 +255,7 @@ def test_it_starts_where_it_is_told() -> None:
         state = sm.get_state(model, data)
         sm.step(model, data)
         after = data.qpos.copy()
-    trace = record(model, None, 0.01, state=state)
-    assert trace.qpos[1].tobytes() == after.tobytes()
+    assert record(model, None, 0.01, state=state).qpos[1].tobytes() == after.tobytes()
     refused(
         (
             BadInputError,
@@ -292,8 +289,7 @@ def test_a_scenario_without_actuators_is_refused(tmp_path: Path) -> None:
 
 def test_played_on_its_own_engine_it_is_the_same_run(backend: str) -> None:
     trace = traced("waves", backend)
-    again = play(trace, sm.load("so101", backend=backend))
-    assert same(trace, again)
+    assert same(trace, play(trace, sm.load("so101", backend=backend)))
 
 
 def test_played_with_another_timestep_commands_hold() -> None:

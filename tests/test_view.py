@@ -354,8 +354,7 @@ def test_an_engine_that_is_too_slow_is_said_and_does_not_lag_ever_more() -> None
         assert pace.reached == pytest.approx(1.0, abs=0.02)
         assert not pace.late
         # What it lost is not made up for in a rush: a quarter of a second at most.
-        after = np.diff([shown[0].time for shown in hand.shown])[len(gaps) :]
-        assert after.sum() < 3.0 + 0.26
+        assert np.diff([shown[0].time for shown in hand.shown])[len(gaps) :].sum() < 3.0 + 0.26
 
 
 def test_time_that_stood_is_not_owed() -> None:

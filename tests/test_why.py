@@ -466,8 +466,7 @@ def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
         with sm.make_data(model) as data:
             data.qpos = qpos
             run(model, data)
-            bodies = model.geom_bodyid[data.contacts.geom]
-            return int((bodies > 0).all(axis=1).sum())
+            return int((model.geom_bodyid[data.contacts.geom] > 0).all(axis=1).sum())
 
     random = np.random.default_rng(3)
     poses = (random.uniform(*arm.jnt_range.T) for _ in range(200))
@@ -602,8 +601,7 @@ def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(explanations
     one = sm.load("so101/scene")
     two = sm.load("so101/scene", backend="pybullet").replace(timestep=1 / 240)
     runs = [path_of(m, scenario("hold"))[::every] for m, every in ((one, 5), (two, 6))]
-    by_hand = np.abs(runs[0] - runs[1]).max()
-    expected = (by_hand - result.brought) / result.gap
+    expected = (np.abs(runs[0] - runs[1]).max() - result.brought) / result.gap
     assert rows["timestep"].last == pytest.approx(expected, abs=1e-9)
     assert rows["timestep"].alone > 0.05
     # The engine has the rotor and the friction of the model only in the model's servo law.
@@ -615,8 +613,7 @@ def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(explanations
 @pytest.mark.slow
 def test_pages_fit_and_say_what_was_found(explanations: Any) -> None:
     for result in explanations.values():
-        text = rendered(report.page(result))
-        assert max(map(len, text.splitlines())) <= 80
+        assert max(map(len, rendered(report.page(result)).splitlines())) <= 80
         json.loads(dumps(result))
 
 
@@ -658,8 +655,7 @@ def test_files_and_settings_of_an_engine_are_explained_together(tmp_path: Path) 
     two.save_binary(heavy)
     right = quietly(str(heavy), defaults="engine")
     result = explain(sm.load("so101/scene"), right, HOLD, uncertain=None, budget=40)
-    kinds = {row.kind for row in result.shares}
-    assert {"body", "engine"} <= kinds
+    assert {"body", "engine"} <= {row.kind for row in result.shares}
     assert result.explained + result.located == pytest.approx(1.0, abs=1e-4)
 
 

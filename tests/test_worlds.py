@@ -511,8 +511,7 @@ def test_sleep_is_run_or_refused(tmp_path: Path) -> None:
 def test_a_python_callback_is_refused() -> None:
     import mujoco
 
-    model = sm.load("so101")
-    with worlds_of(model) as worlds:
+    with worlds_of(sm.load("so101")) as worlds:
         mujoco.set_mjcb_passive(lambda _m, _d: None)
         try:
             with pytest.raises(UnsupportedError, match="worlds"):

@@ -39,7 +39,7 @@ from statemachine.worlds import (
 )
 
 from . import faulty_world as faulty
-from .conftest import ROOT, lives, opened, registered
+from .conftest import ROOT, lives, opened, registered, soon
 from .test_worlds import follow
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
@@ -70,12 +70,7 @@ def running(numbers: Iterable[int]) -> list[int]:
 
 
 def all_end(numbers: Iterable[int], seconds: float = 10.0) -> bool:
-    deadline = time.monotonic() + seconds
-    while running(numbers):
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.02)
-    return True
+    return soon(lambda: not running(numbers), seconds)
 
 
 def bits(array: Any) -> bytes:

@@ -279,8 +279,7 @@ def test_a_draw_depends_on_seed_number_and_option_alone(box: Any) -> None:
 
 def test_the_numbers_of_a_seed_stay_those() -> None:
     """A seed that a paper names gives these numbers in every version."""
-    model = sm.load("so101")
-    drawn = draw(model, 2, seed=0, latency=(0.0, 1.0), damping=LogUniform(0.5, 2.0))
+    drawn = draw(sm.load("so101"), 2, seed=0, latency=(0.0, 1.0), damping=LogUniform(0.5, 2.0))
     np.testing.assert_allclose(drawn["latency"][:, 0], LATENCIES, rtol=0, atol=1e-15)
     np.testing.assert_allclose(drawn["damping"][:, 0] / 0.6, FACTORS, rtol=1e-15)
 
