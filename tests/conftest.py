@@ -100,6 +100,16 @@ def refused(
             pytest.fail(f"nothing was refused, where {error} was to say: {says}")
 
 
+@contextmanager
+def one_line_error(
+    error: type[Exception], *, match: str | None = None
+) -> Iterator[pytest.ExceptionInfo[Any]]:
+    """Something raises this error, and its text is one line."""
+    with pytest.raises(error, match=match) as caught:
+        yield caught
+    assert "\n" not in str(caught.value)
+
+
 def after(model: Model, nstep: int, keyframe: int | str | None = None) -> np.ndarray:
     """qpos (nq,) after so many steps from the default state or from a keyframe."""
     with opened(model, keyframe, nstep=nstep) as (_, data):

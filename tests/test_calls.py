@@ -563,8 +563,7 @@ def test_a_page_shows_the_same_line_in_both_engines_words() -> None:
     code = "sm.forward(model, data)\ndata.qpos[1] = 0.8\nprint(data.qacc)\nsm.step(model, data, 7)"
     page, text = page_of("mujoco", "pybullet", code=code)
     assert max(map(len, text.splitlines())) <= 80
-    for words_ in ("pybullet: No call yet. All that is derived", "Changed: data.qpos[1], and"):
-        assert words_ in text
+    assert_in(text, "pybullet: No call yet. All that is derived", "Changed: data.qpos[1], and")
     assert "pybullet: No call. Nothing changed." not in text
     assert_in(text, 'backend="mujoco"', 'backend="pybullet"')
     assert "import statemachine" not in text

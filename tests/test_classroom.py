@@ -33,7 +33,7 @@ from statemachine.report import gradescope
 from statemachine.report.classroom import page
 from statemachine.runs.whole import csv_text, replace_csv
 
-from .conftest import ROOT, Cli, one_line, refused, written
+from .conftest import ROOT, Cli, assert_in, one_line, refused, written
 
 TEMPLATE = ROOT / "exercises" / "step_loop.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
@@ -235,8 +235,7 @@ def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path
         "state: ctrl was written; forward: …; replay: not written; "
         "please look at this: it reads a.txt"
     )
-    for text in texts:
-        assert text in row["details"]
+    assert_in(row["details"], *texts)
     replace_csv(tmp_path / "t.csv", rows_of([entry]))
     assert read(tmp_path / "t.csv") == {(entry.sha256, "mujoco"): entry}
 

@@ -27,7 +27,7 @@ from statemachine.report import compare as report
 from statemachine.runs import record, write
 from statemachine.runs.controllers import function_scenario
 
-from .conftest import Cli, need_engine, one_line, written
+from .conftest import Cli, need_engine, one_line, one_line_error, written
 from .small_models import BENT, TWO_LINKS, TWO_SERVOS
 
 _FUNCTION = """
@@ -160,9 +160,8 @@ def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
     ],
 )
 def test_what_is_no_side_is_said_in_one_line(words: list[str], says: str) -> None:
-    with pytest.raises(StateMachineError, match=says) as caught:
+    with one_line_error(StateMachineError, match=says):
         parse_sides(words)
-    assert "\n" not in str(caught.value)
 
 
 # The four combinations.
@@ -383,9 +382,8 @@ def test_a_function_imports_what_lies_beside_it(files: Path) -> None:
 )
 def test_a_mistake_in_a_function_is_one_line_about_it(files: Path, name: str, says: str) -> None:
     arm = Side(str(files / "arm.xml"))
-    with pytest.raises(BadInputError, match=says) as caught:
+    with one_line_error(BadInputError, match=says):
         run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))
-    assert "\n" not in str(caught.value)
     with pytest.raises(BadInputError, match=r"no controller file.*Did you mean own.py"):
         function_scenario(str(files / "owm.py:hold"))
 

@@ -572,9 +572,7 @@ def test_the_only_engine_is_missing(
     gone: tuple[str, ...], arguments: tuple[str, ...], lines: int
 ) -> None:
     done = _in_a_process(_without(*gone), "conventions", *arguments)
-    assert done.returncode == 3
-    assert len(done.stderr.splitlines()) == lines
-    assert done.stdout == ""
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (3, "", lines), done.stderr
 
 
 def test_a_call_that_fails_is_the_exit_code() -> None:

@@ -16,7 +16,7 @@ from statemachine.errors import BadInputError, ModelError, ModelFileError, Unkno
 from statemachine.rotations import matrix_from_quat
 from statemachine.runs.provenance import model_digest
 
-from .conftest import refused, written
+from .conftest import one_line_error, refused, written
 from .small_models import ATTACHED, BODY, EVERY_JOINT, STAND
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
@@ -117,10 +117,9 @@ WORLD = "<mujoco><worldbody>{}</worldbody></mujoco>"
     ],
 )
 def test_what_it_does_not_read_is_said_in_one_line(tmp_path: Path, text: str, word: str) -> None:
-    with pytest.raises(ModelError) as caught:
+    with one_line_error(ModelError) as caught:
         sm.Kinematics(_write(tmp_path, text))
     assert word in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_bad_input_is_refused() -> None:

@@ -113,8 +113,7 @@ def test_handlers_that_are_saved_and_restored_pile_up_nothing() -> None:
 
 
 def test_a_warning_of_a_raw_simulation_does_not_come_out_of_our_step() -> None:
-    with opened(sm.load("so101/scene")) as (model, data), warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with opened(sm.load("so101/scene")) as (model, data), warnings.catch_warnings(action="error"):
         _step_raw_to_nan()
         sm.step(model, data)
         sm.forward(model, data)
@@ -168,16 +167,14 @@ def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) 
         with pytest.warns(EngineWarning, match="memory|full|buffer") as given:
             sm.step(model, data, 2)
         assert {warning.filename for warning in given} == {__file__}
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             sm.step(model, data)  # it was said
             sm.step(calm, other)
         sm.reset(model, data)
         with pytest.warns(EngineWarning):
             sm.step(model, data)
         sm.reset(model, data)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             with pytest.raises(EngineWarning):
                 sm.step(model, data)
             sm.get_state(model, data)  # a warning is no trouble

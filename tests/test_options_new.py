@@ -105,8 +105,7 @@ def test_load_takes_them_too(backend: str) -> None:
 def test_pybullet_says_which_frictions_it_cannot_have() -> None:
     """It multiplies the frictions of two links; MuJoCo takes the larger."""
     model = sm.load("so101/scene_box", backend="pybullet")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", EngineWarning)
+    with warnings.catch_warnings(action="error", category=EngineWarning):
         model.replace(friction=0.5)
         model.replace(kp=500)
     friction = np.full(model.ngeom, 0.1)

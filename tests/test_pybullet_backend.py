@@ -425,8 +425,7 @@ def test_a_contact_margin_is_told(tmp_path: Path) -> None:
     )
     with pytest.warns(EngineWarning, match=r"margin of 1 geoms \(the largest: 10 mm, skin\)"):
         sm.load(mjcf(tmp_path, text), backend="pybullet")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         sm.load(mjcf(tmp_path, text), backend="pybullet", contacts=False)
 
 

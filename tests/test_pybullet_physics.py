@@ -243,8 +243,7 @@ def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:
     assert "friction of b0 and b1 is" in text
     # Each of the six pairs has three frictions: the first three are named, the others counted.
     assert (text.count("friction of"), text.count(" more")) == (3, 1)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         sm.load("so101/scene_box", backend="pybullet")
 
 

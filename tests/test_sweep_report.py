@@ -33,7 +33,7 @@ from statemachine.sweep.folder import design_of, read_manifest
 from statemachine.sweep.request import MANIFEST_VERSION
 from statemachine.sweep.rows import DONE, FAILED, RowWriter, read_cells, schema_of
 
-from .conftest import assert_in, refused
+from .conftest import Cli, assert_in, one_line, refused
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
@@ -415,17 +415,15 @@ def test_an_axis_says_what_its_values_are_in() -> None:
     }  # fmt: skip
 
 
-def test_what_does_not_go_together_is_said(tmp_path: Path, capsys: Any) -> None:
-    folder = str(agreement(tmp_path / "s"))
-
-    def says(*words: str) -> str:
-        assert main(["sweep", *words]) == 2
-        return str(capsys.readouterr().err)
-
-    assert "goes with --report" in says("hold", "--out", folder, "--fit", "x")
-    assert "--report DIR" in says("hold")
-    assert "takes no folder" in says("hold", "--out", "there", "--report", folder)
-    assert "is no sweep" in says("--report", str(tmp_path))
+def test_what_does_not_go_together_is_said(tmp_path: Path, here: Cli) -> None:
+    folder = agreement(tmp_path / "s")
+    for words, says in (
+        (("hold", "--out", folder, "--fit", "x"), "goes with --report"),
+        (("hold",), "--report DIR"),
+        (("hold", "--out", "there", "--report", folder), "takes no folder"),
+        (("--report", tmp_path), "is no sweep"),
+    ):
+        one_line(here("sweep", *words), says)
     refused(
         (UnknownNameError, "parameter", lambda: of(Path(folder), fit=["z"])),
         (UnknownNameError, "quantity", lambda: of(Path(folder), quantity="touch")),

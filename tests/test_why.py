@@ -274,8 +274,7 @@ def test_a_cause_that_needs_another_comes_after_it() -> None:
 
 
 def quietly(name: str, **options: Any) -> Model:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", EngineWarning)
+    with warnings.catch_warnings(action="ignore", category=EngineWarning):
         return sm.load(name, backend="pybullet", **options)
 
 

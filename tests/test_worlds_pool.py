@@ -259,8 +259,7 @@ def test_engines_are_silent_and_warn_once(
             step(worlds, 2)
         assert len(told) == 1
         assert told[0].filename == __file__
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             step(worlds, 2)
     assert capfd.readouterr() == ("", "")
 
