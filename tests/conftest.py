@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import linecache
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Container, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -14,12 +17,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from statemachine import backends
+from statemachine import backends, load
 from statemachine.backends import backend_engine, backend_names
 from statemachine.cli import main
 from statemachine.errors import MissingEngineError
 from statemachine.installed import ENGINES, require
-from statemachine.interface import Data, Model, make_data, reset
+from statemachine.interface import Data, Model, make_data, reset, step
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import take
 
@@ -30,10 +33,11 @@ REQUIRED = set(filter(None, os.environ.get("STATEMACHINE_REQUIRE", "").split(","
 
 def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Code that was run in a folder by a Python of its own, which has this checkout."""
-    return subprocess.run(
-        [sys.executable, "-c", code],
+    return subprocess.run(  # from 3.12 on Python itself warns of a fork beside threads
+        [sys.executable, "-W", "ignore:This process:DeprecationWarning", "-c", code],
         capture_output=True,
         text=True,
+        timeout=120,
         cwd=folder,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         check=False,
@@ -48,6 +52,24 @@ def lives(pid: int) -> bool:
         return False
 
 
+def soon(so: Callable[[], object], seconds: float = 30.0) -> bool:
+    """Whether something is so within some seconds."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until and not so():
+        time.sleep(0.05)
+    return bool(so())
+
+
+def processes_with(part: object) -> list[int]:
+    """Processes in whose command line something stands."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if str(part).encode() in (entry / "cmdline").read_bytes():
+                found.append(int(entry.name))
+    return found
+
+
 def need_engine(name: str) -> None:
     """Skip without an engine, or fail where STATEMACHINE_REQUIRE names it."""
     try:
@@ -56,6 +78,82 @@ def need_engine(name: str) -> None:
         if name in REQUIRED:
             pytest.fail(f"STATEMACHINE_REQUIRE names {name}: {error}")
         pytest.skip(str(error))
+
+
+def assert_in(whole: Container[Any], *parts: object) -> None:
+    """All of these are in it; a failure lists those that are not."""
+    assert not [part for part in parts if part not in whole], f"not in {whole}"
+
+
+def assert_not_in(whole: Container[Any], *parts: object) -> None:
+    """None of these is in it; a failure lists those that are."""
+    assert not [part for part in parts if part in whole], f"in {whole}"
+
+
+def refused(
+    *cases: tuple[type[Exception] | tuple[type[Exception], ...], str, Callable[[], object]],
+) -> None:
+    """Every call raises its error, with a text in which its pattern is."""
+    for error, says, call in cases:
+        with pytest.raises(error, match=says or None):  # noqa: PT012
+            call()
+            pytest.fail(f"nothing was refused, where {error} was to say: {says}")
+
+
+@contextmanager
+def one_line_error(
+    error: type[Exception], *, match: str | None = None
+) -> Iterator[pytest.ExceptionInfo[Any]]:
+    """Something raises this error, and its text is one line."""
+    with pytest.raises(error, match=match) as caught:
+        yield caught
+    assert "\n" not in str(caught.value)
+
+
+def after(model: Model, nstep: int, keyframe: int | str | None = None) -> np.ndarray:
+    """qpos (nq,) after so many steps from the default state or from a keyframe."""
+    with opened(model, keyframe, nstep=nstep) as (_, data):
+        return data.qpos.copy()
+
+
+def runs_in_silence(code: str, folder: Path, printed: str = "") -> None:
+    """Code ends well in a Python of its own, and prints nothing but this."""
+    done = in_its_own_python(code, folder)
+    assert (done.returncode, done.stdout, done.stderr) == (0, printed, "")
+
+
+def raised_in_a_thread(use: Callable[[], object]) -> BaseException | None:
+    """What something raises in a thread of its own."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(use).exception()
+
+
+def interrupted_at(at: int, call: Callable[[], object], among: str) -> str:
+    """Ctrl-C before the at-th line of files of such a name: where that was, or "" if it ended."""
+    lines, place = iter(range(1, at + 1)), ""
+
+    def trace(frame: Any, event: str, _: object) -> Any:
+        nonlocal place
+        file, number = frame.f_code.co_filename, frame.f_lineno
+        if among not in file:
+            return None
+        # No signal is looked at between the end of a lock's block and its release.
+        counted = event == "line" and not linecache.getline(file, number).strip().startswith(
+            "with "
+        )
+        if counted and next(lines, at) == at and not place:
+            place = f"{frame.f_code.co_qualname}:{number}"
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    with suppress(KeyboardInterrupt):
+        try:
+            call()
+        finally:
+            sys.settrace(before)
+    return place
 
 
 Patch = Callable[[pytest.MonkeyPatch], None]
@@ -88,11 +186,20 @@ def written(file: Path, text: str) -> Path:
 
 
 @contextmanager
-def opened(model: Model, keyframe: int | str | None = None) -> Iterator[tuple[Model, Data]]:
-    """A Model and a Data of it, in a keyframe or in the default state."""
+def opened(
+    model: Model, keyframe: int | str | None = None, *, ctrl: Any = None, nstep: int = 0
+) -> Iterator[tuple[Model, Data]]:
+    """A Model and a Data of it, in a keyframe or in the default state, or some steps later.
+
+    `ctrl` is the command of those steps, and stays.
+    """
     with make_data(model) as data:
         if keyframe is not None:
             reset(model, data, keyframe)
+        if ctrl is not None:
+            data.ctrl[:] = ctrl
+        if nstep:
+            step(model, data, nstep)
         yield model, data
 
 
@@ -150,6 +257,19 @@ def backend(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
+def box(backend: str) -> Model:
+    """The arm with a box, on every backend."""
+    return load("so101/scene_box", backend=backend)
+
+
+@pytest.fixture
+def viser() -> None:
+    """Only where viser is; where a browser is required it must be."""
+    if "browser" not in REQUIRED:
+        pytest.importorskip("viser")
+
+
+@pytest.fixture
 def bullet() -> None:
     """Only where PyBullet is."""
     need_engine("pybullet")
@@ -185,6 +305,7 @@ def one_line(done: subprocess.CompletedProcess[str], says: str, code: int = 2) -
     """A command was refused, in one line that says why."""
     assert (done.returncode, done.stdout) == (code, ""), done.stderr
     (line,) = done.stderr.splitlines()
+    assert line.startswith("statemachine")
     assert says in line
 
 

@@ -283,8 +283,7 @@ def _asset(
 
 def hills(wave: float = 1.0, points: int = 9) -> str:
     """The arm above a height field instead of a floor."""
-    heights = np.abs(np.sin(wave * np.arange(points * points)))
-    text = " ".join(f"{each:.4f}" for each in heights)
+    text = " ".join(f"{each:.4f}" for each in np.abs(np.sin(wave * np.arange(points * points))))
     asset = (
         f'<asset><hfield name="h" nrow="{points}" ncol="{points}" size="2 2 0.05 0.1" '
         f'elevation="{text}"/></asset><worldbody>'

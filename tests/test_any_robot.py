@@ -27,7 +27,7 @@ from statemachine.runs import record_scenario
 from statemachine.runs.commands import hold_ctrl, is_servo
 from statemachine.runs.scenarios import SCENARIOS, fitting
 
-from .conftest import written
+from .conftest import Cli, assert_not_in, one_line, opened, refused, written
 
 # A slide with a servo whose gear is 2, a hinge with a motor of gear 3 that holds a load, and a
 # hinge that a velocity servo drives.
@@ -104,8 +104,7 @@ def test_a_pose_is_asked_of_servos_and_a_force_of_motors(model: Any) -> None:
     assert ctrl[0] == pytest.approx(0.2)
     with sm.make_data(robot) as data:
         sm.forward(robot, data)
-        load = float(data.qfrc_bias[1])
-        assert ctrl[1] == pytest.approx(load / 3, rel=1e-3)
+        assert ctrl[1] == pytest.approx(float(data.qfrc_bias[1]) / 3, rel=1e-3)
         data.ctrl[:] = ctrl
         sm.forward(robot, data)
         assert data.qacc[1] == pytest.approx(0, abs=1e-2)  # the motor holds the arm up
@@ -130,7 +129,7 @@ def test_a_force_is_never_read_as_a_place(model: Any) -> None:
     found, page, _ = lesson("hold", model(MIXED.format(rest="")), target=[0.4, 40, 0], seconds=0.5)
     assert found.joints == ("rail",)
     assert found.goal.tolist() == pytest.approx([0.2])  # of the joint: the gear is 2
-    table = next(b for b in page.blocks if isinstance(b, Table) and "joint" in b.headers)
+    (table,) = (b for b in page.blocks if isinstance(b, Table) and "joint" in b.headers)
     assert [row[1] for row in table.rows] == ["200.00 mm"]
 
 
@@ -157,24 +156,21 @@ def test_what_makes_no_sense_is_refused_with_what_does(model: Any) -> None:
     passive, still = model(PASSIVE, "passive.xml"), model(STILL, "still.xml")
     assert (fitting(passive), fitting(still)) == (("gravity", "fall"), ())
     without = r"no actuators.*makes sense.*: gravity, fall"
-    refused: list[tuple[Any, Any, sm.Model, str]] = [
+    wrong: list[tuple[Any, Any, sm.Model, str]] = [
         *((record_scenario, SCENARIOS[name], passive, without) for name in ("hold", "droop")),
         (record_scenario, SCENARIOS["waves"], passive, without),
         (record_scenario, SCENARIOS["box"], passive, "no SO-101 that holds a box"),
         (record_scenario, SCENARIOS["gravity"], still, r"no joints: nothing in it can move$"),
         (lesson, "questions", passive, "about the SO-101"),
     ]
-    for ask, name, robot, says in refused:
+    for ask, name, robot, says in wrong:
         with pytest.raises(errors.BadInputError, match=says):
             ask(name, robot)
 
 
-def test_the_command_says_it_in_a_line(model: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    file = str(model(PASSIVE).path)
-    assert main(["compare", "hold", "--model", file, "--backends", "mujoco", "mujoco"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "what makes sense on it: gravity, fall" in said
+def test_the_command_says_it_in_a_line(model: Any, here: Cli) -> None:
+    words = ("--model", model(PASSIVE).path, "--backends", "mujoco", "mujoco")
+    one_line(here("compare", "hold", *words), "what makes sense on it: gravity, fall")
 
 
 def test_sentences_are_true_of_the_robot(model: Any) -> None:
@@ -276,8 +272,7 @@ def test_a_value_is_in_the_range_of_its_joint(model: Any) -> None:
 def test_two_runs_of_what_does_not_move_agree(model: Any) -> None:
     held = model(PASSIVE.replace("axis=", "limited='true' range='0 1e-9' damping='1e9' axis="))
     still = held.replace(gravity=(0, 0, 0))
-    traces = [record_scenario(SCENARIOS["fall"], still, seconds=0.1) for _ in range(2)]
-    found = compare(*traces)
+    found = compare(*[record_scenario(SCENARIOS["fall"], still, seconds=0.1) for _ in range(2)])
     assert found.agrees
     assert all(each.tolerances() == 0 for each in found.agreements)
 
@@ -292,14 +287,12 @@ def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
     assert np.flatnonzero(np.isfinite(robot.actuator_gain)).tolist() == [5]
     assert robot.actuator_gear[5] == 3
     assert robot.actuator_forcerange[6].tolist() == [-7, 7]
-    with sm.make_data(robot) as data:
-        sm.reset(robot, data, keyframe="home")
+    with opened(robot, "home") as (_, data):
         data.ctrl[robot.actuator_id("m")] = 2.0
         sm.forward(robot, data)
         assert data.raw.actuator_force[-3] == 2.0  # its gain is 1
         sm.step(robot, data, 10)
-    trace = record_scenario(SCENARIOS["waves"], robot, seconds=0.05)
-    assert trace.header.actuators == names
+    assert record_scenario(SCENARIOS["waves"], robot, seconds=0.05).header.actuators == names
     assert main(["compare", "--models", str(robot.path), str(robot.path)]) == 0
 
 
@@ -308,9 +301,7 @@ def test_no_filler_of_ours_is_shown(model: Any, capsys: pytest.CaptureFixture[st
     file = str(model(MIXED.format(rest="").replace(' range="-1 1" limited="true"', "")).path)
     # The robots are the same; a motor whose ctrl has a range may differ in what it can exert.
     main(["compare", "--models", file, "--backends", "mujoco", "pybullet"])
-    said = capsys.readouterr().out
-    assert "e+09" not in said
-    assert "e+12" not in said
+    assert_not_in(capsys.readouterr().out, "e+09", "e+12")
 
 
 class _Registry(types.ModuleType):
@@ -357,15 +348,19 @@ def test_a_robot_by_name(menagerie_package: _Registry) -> None:
     assert models.resolve("menagerie:unitree_g1/g1") == folder / "g1.xml"
     assert models.resolve("menagerie:unitree_g1/g1", menagerie="elsewhere") == folder / "g1.xml"
     assert sm.load("menagerie:unitree_g1").joint_names == ("swing",)
-    with pytest.raises(errors.UnknownNameError, match="Did you mean 'unitree_g1'"):
-        models.resolve("menagerie:unitre_g1")
-    with pytest.raises(errors.UnknownNameError, match="scene, g1"):
-        models.resolve("menagerie:unitree_g1/nope")
+    refused(
+        (
+            errors.UnknownNameError,
+            "Did you mean 'unitree_g1'",
+            lambda: models.resolve("menagerie:unitre_g1"),
+        ),
+        (errors.UnknownNameError, "scene, g1", lambda: models.resolve("menagerie:unitree_g1/nope")),
+    )
 
 
-def test_a_robot_by_name_without_a_network(
-    menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def no_network(menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Nothing is here and nothing can be had; how long it was waited for, each time [s]."""
     menagerie_package.here = False
     asked: list[float] = []
 
@@ -374,9 +369,13 @@ def test_a_robot_by_name_without_a_network(
         raise urllib.error.URLError("Name or service not known")
 
     monkeypatch.setattr(robot_packages.urllib.request, "urlopen", urlopen)
+    return asked
+
+
+def test_a_robot_by_name_without_a_network(no_network: list[float]) -> None:
     with pytest.raises(errors.ModelFileError, match=r"could not be downloaded .*not known"):
         models.resolve("menagerie:unitree_g1")
-    assert asked == [5.0]  # and no further try
+    assert no_network == [5.0]  # and no further try
 
 
 @pytest.mark.parametrize(
@@ -393,27 +392,17 @@ def test_a_robot_by_name_without_a_network(
     ],
 )
 @pytest.mark.parametrize("command", ["lesson gravity", "compare hold", "trace record hold"])
+@pytest.mark.usefixtures("no_network")
 def test_a_robot_that_cannot_be_had_is_one_line(
-    menagerie_package: _Registry,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    here: Cli,
     command: str,
     name: str,
     code: int,
     said: str,
 ) -> None:
-    def urlopen(_request: Any, timeout: float) -> Any:
-        raise urllib.error.URLError("Name or service not known")
-
-    menagerie_package.here = False
-    monkeypatch.setattr(robot_packages.urllib.request, "urlopen", urlopen)
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
-    assert main([*command.split(), "--model", name]) == code
-    out, line = capsys.readouterr()
-    assert not out
-    assert line.startswith("statemachine: ")
-    assert said in line
-    assert line.count("\n") == 1
+    one_line(here(*command.split(), "--model", name), said, code)
 
 
 @pytest.mark.parametrize(
@@ -435,15 +424,14 @@ def test_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     vars(package).update(DESCRIPTIONS={"a_mj_description": None, "b_description": None})
     one = types.ModuleType("robot_descriptions.a_mj_description")
     vars(one).update(MJCF_PATH=str(tmp_path / "a.xml"), URDF_PATH="a.urdf")
-    two = types.ModuleType("robot_descriptions.b_description")
-    for module in (package, one, two):
+    for module in (package, one, types.ModuleType("robot_descriptions.b_description")):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     assert models.resolve("a_mj_description") == tmp_path / "a.xml"
     assert models.resolve("robot_descriptions:a_mj_description") == tmp_path / "a.xml"
-    with pytest.raises(errors.ModelFileError, match="neither MJCF nor URDF"):
-        models.resolve("b_description")
-    with pytest.raises(errors.UnknownNameError, match="a_mj_description"):
-        models.resolve("c_description")
+    refused(
+        (errors.ModelFileError, "neither MJCF nor URDF", lambda: models.resolve("b_description")),
+        (errors.UnknownNameError, "a_mj_description", lambda: models.resolve("c_description")),
+    )
 
 
 # Two links whose balls are 50 mm apart at the start and 200 mm thick: 150 mm of the one are in the

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tomllib
 
-from .conftest import ROOT
+from .conftest import ROOT, assert_in
 
 PACKAGE = ROOT / "statemachine"
 MAP = (ROOT / "docs" / "architecture.md").read_text("utf-8")
@@ -59,8 +59,9 @@ def test_the_glossary_tells_a_word_once() -> None:
     words = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", glossary, re.MULTILINE)[1:]
     assert len(words) == len(set(words)) >= 40
     field = "Model Data state derived stale ctrl servo keyframe scenario side gap tolerance verdict"
-    for word in [*field.split(), "touch", "witness", "capability", "emulated", "native", "trace"]:
-        assert word in words
+    assert_in(
+        words, *field.split(), "touch", "witness", "capability", "emulated", "native", "trace"
+    )
 
 
 def test_the_lines_of_the_rooms_are_counted() -> None:

@@ -62,8 +62,7 @@ def test_keyframe_0_holds_the_box() -> None:
     """While the arm moves: by both jaws, with less than a millimetre of slip."""
     model = sm.load("so101/scene_box")
     box, gripper = model.jnt_qposadr[model.joint_id("box")], model.body_id("gripper")
-    with sm.make_data(model) as data:
-        sm.reset(model, data, keyframe=0)
+    with opened(model, 0) as (_, data):
         assert data.time == 6.0
         data.ctrl[:2] += 0.4, -0.2
         places, counts = [], []

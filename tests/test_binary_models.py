@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine import cli
 from statemachine.backends import binary
 from statemachine.errors import EngineWarning, ModelError
 
-from .conftest import Cli, in_its_own_python, need_engine
+from .conftest import Cli, after, in_its_own_python, need_engine, one_line, one_line_error
 
 LOAD = "import statemachine as sm; print(sm.load('arm.mjb').nq)"
 
@@ -54,15 +53,9 @@ def _tampered(file: Path) -> None:
 def test_what_this_process_wrote_is_read(tmp_path: Path, cache: Path) -> None:
     plain = sm.load("so101/scene_box")
     file = _saved(tmp_path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         model = sm.load(file)
-    ends = []
-    for each in (plain, model):
-        with sm.make_data(each) as data:
-            sm.step(each, data, 20)
-            ends.append(data.qpos.tobytes())
-    assert ends[0] == ends[1]
+    assert np.array_equal(after(plain, 20), after(model, 20))
 
 
 def test_another_process_of_the_user_reads_it_too(tmp_path: Path, cache: Path) -> None:
@@ -75,9 +68,8 @@ def test_another_process_of_the_user_reads_it_too(tmp_path: Path, cache: Path) -
 @pytest.mark.parametrize("backend", ["mujoco", "pybullet"])
 def test_any_other_is_refused(strange: Path, backend: str) -> None:
     need_engine(backend)
-    with pytest.raises(ModelError, match="trust_binary=True") as caught:
+    with one_line_error(ModelError, match="trust_binary=True"):
         sm.load(strange, backend=backend)
-    assert "\n" not in str(caught.value)
 
 
 def test_one_that_was_ours_is_refused_once_a_byte_is_another(tmp_path: Path, cache: Path) -> None:
@@ -122,8 +114,7 @@ def test_a_cache_that_cannot_be_written_keeps_nobody_from_saving(
 def test_any_other_is_read_when_asked_and_said_once(strange: Path) -> None:
     with pytest.warns(EngineWarning, match="is trusted"):
         assert sm.load(strange, trust_binary=True).nq == 6
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         assert sm.load(strange).nq == 6  # the same bytes, by what works on that model
     strange.write_bytes(strange.read_bytes() + b"\0")
     with pytest.raises(ModelError, match="did not write"):
@@ -145,14 +136,13 @@ def test_a_broken_one_is_refused_though_it_is_trusted(tmp_path: Path, cache: Pat
 
 
 def test_commands_take_it_when_asked(
-    strange: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    strange: Path, here: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(binary.TRUST, "")
     words = ["audit", "--model", str(strange), "--steps", "2"]
-    assert cli.main(words) == 2
-    assert "--trust-binary" in capsys.readouterr().err
-    assert cli.main([*words, "--trust-binary"]) == 0
-    assert "is trusted" in capsys.readouterr().err
+    one_line(here(*words), "--trust-binary")
+    trusted = here(*words, "--trust-binary")
+    assert (trusted.returncode, "is trusted" in trusted.stderr) == (0, True), trusted.stderr
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ from statemachine.report import calls as words
 from statemachine.report import terminal
 from statemachine.report.as_json import dumps
 
-from .conftest import need_engine
+from .conftest import assert_in, need_engine
 
 # A little of everything: a keyframe in mid-contact, a write, both verbs, each kind of
 # derived array, a State, a variant of the model, two Data.
@@ -163,8 +163,7 @@ def test_every_call_is_recorded(engine: str) -> None:
 def is_a_look(frame: Any) -> bool:
     """Whether code is the recorder's own, or that with which an engine's room looks."""
     file = Path(frame.f_code.co_filename)
-    of_a_room = file.parts[-3::2] == ("engines", "calls.py")
-    return of_a_room or file == Path(calls.__file__)
+    return (file.parts[-3::2] == ("engines", "calls.py")) or file == Path(calls.__file__)
 
 
 def around(engine: str, run: Callable[[], object]) -> set[str]:
@@ -247,8 +246,7 @@ def test_everything_is_put_back(engine: str, ending: str) -> None:
     for owner, attributes in zip(owners(engine), before, strict=True):
         assert vars(owner).keys() == attributes.keys()
         assert all(vars(owner)[name] is value for name, value in attributes.items())
-    model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    assert isinstance(mujoco.MjData(model), mujoco.MjData)
+    assert isinstance(mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>")), mujoco.MjData)
     assert record(SHORT.format(engine=engine, code=""), engine).error is None  # and again
 
 
@@ -400,13 +398,15 @@ def test_the_still_copy_is_never_stepped() -> None:
 def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
     from statemachine.engines.pybullet import calls as watched
 
-    found = watched.client_of
-    assert found("stepSimulation", (7,), {}) == 7
-    assert found("stepSimulation", (), {}) == 0
-    assert found("anything", (1, 2), {"physicsClientId": 5}) == 5
-    assert found("anything", (1, 2), {}) is None
-    assert found("getJointStates", (1, [2], 9), {}) == 9
-    assert found("getJointStates", (1, [2]), {}) == 0
+    for function, given, named, client in (
+        ("stepSimulation", (7,), {}, 7),
+        ("stepSimulation", (), {}, 0),
+        ("anything", (1, 2), {"physicsClientId": 5}, 5),
+        ("anything", (1, 2), {}, None),
+        ("getJointStates", (1, [2], 9), {}, 9),
+        ("getJointStates", (1, [2]), {}, 0),
+    ):
+        assert watched.client_of(function, given, named) == client, function
     pb: Any = installed.require("pybullet")
     nowhere = pb.connect(pb.DIRECT)
     pb.disconnect(nowhere)
@@ -563,18 +563,19 @@ def test_a_page_shows_the_same_line_in_both_engines_words() -> None:
     code = "sm.forward(model, data)\ndata.qpos[1] = 0.8\nprint(data.qacc)\nsm.step(model, data, 7)"
     page, text = page_of("mujoco", "pybullet", code=code)
     assert max(map(len, text.splitlines())) <= 80
-    for words_ in ("pybullet: No call yet. All that is derived", "Changed: data.qpos[1], and"):
-        assert words_ in text
+    assert_in(text, "pybullet: No call yet. All that is derived", "Changed: data.qpos[1], and")
     assert "pybullet: No call. Nothing changed." not in text
-    assert 'backend="mujoco"' in text
-    assert 'backend="pybullet"' in text
+    assert_in(text, 'backend="mujoco"', 'backend="pybullet"')
     assert "import statemachine" not in text
     last = [block for block in page.blocks if isinstance(block, Table)][-1]
     assert ("  stepSimulation", "7") in [tuple(row[:2]) for row in last.rows]
     flat = " ".join(text.split())
-    assert "In this run it was never stepped." in flat
-    assert "In this run it was stepped once." in flat
-    assert "Its own step was never called there." in flat
+    assert_in(
+        flat,
+        "In this run it was never stepped.",
+        "In this run it was stepped once.",
+        "Its own step was never called there.",
+    )
 
 
 def test_a_page_says_why_the_run_ended() -> None:

@@ -33,7 +33,7 @@ from statemachine.report import gradescope
 from statemachine.report.classroom import page
 from statemachine.runs.whole import csv_text, replace_csv
 
-from .conftest import ROOT, Cli, written
+from .conftest import ROOT, Cli, assert_in, one_line, refused, written
 
 TEMPLATE = ROOT / "exercises" / "step_loop.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
@@ -90,10 +90,10 @@ def test_what_is_a_submission(folder: Path) -> None:
     assert found["dee"].refusal == "2 files in it have the functions: a.py, b.py"
     files = [folder / "eve.py", folder / "fay.py", folder / "eve.py"]
     assert [each.path for each in submissions(files)] == files[:2]
-    with pytest.raises(BadInputError, match="no file or folder"):
-        submissions([folder / "nobody"])
-    with pytest.raises(BadInputError, match="no Python files in"):
-        submissions([folder / "cy"])
+    refused(
+        (BadInputError, "no file or folder", lambda: submissions([folder / "nobody"])),
+        (BadInputError, "no Python files in", lambda: submissions([folder / "cy"])),
+    )
 
 
 def test_the_folder_of_one_student_is_no_class(tmp_path: Path, judged: list[str]) -> None:
@@ -235,8 +235,7 @@ def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path
         "state: ctrl was written; forward: …; replay: not written; "
         "please look at this: it reads a.txt"
     )
-    for text in texts:
-        assert text in row["details"]
+    assert_in(row["details"], *texts)
     replace_csv(tmp_path / "t.csv", rows_of([entry]))
     assert read(tmp_path / "t.csv") == {(entry.sha256, "mujoco"): entry}
 
@@ -258,11 +257,15 @@ def test_a_roster_gives_every_student_a_row(
         rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
         found = {row["student"]: row for row in rows if row["student"]}
         assert [row["student"] for row in rows[:4]] == ["Ann Smith", "Bo Lee", "Cy", "Zoë"]
-        assert found["Ann Smith"]["file"] == "ann"
-        assert found["Bo Lee"]["file"] == "Lee_Bo_41017_assignment.py"
-        assert found["Cy"]["remarks"] == "2 may be theirs: x_41018.py, x_again_41018.py"
-        assert found["Cy"]["right"] == ""
-        assert (found["Zoë"]["right"], found["Zoë"]["remarks"]) == ("0", "handed in nothing")
+        for name, column, says in (
+            ("Ann Smith", "file", "ann"),
+            ("Bo Lee", "file", "Lee_Bo_41017_assignment.py"),
+            ("Cy", "remarks", "2 may be theirs: x_41018.py, x_again_41018.py"),
+            ("Cy", "right", ""),
+            ("Zoë", "right", "0"),
+            ("Zoë", "remarks", "handed in nothing"),
+        ):
+            assert found[name][column] == says, name
         assert {row["file"] for row in rows[4:]} == {
             "bob", "cy", "dee", "eve.py", "fay.py", "x_41018.py", "x_again_41018.py",
         }  # fmt: skip
@@ -295,12 +298,14 @@ def test_tests_and_predictions_are_in_the_same_table(
     for _ in range(2):
         main(["check", str(folder), "--csv", str(table), "--tests"])
         rows = {r["file"]: r for r in csv.DictReader(table.read_text("utf-8-sig").splitlines())}
-        assert rows["ann"]["tests"] == "13 of 14; not xyzw"
-        assert rows["bob"]["tests"] == "test_x fails on the arm without a fault"
-        assert rows["cy"]["tests"] == "13 of 14; not xyzw"  # without the functions
-        assert rows["ann"]["predictions"] == "2 of 3"  # counted, whatever the score says
-        assert rows["bob"]["predictions"] == "lesson.json is no record of predictions"
-        assert rows["eve.py"]["tests"] == rows["eve.py"]["predictions"] == ""
+        for name, tests, predictions in (
+            ("ann", "13 of 14; not xyzw", "2 of 3"),  # counted, whatever the score says
+            ("bob", "test_x fails on the arm without a fault",
+             "lesson.json is no record of predictions"),
+            ("cy", "13 of 14; not xyzw", ""),  # without the functions
+            ("eve.py", "", ""),
+        ):  # fmt: skip
+            assert (rows[name]["tests"], rows[name]["predictions"]) == (tests, predictions), name
     assert [file.parent.name for file in ran].count("ann") == 1  # taken over from the table
 
 
@@ -385,8 +390,7 @@ def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> 
         table.write_bytes(content)
         assert again(time_limit=7.0) == []
     # A table that ended in the middle of a file is one with fewer rows.
-    rows = text.splitlines(keepends=True)
-    table.write_text("".join(rows[:2]))
+    table.write_text("".join(text.splitlines(keepends=True)[:2]))
     assert again()
     table.write_text("name,mark\nann,1\n")
     with pytest.raises(BadInputError, match="not the columns of a table of grades"):
@@ -474,15 +478,10 @@ def test_where_to_write_is_asked_before_anything_is_judged(
     target: str,
     says: str,
     judged: list[str],
-    capsys: pytest.CaptureFixture[str],
+    here: Cli,
 ) -> None:
     files = [str(SOLUTION)] if option == "--gradescope" else [str(SOLUTION), str(TEMPLATE)]
-    try:
-        code: object = main(["check", *files, option, target])
-    except SystemExit as refused:
-        code = refused.code
-    assert code == 2
-    assert says in capsys.readouterr().err
+    one_line(here("check", *files, option, target), says)
     assert judged == []
 
 
@@ -506,8 +505,6 @@ def test_one_file_for_gradescope(cli: Cli, tmp_path: Path) -> None:
         ([], "expected one of FILE and --mutants"),
     ],
 )
-def test_options_that_do_not_go_together(cli: Cli, arguments: list[str], says: str) -> None:
-    done = cli(
-        "check", *[str(ROOT / a) if a.startswith("exercises") else a for a in arguments], code=2
-    )
-    assert says in done.stderr
+def test_options_that_do_not_go_together(here: Cli, arguments: list[str], says: str) -> None:
+    words = [ROOT / word if word.startswith("exercises") else word for word in arguments]
+    one_line(here("check", *words), says)

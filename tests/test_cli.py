@@ -22,7 +22,7 @@ from rich.cells import cell_len
 from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import ROOT, Cli, need_engine, one_line, written
+from .conftest import ROOT, Cli, assert_in, assert_not_in, need_engine, one_line, written
 from .small_models import NAMED_PENDULUM, mjcf
 
 QUICK = {
@@ -47,8 +47,7 @@ def test_every_lesson_runs_and_reads_well_piped(cli: Cli, lesson: str, backend: 
     assert len(lines) > 8
     assert max(map(cell_len, lines)) <= 80
     assert all(line == line.rstrip() for line in lines)
-    assert "\x1b" not in done.stdout
-    assert "✗" not in done.stdout
+    assert_not_in(done.stdout, "\x1b", "✗")
     assert "nan" not in done.stdout.lower().split()
 
 
@@ -139,8 +138,7 @@ def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
 
 def test_fingertip_certificate(cli: Cli, pinocchio: None) -> None:
     found = _json(cli, "fingertip", "--poses", "300", "--seed", "3")["mujoco"]
-    assert found["poses"] == 300
-    assert found["provenance"]["seed"] == 3
+    assert (found["poses"], found["provenance"]["seed"]) == (300, 3)
     assert found["agrees"] is True
     assert found["position_worst"] <= 1e-12
     assert found["rotation_worst"] <= 1e-12
@@ -150,9 +148,7 @@ def test_fingertip_certificate(cli: Cli, pinocchio: None) -> None:
 def test_fingertip_of_other_models_and_frames(cli: Cli, pinocchio: None) -> None:
     assert cli("fingertip", "--site", "baseframe").returncode == 0
     scene = ("fingertip", "--model", "so101/scene_box")
-    page = cli(*scene, code=0)
-    assert "included files read in: 2" in page.stdout
-    assert "own reading" in page.stdout
+    assert_in(cli(*scene, code=0).stdout, "included files read in: 2", "own reading")
     assert cli(*scene, "--witness", "so101").returncode == 0
 
 
@@ -246,9 +242,7 @@ def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
 def test_every_mistake_is_one_clear_line(cli: Cli, arguments: tuple[str, ...], word: str) -> None:
     if arguments[0] == "fingertip":
         need_engine("pinocchio")
-    done = cli(*arguments)
-    one_line(done, word)
-    assert done.stderr.startswith("statemachine")
+    one_line(cli(*arguments), word)
 
 
 @pytest.mark.parametrize(
@@ -294,8 +288,7 @@ def test_the_doctor_knows_every_package_of_an_extra(cli: Cli) -> None:
     assert {each["name"]: sorted(each["extras"]) for each in told} == {
         package: sorted(extras) for package, extras in named.items()
     }
-    versions = {each["name"]: each["version"] for each in told}
-    assert versions["pytest"] == pytest.__version__
+    assert {each["name"]: each["version"] for each in told}["pytest"] == pytest.__version__
     assert f"pytest {pytest.__version__}" in " ".join(cli("doctor").stdout.split())
 
 
@@ -337,11 +330,9 @@ def test_gravity_of_a_slide_and_of_an_equality(cli: Cli, tmp_path: Path) -> None
     rest = "<equality><joint joint1='j'/></equality>"
     rest += "<actuator><position joint='j' kp='1'/></actuator>"
     file = _model(tmp_path, body, rest)
-    page = cli("lesson", "gravity", "--model", file, "--joint", "j")
+    page = cli("lesson", "gravity", "--model", file, "--joint", "j", code=0)
     assert re.search(r"held by +equality +equality", page.stdout)
-    assert "[N]" in page.stdout
-    assert "mm" in page.stdout
-    assert page.returncode == 0
+    assert_in(page.stdout, "[N]", "mm")
 
 
 def test_a_body_of_the_scene_is_not_taken_for_the_robot(cli: Cli) -> None:
@@ -354,8 +345,7 @@ def test_a_body_of_the_scene_is_not_taken_for_the_robot(cli: Cli) -> None:
 
 def test_hold_of_another_robot_reads_no_torque_as_an_angle(cli: Cli, tmp_path: Path) -> None:
     file = _model(tmp_path, NAMED_PENDULUM.format(""), "<actuator><motor joint='j'/></actuator>")
-    done = cli("lesson", "hold", "--model", file, code=2)
-    assert "statemachine compare hold --model" in done.stderr
+    one_line(cli("lesson", "hold", "--model", file), "statemachine compare hold --model")
 
 
 def test_ctrl_c_ends_a_long_run() -> None:
@@ -435,8 +425,7 @@ def test_each_refusal_of_a_model_is_one_line(
 def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path: Path) -> None:
     body = "<geom type='plane' size='1 1 1' friction='.1'/><body pos='0 0 1'><joint name='j'/>"
     body += "<geom size='.1' friction='.1'/><geom pos='1 0 0' size='.1' friction='.9'/></body>"
-    file = _model(tmp_path, body)
-    done = cli("lesson", "state", "--model", file, "--backend", "pybullet")
+    done = cli("lesson", "state", "--model", _model(tmp_path, body), "--backend", "pybullet")
     (line,) = done.stderr.splitlines()
     assert line.startswith("statemachine: PyBullet: friction of ")
     assert ".py" not in line

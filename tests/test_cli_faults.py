@@ -33,8 +33,7 @@ sys.exit(statemachine_sim.main())
 def test_ctrl_c_while_it_imports_ends_it_without_a_traceback(module: str) -> None:
     done = in_its_own_python(INTERRUPT.format(module=module), ROOT)
     assert done.returncode in (130, -2)  # a shell shows both as 130
-    assert done.stderr.strip() == ""
-    assert done.stdout == ""
+    assert (done.stdout, done.stderr.strip()) == ("", "")
 
 
 @pytest.mark.parametrize(
@@ -50,16 +49,13 @@ def test_what_no_command_expects_is_one_line(
     code: int,
     says: str,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    here: Cli,
 ) -> None:
     def fails(_options: object) -> int:
         raise error
 
     monkeypatch.setattr("statemachine.commands.doctor.run", fails)
-    assert command_line.main(["doctor"]) == code
-    said = capsys.readouterr().err
-    assert says in said
-    assert len(said.splitlines()) == 1
+    one_line(here("doctor"), says, code)
 
 
 def test_an_import_that_an_interrupt_broke_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,7 +27,7 @@ from statemachine.report import compare as report
 from statemachine.runs import record, write
 from statemachine.runs.controllers import function_scenario
 
-from .conftest import Cli, need_engine, one_line, written
+from .conftest import Cli, need_engine, one_line, one_line_error, written
 from .small_models import BENT, TWO_LINKS, TWO_SERVOS
 
 _FUNCTION = """
@@ -160,9 +160,8 @@ def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
     ],
 )
 def test_what_is_no_side_is_said_in_one_line(words: list[str], says: str) -> None:
-    with pytest.raises(StateMachineError, match=says) as caught:
+    with one_line_error(StateMachineError, match=says):
         parse_sides(words)
-    assert "\n" not in str(caught.value)
 
 
 # The four combinations.
@@ -222,8 +221,7 @@ def test_an_mjcf_against_its_own_urdf() -> None:
     root = Path(sm.__file__).parent.parent / "models"
     if not root.is_dir():
         pytest.skip("no checkout")
-    request = asked("fall", Side("so101"), Side(str(root / "so101" / "so101.urdf")))
-    run = run_sides(request)
+    run = run_sides(asked("fall", Side("so101"), Side(str(root / "so101" / "so101.urdf"))))
     names = {each.name for each in compare(run.left, run.right).agreements}
     assert {"shoulder_pan", "elbow_flex", "gripper", "energy"} <= names
     (line,) = run.unmatched
@@ -253,8 +251,7 @@ def test_permuted_joints_and_actuators_are_the_same_robot(files: Path) -> None:
 
 def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
     sides = Side(str(files / "arm.xml")), Side(str(files / "renamed.xml"))
-    names = {"shoulder": "Gelenk_1", "elbow": "Gelenk_2"}
-    for given in ({}, names):
+    for given in ({}, {"shoulder": "Gelenk_1", "elbow": "Gelenk_2"}):
         run, found = ran("hold", *sides, names=given)
         assert largest(found) == 0
         assert {"shoulder", "elbow"} <= {each.name for each in found.agreements}
@@ -385,9 +382,8 @@ def test_a_function_imports_what_lies_beside_it(files: Path) -> None:
 )
 def test_a_mistake_in_a_function_is_one_line_about_it(files: Path, name: str, says: str) -> None:
     arm = Side(str(files / "arm.xml"))
-    with pytest.raises(BadInputError, match=says) as caught:
+    with one_line_error(BadInputError, match=says):
         run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))
-    assert "\n" not in str(caught.value)
     with pytest.raises(BadInputError, match=r"no controller file.*Did you mean own.py"):
         function_scenario(str(files / "owm.py:hold"))
 
@@ -418,8 +414,7 @@ def test_feedback_that_makes_the_difference_and_a_machine_that_is_the_same(files
     closed, opened = compare(run.left, run.right), compare(run.left, run.played)
     assert not closed.agrees
     assert largest(opened) == 0
-    page = report.page(closed, run.left, run.right, run=run, played=opened)
-    assert not page.holds
+    assert not report.page(closed, run.left, run.right, run=run, played=opened).holds
 
 
 def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
@@ -547,8 +542,7 @@ def test_what_a_side_has_nothing_of_is_said_first_and_its_switch_shows_the_rest(
     assert found["missing"] == []
     assert [row["name"] for row in found["shares"]] == ["damping of swing"]
     assert found["explained"] == pytest.approx(1.0)
-    run = json.loads(cli(*words, *both).stdout)
-    assert run["commands"] == "the same"
+    assert json.loads(cli(*words, *both).stdout)["commands"] == "the same"
 
 
 def test_parts_that_cannot_be_given_are_one_clear_line(

@@ -418,8 +418,7 @@ def test_a_restore_that_loses_the_warm_start(mj: Any, monkeypatch: pytest.Monkey
 def test_an_engine_without_a_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Then positions and velocities are all that there is."""
     flag = '<option><flag warmstart="disable"/></option><worldbody>'
-    text = pile.MJCF.replace("<worldbody>", flag)
-    monkeypatch.setattr(pile, "MJCF", text)
+    monkeypatch.setattr(pile, "MJCF", pile.MJCF.replace("<worldbody>", flag))
     assert set(answers("future", "mujoco").values()) == {"exact"}
 
 
@@ -495,8 +494,7 @@ def test_a_cell_that_does_nothing_is_found_out(
     monkeypatch.setitem(cells, concept, dataclasses.replace(cells[concept], code="pass"))
     found = {call.concept: call for call in phrasebook.run([engine]).engines[engine]}
     assert not found[concept].works
-    page = report.calls_page(phrasebook.run([engine]))
-    assert not page.holds
+    assert not report.calls_page(phrasebook.run([engine])).holds
 
 
 # The command.
@@ -557,8 +555,7 @@ def _without(*names: str) -> str:
 def test_a_missing_engine_is_left_out(more: tuple[str, ...]) -> None:
     done = _in_a_process(_without("pybullet", "pinocchio"), "conventions", *more)
     assert done.returncode == 0, done.stderr
-    lines = done.stderr.splitlines()
-    assert [line.split()[1] for line in lines] == ["pybullet", "pinocchio"]
+    assert [line.split()[1] for line in done.stderr.splitlines()] == ["pybullet", "pinocchio"]
     assert "mujoco 4" in done.stdout
     assert not any(line.startswith(("pybullet", "pinocchio")) for line in done.stdout.splitlines())
 
@@ -575,9 +572,7 @@ def test_the_only_engine_is_missing(
     gone: tuple[str, ...], arguments: tuple[str, ...], lines: int
 ) -> None:
     done = _in_a_process(_without(*gone), "conventions", *arguments)
-    assert done.returncode == 3
-    assert len(done.stderr.splitlines()) == lines
-    assert done.stdout == ""
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (3, "", lines), done.stderr
 
 
 def test_a_call_that_fails_is_the_exit_code() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import random
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from statemachine.models import models_dir
 from statemachine.page import Verdict
 from statemachine.runs.provenance import provenance
 
-from .conftest import lesson_result, need_engine, opened, written
+from .conftest import around, lesson_result, opened, started, written
 from .small_models import BALL_AND_SLIDE, loaded, model_of
 
 
@@ -51,8 +52,7 @@ def test_forces_sum_with_the_bias_on_the_other_side() -> None:
 def test_gravity_is_read_at_the_moment_of_the_end() -> None:
     model = sm.load("so101/scene")
     found = lesson_result("gravity", model, seconds=1.0)
-    with sm.make_data(model) as data:
-        sm.step(model, data, 200)
+    with opened(model, nstep=200) as (_, data):
         sm.forward(model, data)
         assert found.servos_on.forces["actuator"] == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()
@@ -68,11 +68,9 @@ def test_gravity_is_read_at_the_moment_of_the_end() -> None:
 
 def test_hold_tracks_the_worst_joint_and_the_speed() -> None:
     found = lesson_result("hold", sm.load("so101/scene"), seconds=0.2)
-    gaps = np.abs(found.qpos - found.goal)
-    assert np.array_equal(found.error, gaps.max(axis=1))
+    assert np.array_equal(found.error, np.abs(found.qpos - found.goal).max(axis=1))
     assert np.abs(found.speed).max() > 1.0
-    step = (found.qpos[-1] - found.qpos[-2]) / 0.005
-    assert np.abs(found.speed - step).max() < 1e-9
+    assert np.abs(found.speed - ((found.qpos[-1] - found.qpos[-2]) / 0.005)).max() < 1e-9
 
 
 def test_hold_that_ends_at_the_first_touch_says_so() -> None:
@@ -86,10 +84,8 @@ def test_hold_that_ends_at_the_first_touch_says_so() -> None:
 def test_replay_compares_what_it_says() -> None:
     model = sm.load("so101/scene_box")
     found = lesson_result("replay", model, steps=30, **{"break": "late-ctrl"})
-    with sm.make_data(model) as one, sm.make_data(model) as two:
-        for data in (one, two):
-            sm.reset(model, data, keyframe=0)
-            data.time = 0.0
+    with started(model) as one, started(model) as two:
+        one.time = two.time = 0.0
         one.ctrl = found.ctrl
         for k in range(30):
             sm.step(model, one)
@@ -180,11 +176,22 @@ def test_state_of_every_type_of_joint(tmp_path: Path) -> None:
     assert joints["s"].type == "slide"
 
 
-class TestCertificate:
-    @pytest.fixture(autouse=True)
-    def _witness(self) -> None:
-        need_engine("pinocchio")
+def _off(
+    monkeypatch: pytest.MonkeyPatch, part: Callable[[np.ndarray, np.ndarray], np.ndarray]
+) -> None:
+    """A fault: what the engine says of a part of positions and rotations is a little off."""
 
+    @around(fingertip, "_engine_poses")
+    def wrong(right: Any, *arguments: object) -> fingertip.Placement:
+        pos, mat = right(*arguments)
+        part(pos, mat)[...] += 1e-9
+        return fingertip.Placement(pos, mat)
+
+    wrong(monkeypatch)
+
+
+@pytest.mark.usefixtures("pinocchio")
+class TestCertificate:
     def test_poses_are_drawn_within_the_limits_by_the_seed(self) -> None:
         model = sm.load("so101")
         ids = range(model.njnt)
@@ -205,14 +212,7 @@ class TestCertificate:
     def test_one_bad_pose_among_many_is_enough(
         self, monkeypatch: pytest.MonkeyPatch, what: str
     ) -> None:
-        right = fingertip._engine_poses
-
-        def wrong(*arguments: object) -> fingertip.Placement:
-            pos, mat = right(*arguments)  # pyright: ignore[reportArgumentType]
-            (pos if what == "position" else mat)[7] += 1e-9
-            return fingertip.Placement(pos, mat)
-
-        monkeypatch.setattr(fingertip, "_engine_poses", wrong)
+        _off(monkeypatch, lambda pos, mat: (pos if what == "position" else mat)[7])
         found = fingertip.certify(sm.load("so101"), poses=20)
         assert found.frames is not None
         assert found.frames.same
@@ -237,8 +237,7 @@ class TestCertificate:
         assert found.position_worst is None
 
     def test_a_witness_without_a_joint_that_moves_the_tip_is_refused(self, tmp_path: Path) -> None:
-        text = (models_dir() / "so101" / "so101.xml").read_text()
-        lines = text.splitlines()
+        lines = (models_dir() / "so101" / "so101.xml").read_text().splitlines()
         kept = [ln for ln in lines if "mesh" not in ln and 'joint name="wrist_roll"' not in ln]
         file = written(
             tmp_path / "other.xml", "\n".join(ln for ln in kept if 'joint="wrist_roll"' not in ln)
@@ -275,8 +274,7 @@ class TestCertificate:
         drawn = random_qpos(model, range(2), 500, 0)
         assert np.abs(drawn[:, 0]).max() == pytest.approx(np.pi, rel=0.01)
         assert np.abs(drawn[:, 1]).max() == pytest.approx(1, rel=0.01)  # a slide's metres
-        alone = fingertip.certify(model, poses=50, site="a")
-        assert [tip.site for tip in alone.tips] == ["a"]
+        assert [tip.site for tip in fingertip.certify(model, poses=50, site="a").tips] == ["a"]
         still = written(
             tmp_path / "still.xml", "<mujoco><worldbody><body name='b'/></worldbody></mujoco>"
         )
@@ -287,14 +285,7 @@ class TestCertificate:
     def test_one_tip_of_many_that_is_elsewhere_is_enough(
         self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     ) -> None:
-        right = fingertip._engine_poses
-
-        def wrong(*arguments: object) -> fingertip.Placement:
-            pos, mat = right(*arguments)  # pyright: ignore[reportArgumentType]
-            pos[7, 1] += 1e-9
-            return fingertip.Placement(pos, mat)
-
-        monkeypatch.setattr(fingertip, "_engine_poses", wrong)
+        _off(monkeypatch, lambda pos, _: pos[7, 1:2])
         found = fingertip.certify(model_of(tmp_path, self.ENDS.format("")), poses=20)
         assert not found.agrees
         assert found.site == "body 3"
@@ -314,13 +305,7 @@ class TestCertificate:
         assert "<flexcomp>" in found.reason
         shown = page({"mujoco": found})
         assert not any(isinstance(block, Verdict) for block in shown.blocks)
-        right = fingertip._engine_poses
-
-        def wrong(*arguments: object) -> fingertip.Placement:
-            pos, mat = right(*arguments)  # pyright: ignore[reportArgumentType]
-            return fingertip.Placement(pos + 1e-9, mat)
-
-        monkeypatch.setattr(fingertip, "_engine_poses", wrong)
+        _off(monkeypatch, lambda pos, _: pos)
         shown = page({"mujoco": fingertip.certify(sm.load(file), poses=20)})
         assert not shown.holds
         with pytest.raises(ModelError, match="<flexcomp>"):  # asked for, it is not replaced

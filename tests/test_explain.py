@@ -189,8 +189,7 @@ def said_otherwise(name: str) -> str:
 
 @pytest.mark.parametrize("name", SAME)
 def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
-    right = said_otherwise(name)
-    found = explained(tmp_path, ARM, right, scenario=HOME)
+    found = explained(tmp_path, ARM, said_otherwise(name), scenario=HOME)
     # The order of ctrl matters to who writes it by number.
     assert [each.name for each in found.shares] == (
         ["order of ctrl"] if name == "permuted actuators" else []
@@ -434,8 +433,7 @@ def test_each_figure_of_a_model_is_found_and_brought_over(model):
         new = ~old if old.dtype.kind == "b" else old + 1 if old.dtype.kind == "i" else old + 0.01
         right = left.with_compiled(edited(raw, [(name, (place,), new)]))
         (found,) = differences(raw, right.compiled, match_models(left, right))
-        back = edited(right.compiled, found.edits)
-        assert np.array_equal(getattr(back, name), array), name
+        assert np.array_equal(getattr(edited(right.compiled, found.edits), name), array), name
         tried += 1
     assert tried > 15
 
@@ -591,8 +589,7 @@ def test_what_is_easily_missed(name, tmp_path):
     ],
 )
 def test_a_mocap_body_and_a_cord_are_no_difference(change, tmp_path):
-    found = explained(tmp_path, LED, with_changes(LED, change), scenario=HOME_LEAVE)
-    assert not found.shares
+    assert not explained(tmp_path, LED, with_changes(LED, change), scenario=HOME_LEAVE).shares
 
 
 @pytest.mark.parametrize("held", [True, False])
@@ -660,8 +657,7 @@ def test_the_coefficient_of_a_fixed_tendon_is_brought_over(tmp_path):
 def test_a_site_with_another_name_is_found_by_its_place(tmp_path):
     drive = '<general name="push" site="tip" gear="0 0 0 0 1 0" gainprm="1"/></actuator>'
     left = ARM.replace("</actuator>", drive).replace('ctrl="0 0"', 'ctrl="0 0 0.1"')
-    right = left.replace('"tip"', '"end"')
-    found = explained(tmp_path, left, right, scenario=HOME)
+    found = explained(tmp_path, left, left.replace('"tip"', '"end"'), scenario=HOME)
     assert found.shares == ()
     assert found.is_rounding
 
@@ -715,8 +711,7 @@ def test_entries_of_every_case_bring_the_right_to_the_left(tmp_path):
     for name, case in ALONE.items():
         texts = (ARM, changed(ARM, case))
         left, right = (sm.load(write(tmp_path, f"{k}.xml", text)) for k, text in enumerate(texts))
-        pairs = match_models(left, right)
-        found = differences(left.compiled, right.compiled, pairs)
+        found = differences(left.compiled, right.compiled, match_models(left, right))
         parts = [part for each in found for part in entries(right.compiled, each)]
         ways = [
             edited(right.compiled, [edit for each in those for edit in each.edits])
@@ -740,5 +735,4 @@ def test_no_command_leaves_ctrl_as_it_is_on_both_sides(tmp_path):
         "ctrl of the start": pytest.approx(1.0)
     }
     nothing = ARM[: ARM.index("<keyframe>")] + "</mujoco>"  # it starts in the left's
-    left = right
-    assert explained(tmp_path, left, nothing, scenario=silent).is_rounding
+    assert explained(tmp_path, right, nothing, scenario=silent).is_rounding

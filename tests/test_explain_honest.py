@@ -13,6 +13,8 @@ import statemachine as sm
 from statemachine.cli import main
 from statemachine.runs import read, record, write
 
+from .conftest import Cli, one_line
+
 ARM = """
 <mujoco model="arm"><option integrator="implicitfast"/><worldbody>
 <body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="{damping}"/>
@@ -76,8 +78,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def file(folder: Path, name: str, **changed: str) -> str:
-    text = ARM.format(**{**USUAL, **changed})
-    (folder / name).write_text(text, encoding="utf-8")
+    (folder / name).write_text(ARM.format(**{**USUAL, **changed}), encoding="utf-8")
     return name
 
 
@@ -189,8 +190,7 @@ def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
         '<sensor><jointpos name="p" joint="j1"/>'
         '<framepos name="q" objtype="body" objname="a"/></sensor>'
     )
-    left = file(folder, "l.xml", sensor=sensor)
-    text = (folder / left).read_text(encoding="utf-8")
+    text = (folder / file(folder, "l.xml", sensor=sensor)).read_text(encoding="utf-8")
     for name, other in (("j1", "hinge"), ("a", "arm")):
         text = text.replace(f'"{name}"', f'"{other}"')
     (folder / "r.xml").write_text(text, encoding="utf-8")
@@ -198,10 +198,10 @@ def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
     assert sensors_of(match_models(one, two, {"j1": "hinge"})) == []
 
 
-def test_a_function_that_draws_without_a_seed_has_no_causes(folder: Path, capsys: Any) -> None:
+def test_a_function_that_draws_without_a_seed_has_no_causes(folder: Path, here: Cli) -> None:
     file(folder, "l.xml")
-    assert main(["compare", "f.py:drawn", "l.xml", "l.xml", "damping=0.5", "--why"]) == 2
-    assert "does not command the same twice" in capsys.readouterr().err
+    done = here("compare", "f.py:drawn", "l.xml", "l.xml", "damping=0.5", "--why")
+    one_line(done, "does not command the same twice")
 
 
 def test_forces_of_a_function_leave_no_open_loop(folder: Path, capsys: Any) -> None:

@@ -82,15 +82,16 @@ def test_a_raw_flag_switches_the_servos_off() -> None:
     """The course's own exercise: the student's way through the escape hatch works."""
     model = sm.load("so101/scene")
     model.raw.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    with sm.make_data(model) as data:
-        sm.step(model, data, 800)
+    with opened(model, nstep=800) as (_, data):
         assert f"{np.degrees(data.qpos[1]):.2f}" == "23.92"
 
 
 def test_without_the_floor_the_arm_goes_on_to_its_stop() -> None:
     """What catches the falling arm is the floor."""
-    with opened(sm.load("so101/scene").replace(actuation=False, contacts=False)) as (model, data):
-        sm.step(model, data, 2000)
+    with opened(sm.load("so101/scene").replace(actuation=False, contacts=False), nstep=2000) as (
+        _,
+        data,
+    ):
         assert np.degrees(data.qpos[1]) == pytest.approx(100, abs=0.5)
 
 
@@ -114,8 +115,7 @@ def test_without_a_range_an_infinite_ctrl_is_refused(
 @pytest.mark.usefixtures("bullet")
 def test_pybullet_as_it_comes_refuses_an_infinite_ctrl() -> None:
     model = sm.load("so101", backend="pybullet", defaults="engine")
-    note = model.capabilities.behaviours["position servo"].note
-    assert "infinite ctrl is refused" in note
+    assert "infinite ctrl is refused" in model.capabilities.behaviours["position servo"].note
     with sm.make_data(model) as data:
         data.ctrl[1] = np.inf
         for verb in (sm.forward, sm.get_state, sm.step):
@@ -127,9 +127,8 @@ def test_pybullet_as_it_comes_refuses_an_infinite_ctrl() -> None:
 def test_an_infinite_ctrl_is_clamped_on_its_way_and_in_many_worlds(
     backend: str, latency: float
 ) -> None:
-    model = sm.load("so101", backend=backend).replace(latency=latency)
     with (
-        sm.make_data(model) as data,
+        opened(sm.load("so101", backend=backend).replace(latency=latency)) as (model, data),
         sm.make_data(model) as at_end,
         worlds.make_worlds(model, 2) as two,
     ):

@@ -39,8 +39,7 @@ def band_of(run: Rerun, name: str, two: Trace | None = None, **how: Any) -> Floo
 
 
 def test_a_damped_pendulum_that_hangs_has_a_floor_at_rounding(tmp_path: Path) -> None:
-    run = rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([0.3]))
-    band = band_of(run, "swing")
+    band = band_of(rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([0.3])), "swing")
     assert 0 < band.most < 5 * ROUNDING
     assert band.end < band.most
 
@@ -54,8 +53,7 @@ def test_the_floor_of_a_double_pendulum_grows(tmp_path: Path) -> None:
 
 def test_the_floor_of_a_box_that_lands_on_an_edge_grows_with_the_impact(tmp_path: Path) -> None:
     tilt = np.array([0.0, 0.0, 0.4, np.cos(0.6), np.sin(0.6) * 0.8, np.sin(0.6) * 0.6, 0.0])
-    run = rerun(model_of(tmp_path, TILTED_BOX), 1.0, qpos=tilt)
-    band = band_of(run, "box, rotation")
+    band = band_of(rerun(model_of(tmp_path, TILTED_BOX), 1.0, qpos=tilt), "box, rotation")
     before = band.width[:75]  # 0.15 s
     assert band.most > 20 * before.max()
 
@@ -107,8 +105,7 @@ def test_the_band_is_wide_about_a_moment_and_forgets_it_later(tmp_path: Path) ->
 
 def test_quaternions_of_perturbed_starts_stay_unit(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, TILTED_BOX), 0.01)
-    size = Uncertainty(1e-4, 0.01)
-    for trace in perturbed_runs(run, uncertain=size, derive=False):
+    for trace in perturbed_runs(run, uncertain=Uncertainty(1e-4, 0.01), derive=False):
         start = trace.qpos[0]
         assert np.linalg.norm(start[3:]) == pytest.approx(1.0, abs=1e-15)
         assert 2 * np.arccos(start[3]) == pytest.approx(0.01, rel=1e-6)
@@ -126,8 +123,7 @@ def test_a_seed_gives_the_same_runs_again_and_another_gives_others(tmp_path: Pat
 
 
 def test_a_command_that_stays_as_it_is_does_not_wander() -> None:
-    model = sm.load("so101")
-    run = Rerun(model, lambda _: lambda _time, data: None, 0.1)
+    run = Rerun(sm.load("so101"), lambda _: lambda _time, data: None, 0.1)
     for trace in perturbed_runs(run, runs=1, derive=False):
         assert (trace.ctrl == trace.ctrl[0]).all()
         assert 0 < np.abs(trace.ctrl[0]).max() <= ROUNDING
@@ -160,8 +156,7 @@ def test_uncertainties_are_read_in_their_units() -> None:
 @pytest.mark.usefixtures("bullet")
 def test_the_command_line_shows_the_floor(cli: Cli) -> None:
     asked = ("compare", "hold", "--seconds", "0.4")
-    told = json.loads(cli(*asked, "--json").stdout)["floor"]
-    assert told["runs"] == 4
+    assert json.loads(cli(*asked, "--json").stdout)["floor"]["runs"] == 4
     assert "chaos" not in cli(*asked, "--no-chaos").stdout
 
 

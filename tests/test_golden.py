@@ -57,8 +57,7 @@ def test_fingertip_by_the_witness(golden: Golden, pinocchio: None) -> None:
 
 
 def test_servos_on(golden: Golden) -> None:
-    expected = _angles(golden("golden_gravity_on"))
-    assert np.abs(_run((0.0,) * 6, 800) - expected).max() < 1e-6
+    assert np.abs(_run((0.0,) * 6, 800) - _angles(golden("golden_gravity_on"))).max() < 1e-6
 
 
 def test_servos_off(golden: Golden) -> None:

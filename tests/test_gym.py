@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
-from gymnasium.utils.env_checker import check_env
+from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.vector import AutoresetMode
 
 import statemachine as sm
@@ -27,7 +27,7 @@ from statemachine.gym.tasks import TASKS, HeldBox, Reach
 from statemachine.gym.vector import ArmVectorEnv
 from statemachine.rendering import renderer_here
 
-from .conftest import ROOT, in_its_own_python
+from .conftest import ROOT, refused, runs_in_silence
 
 IDS = [task.id for task in TASKS.values()]
 REACH, HELD_BOX = IDS
@@ -40,27 +40,6 @@ def _make(task: str, backend: str, **options: Any) -> Any:
 
 def _make_vec(task: str, backend: str, num_envs: int, **options: Any) -> Any:
     return gymnasium.make_vec(task, num_envs=num_envs, backend=backend, **options)
-
-
-def _same(one: Any, two: Any) -> None:
-    """The same types, shapes and bits, all the way down."""
-    assert type(one) is type(two)
-    if isinstance(one, dict):
-        assert one.keys() == two.keys()
-        for key in one:
-            _same(one[key], two[key])
-    elif isinstance(one, tuple):
-        for each, other in zip(one, two, strict=True):
-            _same(each, other)
-    elif isinstance(one, np.ndarray):
-        assert (one.dtype, one.shape) == (two.dtype, two.shape)
-        if one.dtype == object:
-            for each, other in zip(one, two, strict=True):
-                _same(each, other)
-        else:
-            assert one.tobytes() == two.tobytes()
-    else:
-        assert one == two
 
 
 @pytest.mark.parametrize("task", IDS)
@@ -93,8 +72,7 @@ def test_the_target_is_in_the_picture(task: str) -> None:
     renderer_here()
     with closing(_make_vec(task, "mujoco", 2, render_mode="rgb_array")) as envs:
         seen, _ = envs.reset(seed=1)
-        targets = seen[:, -6:-3]
-        for picture, target in zip(envs.render(), targets, strict=True):
+        for picture, target in zip(envs.render(), seen[:, -6:-3], strict=True):
             x, y = CAMERA.seen(target[None], SIZE[0] / SIZE[1])[0]
             column, row = np.round((np.array([x, -y]) + 1) / 2 * SIZE - 0.5).astype(int)
             red, green, blue = np.moveaxis(picture.astype(int), -1, 0)
@@ -156,8 +134,7 @@ def test_the_box_is_held_by_the_action_0_and_dropped_by_open_jaws(backend: str) 
         env.reset(seed=0)
         for _ in range(40):
             _, reward, terminated, truncated, info = env.step(np.zeros(6, dtype=np.float32))
-            assert not terminated
-            assert not truncated
+            assert (terminated, truncated) == (False, False)
             assert reward == 1 - info["distance"]
         steps, terminated, reward, info = 0, False, 0.0, {}
         while not terminated:
@@ -194,22 +171,22 @@ def _against_single(task: str, backend: str, mode: AutoresetMode, workers: int, 
     assert ours.observation_space == theirs.observation_space
     assert ours.action_space == theirs.action_space
     with closing(ours), closing(theirs):
-        _same(ours.reset(seed=3), theirs.reset(seed=3))
+        assert data_equivalence(ours.reset(seed=3), theirs.reset(seed=3), exact=True)
         ours.action_space.seed(0)
         ended = 0
         for _ in range(steps):
             actions = ours.action_space.sample()
             one, two = ours.step(actions), theirs.step(actions)
-            _same(one, two)
+            assert data_equivalence(one, two, exact=True)
             over = one[2] | one[3]
             ended += int(over.sum())
             if mode is AutoresetMode.DISABLED and over.any():
                 again = [each.reset(seed=[7, None, 2], options={"reset_mask": over.copy()})
                          for each in (ours, theirs)]  # fmt: skip
-                _same(*again)
+                assert data_equivalence(*again, exact=True)
         seeds: Any = ours.np_random_seed
         assert tuple(seeds) == theirs.np_random_seed
-        _same(ours.reset(), theirs.reset())
+        assert data_equivalence(ours.reset(), theirs.reset(), exact=True)
     return ended
 
 
@@ -353,15 +330,16 @@ def test_faults_are_one_clear_line(backend: str) -> None:
         # The engine never saw it: the next step is as if nothing had been.
         assert np.array_equal((env.data if each is env else envs.worlds).ctrl, before)
         assert np.isfinite(each.step(action)[0]).all()
-    with pytest.raises(BadInputError, match="seed wants 2 seeds"):
-        envs.reset(seed=[1, 2, 3])
-    with pytest.raises(BadInputError, match="reset_mask wants 2 bools"):
-        envs.reset(options={"reset_mask": np.array([False, False])})
-    for each in (env, envs):
-        each.close()
-        each.close()
-    with pytest.raises(ClosedDataError):
-        env.step(still)
+    refused(
+        (BadInputError, "seed wants 2 seeds", lambda: envs.reset(seed=[1, 2, 3])),
+        (
+            BadInputError,
+            "reset_mask wants 2 bools",
+            lambda: envs.reset(options={"reset_mask": np.array([False, False])}),
+        ),
+    )
+    env.close()
+    envs.close()
 
 
 def test_an_ended_world_must_be_reset_where_nobody_else_does() -> None:
@@ -381,10 +359,8 @@ def test_without_gymnasium_the_extra_is_named() -> None:
         "try:\n    import statemachine.gym\n"
         "except ImportError as error:\n    print(type(error).__name__, error)\n"
     )
-    done = in_its_own_python(code, ROOT)
-    assert done.stdout.strip() == (
-        "MissingEngineError the tasks need Gymnasium: pip install 'statemachine-sim[gym]'"
-    )
+    needs = "the tasks need Gymnasium: pip install 'statemachine-sim[gym]'"
+    runs_in_silence(code, ROOT, f"MissingEngineError {needs}\n")
 
 
 def test_what_is_closed_says_so_and_starts_nothing() -> None:
@@ -394,6 +370,7 @@ def test_what_is_closed_says_so_and_starts_nothing() -> None:
     for each, actions in ((env, np.zeros(6)), (envs, np.zeros((1, 6)))):
         each.reset(seed=0)
         each.close()
+        each.close()  # twice is as good as once
         for use in (each.render, lambda each=each, actions=actions: each.step(actions)):
             with pytest.raises(ClosedDataError, match="closed: make"):
                 use()

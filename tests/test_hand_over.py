@@ -18,7 +18,7 @@ from statemachine.errors import BusyDataError
 from statemachine.interface import data as data_module
 from statemachine.interface import turns, verbs
 
-from .conftest import ROOT, in_its_own_python
+from .conftest import ROOT, runs_in_silence
 
 USES: dict[str, Callable[[sm.Model, sm.Data], object]] = {
     "step": lambda model, data: verbs.step(model, data),
@@ -159,15 +159,10 @@ def test_a_wrong_hand_over_is_found(line: str, monkeypatch: pytest.MonkeyPatch) 
     assert _doubles("contacts", monkeypatch) > 0
 
 
-def _ends_well(code: str) -> None:
-    """Run code in a Python of its own, which a wrong hand-over may end with a signal."""
-    done = in_its_own_python(code, ROOT)
-    assert done.returncode == 0, (done.stdout + done.stderr)[-500:]
-
-
 def test_threads_that_take_turns_all_the_time_are_never_inside_together() -> None:
     """Four threads use one Data, and Python changes between them whenever it may."""
-    _ends_well("""
+    runs_in_silence(
+        """
 import sys, threading, time
 import statemachine as sm
 from tests.test_hand_over import USES
@@ -203,16 +198,19 @@ for thread in threads:
     thread.start()
 for thread in threads:
     thread.join()
-print(len(entered), len(refused), failed)
 assert hasattr(data._turn, "free")
-raise SystemExit(bool(failed) or len(entered) < 2 or len(refused) < 100)
-""")
+assert not failed, failed
+assert len(entered) >= 2 and len(refused) >= 100, (len(entered), len(refused))
+""",
+        ROOT,
+    )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_an_interrupt_leaves_nothing_taken() -> None:
     """Ctrl-C, thousands of times at moments that nobody chose: another thread goes on."""
-    _ends_well("""
+    runs_in_silence(
+        """
 import random, signal, threading, time
 import statemachine as sm
 from tests.test_hand_over import USES
@@ -254,6 +252,7 @@ while time.time() < end:
         assert not failed, failed
     if data._trouble:
         sm.reset(model, data)
-print(interrupts)
-raise SystemExit(interrupts < 200)
-""")
+assert interrupts >= 200, interrupts
+""",
+        ROOT,
+    )

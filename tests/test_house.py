@@ -96,8 +96,7 @@ def test_what_names_an_engine_is_seen() -> None:
 
 def test_no_module_imports_itself_by_way_of_others() -> None:
     """Inside functions and for type checking included."""
-    grimp = pytest.importorskip("grimp")
-    graph = grimp.build_graph(PACKAGE.name)
+    graph = pytest.importorskip("grimp").build_graph(PACKAGE.name)
     imported = {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
     assert sum(map(len, imported.values())) > len(imported)  # it does read imports
     TopologicalSorter(imported).prepare()

@@ -50,8 +50,7 @@ def test_zero_is_below_every_power_of_ten() -> None:
 
 def test_small_is_not_zero() -> None:
     """A thousandth of the tolerance and what is less is at one level, above zero."""
-    axes = axes_of(VALUES, sides=True, tolerance=1.0)
-    drawn = axes.lines[0].get_ydata()
+    drawn = axes_of(VALUES, sides=True, tolerance=1.0).lines[0].get_ydata()
     drawn = drawn[np.isfinite(drawn)]
     assert set(drawn[drawn < 1e-3 * 0.999]) == {0.0}
     assert (drawn == 0).sum() == ZERO.sum()
@@ -79,8 +78,7 @@ def test_no_line_joins_zero_to_what_is_not() -> None:
 
 
 def test_the_floor_is_an_area_where_it_is_high_enough() -> None:
-    floor = np.where(TIME < 0.5, 1e-20, 1e-2)
-    axes = axes_of(VALUES + 1e-9, floor=(TIME, floor))
+    axes = axes_of(VALUES + 1e-9, floor=(TIME, np.where(TIME < 0.5, 1e-20, 1e-2)))
     (area,) = axes.collections
     points = np.concatenate([path.vertices for path in area.get_paths()])
     assert points[:, 0].min() == pytest.approx(0.5)

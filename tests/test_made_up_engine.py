@@ -18,7 +18,7 @@ from statemachine import backends, engines
 from statemachine.cli import main
 from statemachine.installed import ENGINES
 
-from .conftest import ROOT
+from .conftest import ROOT, assert_in
 
 NAME = "hidden"
 ON = ("--backend", NAME)
@@ -181,8 +181,9 @@ def test_its_traces_are_drawn(capsys: Output) -> None:
 @pytest.mark.usefixtures("engine")
 def test_it_is_audited_through_the_interface(capsys: Output) -> None:
     text = said(capsys, "audit", *ON, "--steps", "3")
-    assert f"{NAME} itself, by its own functions, was not asked." in text
-    assert "this interface on hidden" in text
+    assert_in(
+        text, f"{NAME} itself, by its own functions, was not asked.", "this interface on hidden"
+    )
 
 
 @pytest.mark.slow
@@ -202,10 +203,8 @@ def test_what_it_takes_for_granted_is_not_asked(capsys: Output, words: tuple[str
 @pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_exercises_are_judged_on_it(capsys: Output) -> None:
-    file = str(ROOT / "exercises" / "step_loop.py")
-    text = said(capsys, "check", file, *ON, code=SAYS_NO)
-    assert f"step_loop.py on {NAME}" in text
-    assert "4 not written yet" in text
+    text = said(capsys, "check", str(ROOT / "exercises" / "step_loop.py"), *ON, code=SAYS_NO)
+    assert_in(text, f"step_loop.py on {NAME}", "4 not written yet")
 
 
 @pytest.mark.usefixtures("engine")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import threading
 import warnings
 from collections.abc import Iterator
@@ -18,7 +16,7 @@ import statemachine as sm
 from statemachine.backends import _mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
-from .conftest import ROOT, opened
+from .conftest import ROOT, opened, runs_in_silence
 from .small_models import SLIDE, TWO_SLIDES, crowded, model_of
 
 
@@ -47,8 +45,7 @@ def test_a_divergence_is_noticed_whoever_set_the_handler(
     monkeypatch.chdir(tmp_path)  # where MuJoCo writes its log if nobody listens
     model = sm.load("so101/scene")
     heard: list[str] = []
-    with sm.make_data(model) as data:
-        sm.step(model, data, 10)
+    with opened(model, nstep=10) as (_, data):
         mujoco.set_mju_user_warning(heard.append if handler == "a function" else None)
         data.ctrl[2], before = np.nan, data.time
         with pytest.raises(BadInputError, match="elbow_flex") as caught:
@@ -68,8 +65,7 @@ def test_a_divergence_is_noticed_whoever_set_the_handler(
 def test_the_handler_of_somebody_else_hears_all() -> None:
     heard: list[str] = []
     mujoco.set_mju_user_warning(heard.append)
-    model = sm.load("so101/scene")
-    with sm.make_data(model) as data, sm.make_data(model) as other:
+    with opened(sm.load("so101/scene")) as (model, data), sm.make_data(model) as other:
         _step_raw_to_nan()
         assert len(heard) == 1
         data.qpos[0] = np.nan
@@ -102,10 +98,7 @@ mujoco.set_mju_user_warning(print)
 del data
 assert mujoco.get_mju_user_warning() is print
 """
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    runs_in_silence(code, ROOT)
 
 
 def test_handlers_that_are_saved_and_restored_pile_up_nothing() -> None:
@@ -120,9 +113,7 @@ def test_handlers_that_are_saved_and_restored_pile_up_nothing() -> None:
 
 
 def test_a_warning_of_a_raw_simulation_does_not_come_out_of_our_step() -> None:
-    model = sm.load("so101/scene")
-    with sm.make_data(model) as data, warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with opened(sm.load("so101/scene")) as (model, data), warnings.catch_warnings(action="error"):
         _step_raw_to_nan()
         sm.step(model, data)
         sm.forward(model, data)
@@ -152,9 +143,7 @@ def test_three_threads_that_diverge_at_once_each_hear_of_their_own() -> None:
     def diverge(name: str) -> None:
         start.wait()
         for k in range(150):
-            with sm.make_data(model) as data:
-                sm.reset(model, data, 0)
-                sm.step(model, data)
+            with opened(model, 0, nstep=1) as (_, data):
                 getattr(data, name)[k % 6] = np.nan
                 try:
                     sm.step(model, data, 2)
@@ -178,24 +167,21 @@ def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) 
         with pytest.warns(EngineWarning, match="memory|full|buffer") as given:
             sm.step(model, data, 2)
         assert {warning.filename for warning in given} == {__file__}
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             sm.step(model, data)  # it was said
             sm.step(calm, other)
         sm.reset(model, data)
         with pytest.warns(EngineWarning):
             sm.step(model, data)
         sm.reset(model, data)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             with pytest.raises(EngineWarning):
                 sm.step(model, data)
             sm.get_state(model, data)  # a warning is no trouble
 
 
 def test_forward_warns_too(tmp_path: Path) -> None:
-    model = crowded(tmp_path, 18, "300K")
-    with sm.make_data(model) as data, pytest.warns(EngineWarning):
+    with opened(crowded(tmp_path, 18, "300K")) as (model, data), pytest.warns(EngineWarning):
         sm.forward(model, data)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import mujoco
@@ -20,7 +18,7 @@ from statemachine.errors import (
     UnknownNameError,
 )
 
-from .conftest import ROOT, opened, started
+from .conftest import ROOT, after, in_its_own_python, opened
 from .small_models import GEOM, loaded
 
 
@@ -46,8 +44,7 @@ def test_substeps_and_timestep_compose_in_any_order() -> None:
     for each in (one, two, model.replace(timestep=0.01, substeps=5)):
         assert (each.timestep, each.substeps) == (0.01, 5)
         assert each.raw.opt.timestep == pytest.approx(0.002)
-        with sm.make_data(each) as data:
-            sm.step(each, data, 3)
+        with opened(each, nstep=3) as (_, data):
             assert data.time == pytest.approx(0.03)
     assert one.replace(gravity=[0, 0, 0]).substeps == 5
 
@@ -79,12 +76,7 @@ def test_a_replaced_model_is_what_a_file_would_have_given(tmp_path: Path) -> Non
     body = f"<body><joint name='j' type='slide' axis='0 0 1' armature='{{}}'/>{GEOM}</body>"
     light = loaded(tmp_path, body.format("0"), name="a.xml").replace(armature=2.0)
     heavy = loaded(tmp_path, body.format("2"), name="b.xml")
-    ends = []
-    for model in (light, heavy):
-        with sm.make_data(model) as data:
-            sm.step(model, data, 50)
-            ends.append(data.qpos.copy())
-    assert np.array_equal(*ends)
+    assert np.array_equal(after(light, 50), after(heavy, 50))
 
 
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
@@ -108,8 +100,7 @@ def test_parts_of_the_constraint_force_add_up(
         "<joint joint='a' coef='1'/><joint joint='b' coef='1'/></fixed></tendon>"
         "<equality><joint joint1='b' polycoef='0.1 0 0 0 0'/></equality>",
     )
-    with sm.make_data(model) as data:
-        sm.step(model, data, 60)
+    with opened(model, nstep=60) as (_, data):
         sm.forward(model, data)
         parts = {
             n: getattr(data, f"qfrc_{n}") for n in ("contact", "friction", "limit", "equality")
@@ -119,9 +110,7 @@ def test_parts_of_the_constraint_force_add_up(
 
 
 def test_contact_forces_are_the_engines(tmp_path: Path) -> None:
-    model = sm.load("so101/scene_box")
-    with started(model) as data:
-        sm.step(model, data, 10)
+    with opened(sm.load("so101/scene_box"), 0, nstep=10) as (model, data):
         contacts, wrench = data.contacts, np.zeros(6)
         assert len(contacts) == data.raw.ncon > 0
         assert contacts.torque.any()
@@ -134,8 +123,10 @@ def test_contact_forces_are_the_engines(tmp_path: Path) -> None:
 
 
 def test_a_zero_quaternion_of_a_ball_joint_is_refused(tmp_path: Path) -> None:
-    model = loaded(tmp_path, f"<body><joint name='b' type='ball'/>{GEOM}</body>")
-    with sm.make_data(model) as data:
+    with opened(loaded(tmp_path, f"<body><joint name='b' type='ball'/>{GEOM}</body>")) as (
+        model,
+        data,
+    ):
         data.qpos[:] = (0.5, -0.5, 0.5, -0.5)  # adds up to zero, and is a rotation
         sm.step(model, data)
         data.qpos[:] = -0.0
@@ -159,8 +150,7 @@ def test_bad_entries_are_called_by_their_joint() -> None:
 
 
 def test_closing_gives_the_memory_back_and_keeps_the_last_values() -> None:
-    model = sm.load("so101")
-    data = sm.make_data(model)
+    data = sm.make_data(sm.load("so101"))
     view = data.qpos
     data.qpos[1] = 0.25
     data.close()
@@ -255,9 +245,7 @@ try:
 except (KeyboardInterrupt, sm.errors.DivergedError) as error:
     print("caught", type(error).__name__)
 """
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
-    )
+    done = in_its_own_python(code, ROOT)
     assert "caught" in done.stdout, done.stderr
     assert done.returncode in (0, 1, 130, -2)
 
@@ -282,14 +270,9 @@ def test_an_option_overrules_a_flag_of_the_file(tmp_path: Path) -> None:
     model = loaded(tmp_path, body, flags)
     falling = model.replace(gravity=[0, 0, -5])
     held = falling.replace(frictionloss=100.0)
-    ends = []
-    for each in (model, falling, held):
-        with sm.make_data(each) as data:
-            sm.step(each, data, 100)
-            ends.append(float(data.qpos[0]))
-    assert ends[0] == 0.0
-    assert ends[1] < -0.05
-    assert abs(ends[2]) < 0.01
+    assert after(model, 100) == 0.0
+    assert after(falling, 100) < -0.05
+    assert abs(after(held, 100)) < 0.01
 
 
 def test_a_model_whose_bodies_sleep_promises_no_exact_restore(tmp_path: Path) -> None:
@@ -301,8 +284,7 @@ def test_a_model_whose_bodies_sleep_promises_no_exact_restore(tmp_path: Path) ->
 
 def test_the_record_of_a_model_with_rk4_says_what_it_breaks(tmp_path: Path) -> None:
     model = loaded(tmp_path, f"<body><joint name='j'/>{GEOM}</body>", "<option integrator='RK4'/>")
-    told = model.capabilities.behaviours["stale after a step"]
-    assert told.support == "unsupported"
+    assert model.capabilities.behaviours["stale after a step"].support == "unsupported"
     with pytest.raises(UnknownNameError, match="implicitfast"):
         model.replace(integrator="rk4")
     better = model.replace(integrator="implicitfast")

@@ -111,8 +111,7 @@ def test_tests_are_chosen_by_line_room_and_time(tmp_path: Path) -> None:
     names = [test.partition("::")[2] for test in covered.tests(inside, 60)]
     assert names == ["slow", "quick", "first", "second"]
     assert len(covered.tests(inside, 6.5)) == len(covered.tests(inside, 40)) == 2
-    at_import = next(site for site in found if not site.called)
-    assert len(covered.tests(at_import, 60)) == 5
+    assert len(covered.tests(next(site for site in found if not site.called), 60)) == 5
 
 
 @pytest.mark.slow

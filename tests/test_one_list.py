@@ -66,8 +66,7 @@ def test_what_cannot_be_brought_over_is_said_with_its_reason(tmp_path):
 def test_the_words_are_those_of_two_sides(cli: Cli, tmp_path):
     right = ARM.replace('"elbow"', '"e"').replace('name="shoulder"', 'name="s"')
     right = right.replace('joint="shoulder"', 'joint="s"')
-    case = Case('range="-2 2"', 'range="-2 0.4"', "")
-    _listed(tmp_path, changed(right, case))
+    _listed(tmp_path, changed(right, Case('range="-2 2"', 'range="-2 0.4"', "")))
     files = str(tmp_path / "left.xml"), str(tmp_path / "right.xml")
     for option in ("--map", "--rename"):  # the name that it had
         words = ("compare", "--models", *files, option, "elbow=e", option, "shoulder=s", "--json")

@@ -19,6 +19,7 @@ from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
 from statemachine.interface import Array
 
+from .conftest import opened, refused
 from .small_models import CART, model_of
 
 SERVO = '<position name="servo" joint="rail" kp="100" kv="20"/>'
@@ -97,16 +98,14 @@ def test_options_add_up_and_their_order_does_not_count(backend: str) -> None:
 
 
 def test_load_takes_them_too(backend: str) -> None:
-    model = sm.load("so101", backend=backend, kp=500)
-    assert (model.actuator_kp == 500).all()
+    assert (sm.load("so101", backend=backend, kp=500).actuator_kp == 500).all()
 
 
 @pytest.mark.usefixtures("bullet")
 def test_pybullet_says_which_frictions_it_cannot_have() -> None:
     """It multiplies the frictions of two links; MuJoCo takes the larger."""
     model = sm.load("so101/scene_box", backend="pybullet")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", EngineWarning)
+    with warnings.catch_warnings(action="error", category=EngineWarning):
         model.replace(friction=0.5)
         model.replace(kp=500)
     friction = np.full(model.ngeom, 0.1)
@@ -123,10 +122,14 @@ def test_friction_without_effect_is_refused(tmp_path: Path) -> None:
     model = model_of(
         tmp_path, CART.format(actuators="").replace("<worldbody>", option + "<worldbody>")
     )
-    with pytest.raises(UnsupportedError, match="overrides the friction"):
-        model.replace(friction=0.5)
-    with pytest.raises(UnsupportedError, match="overrides the friction"):
-        worlds.make_worlds(model, 2, friction=[0.5, 0.6])
+    refused(
+        (UnsupportedError, "overrides the friction", lambda: model.replace(friction=0.5)),
+        (
+            UnsupportedError,
+            "overrides the friction",
+            lambda: worlds.make_worlds(model, 2, friction=[0.5, 0.6]),
+        ),
+    )
 
 
 DELAYED = CART.format(
@@ -170,8 +173,7 @@ def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, back
     model = model_of(tmp_path, LATE, "late.xml", backend=backend)
 
     def ours(model: sm.Model) -> Array:
-        with sm.make_data(model) as own:
-            sm.reset(model, own, keyframe="home")
+        with opened(model, "home") as (_, own):
             return run_rows(model, own, 30)
 
     assert np.abs(ours(model) - path).max() < (1e-9 if backend == "pybullet" else 1e-15)

@@ -14,7 +14,7 @@ import pytest
 
 from statemachine import __version__
 
-from .conftest import ROOT
+from .conftest import ROOT, assert_in
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
@@ -48,9 +48,12 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.network
 def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
-    assert "statemachine/_models/so101/so101.xml" in names
-    assert "statemachine/_models/so101/look/base_print.stl" in names
-    assert "statemachine/py.typed" in names
+    assert_in(
+        names,
+        "statemachine/_models/so101/so101.xml",
+        "statemachine/_models/so101/look/base_print.stl",
+        "statemachine/py.typed",
+    )
     for name in ("page.html", "page.css", "page.js", "scene.js", "gl.js"):
         assert f"statemachine/report/html/{name}" in names
     assert "statemachine/runs/recorded/hold.pybullet.npz" in names

@@ -41,7 +41,18 @@ from statemachine.report.plot import (
 from statemachine.runs import Trace, record, shipped, write
 from statemachine.runs.header import INPUTS
 
-from .conftest import ROOT, Cli, need_engine, one_line, written
+from .conftest import (
+    ROOT,
+    Cli,
+    assert_in,
+    need_engine,
+    one_line,
+    one_line_error,
+    processes_with,
+    refused,
+    soon,
+    written,
+)
 from .rendering import rendering_environment, silhouettes
 from .small_models import mjcf
 
@@ -337,8 +348,7 @@ def test_without_opengl_pybullet_draws_and_it_is_said(cli: Cli, tmp_path: Path) 
         **_without_opengl(tmp_path),
     )
     first, second = done.stderr.splitlines()
-    assert "no OpenGL here" in first
-    assert "PyBullet's software" in first
+    assert_in(first, "no OpenGL here", "PyBullet's software")
     assert second.endswith("drawn by PyBullet's software renderer")
     with image_of.open(tmp_path / "a.webp") as image:
         assert image.n_frames == 6
@@ -353,19 +363,18 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(_opengl, "offscreen_opengl", lambda: "egl")
     assert probe.renderer_here() == probe.Renderer("mujoco", "egl")
     monkeypatch.setattr(_opengl, "offscreen_opengl", lambda: None)
-    with pytest.raises(MissingEngineError, match=r"apt-get|driver"):
-        probe.renderer_here("mujoco")
-    with pytest.raises(UnknownNameError, match="Did you mean 'mujoco'"):
-        probe.renderer_here("mujcoo")
+    refused(
+        (MissingEngineError, r"apt-get|driver", lambda: probe.renderer_here("mujoco")),
+        (UnknownNameError, "Did you mean 'mujoco'", lambda: probe.renderer_here("mujcoo")),
+    )
 
     def require(name: str) -> None:
         if name == "pybullet":
             raise MissingEngineError("pybullet is not installed here", engine=name)
 
     monkeypatch.setattr(pybullet_room, "require", require)
-    with pytest.raises(MissingEngineError, match="nothing here can draw") as caught:
+    with one_line_error(MissingEngineError, match="nothing here can draw"):
         probe.renderer_here()
-    assert "\n" not in str(caught.value)
     monkeypatch.setattr(pybullet_room, "require", lambda name: None)
     assert probe.renderer_here() == probe.Renderer("pybullet")
 
@@ -435,8 +444,7 @@ def test_compare_writes_what_it_is_asked_for(
     json.loads(done.stdout)
     plotted, filmed = done.stderr.splitlines()
     assert "a.svg: a figure" in plotted
-    assert "a.webp: a film of 0.5 s, 5 pictures" in filmed
-    assert "drawn by MuJoCo" in filmed
+    assert_in(filmed, "a.webp: a film of 0.5 s, 5 pictures", "drawn by MuJoCo")
     assert sorted(path.name for path in tmp_path.glob("a.*")) == ["a.svg", "a.webp"]
 
 
@@ -457,9 +465,7 @@ def test_ctrl_c_leaves_no_half_film_and_no_process(
         start_new_session=True,  # a group of its own, as a terminal's foreground job
     )
     try:
-        deadline = time.monotonic() + 60
-        while not _drawing(tmp_path) and time.monotonic() < deadline and child.poll() is None:
-            time.sleep(0.05)
+        soon(lambda: _drawing(tmp_path) or child.poll() is not None, 60)
         time.sleep(1)
         os.killpg(child.pid, signal.SIGINT)
         _, said = child.communicate(timeout=60)
@@ -471,18 +477,10 @@ def test_ctrl_c_leaves_no_half_film_and_no_process(
     assert not _drawing(tmp_path)
 
 
-def _drawing(place: Path) -> list[str]:
+def _drawing(place: Path) -> list[int]:
     """Processes that draw or encode in a folder."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            there = (folder / "cwd").readlink() == place
-            command = (folder / "cmdline").read_bytes()
-        except OSError:
-            continue
-        if there and (b"rendering._child" in command or b"ffmpeg" in command):
-            found.append(command.decode())
-    return found
+    pids = [*processes_with("rendering._child"), *processes_with("ffmpeg")]
+    return [pid for pid in pids if Path(f"/proc/{pid}/cwd").resolve() == place]
 
 
 # Figures.
@@ -492,8 +490,7 @@ def _drawing(place: Path) -> list[str]:
 def compared() -> tuple[Trace, Trace, Any]:
     """Hold on MuJoCo, and as PyBullet was recorded."""
     two = shipped("hold", "pybullet")
-    model = sm.load("so101/scene")
-    one = record(model, lambda _t, _d: np.array(FIRST), 2.0, experiment="hold")
+    one = record(sm.load("so101/scene"), lambda _t, _d: np.array(FIRST), 2.0, experiment="hold")
     return one, two, compare(one, two)
 
 
@@ -512,10 +509,8 @@ def test_an_svg_says_in_text_what_it_shows(compared: tuple[Trace, Trace, Any]) -
     pytest.importorskip("matplotlib")
     one, two, found = compared
     text = _texts(drawn(of_comparison(one, two, found), "svg"))
-    for word in (one.header.label, two.header.label, "hold", *one.header.joints, "gripperframe"):
-        assert word in text
-    for word in ("energy", "tolerance", "gripper on floor", "time [s]", "statemachine 0."):
-        assert word in text
+    assert_in(text, one.header.label, two.header.label, "hold", *one.header.joints, "gripperframe")
+    assert_in(text, "energy", "tolerance", "gripper on floor", "time [s]", "statemachine 0.")
     assert f"they part at {min(a.since for a in found.agreements if a.since):.3f} s" in text
 
 
@@ -588,5 +583,4 @@ def test_one_trace_alone(compared: tuple[Trace, Trace, Any]) -> None:
     pytest.importorskip("matplotlib")
     _, two, _ = compared
     text = _texts(drawn(of_trace(two), "svg"))
-    for word in (two.header.label, "the command", *two.header.joints, "energy"):
-        assert word in text
+    assert_in(text, two.header.label, "the command", *two.header.joints, "energy")

@@ -30,16 +30,14 @@ def _swing(model: sm.Model, data: sm.Data, steps: int) -> sm.State:
 
 
 def _mid_contact(backend: str) -> tuple[sm.Model, sm.State]:
-    with opened(sm.load("so101/scene_box", backend=backend), keyframe=0) as (model, data):
-        sm.step(model, data, 37)
+    with opened(sm.load("so101/scene_box", backend=backend), 0, nstep=37) as (model, data):
         assert len(data.contacts) > 0
         return model, sm.get_state(model, data)
 
 
 def test_other_processes_continue_with_the_same_bits(backend: str) -> None:
     model, state = _mid_contact(backend)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, mp_context=context) as pool:
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         jobs = [pool.submit(_continue, backend, pickle.dumps(state), 200) for _ in range(2)]
         futures = [pickle.loads(job.result(timeout=60)) for job in jobs]
     with sm.make_data(model) as data:

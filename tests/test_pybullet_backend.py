@@ -6,12 +6,14 @@ import gc
 import hashlib
 import math
 import os
+import shlex
 import signal
 import subprocess
 import sys
 import time
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,24 +30,24 @@ from statemachine.errors import (
 from statemachine.interface import DERIVED
 from statemachine.rotations import matrix_from_quat
 
-from .conftest import ROOT, need_engine, opened, started, written
+from .conftest import (
+    ROOT,
+    interrupted_at,
+    opened,
+    refused,
+    runs_in_silence,
+    started,
+    written,
+)
 from .small_models import REFS, TREES, TWO_ROOTS
 
 Golden = Callable[[str], np.ndarray]
 HOLD = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 LIFT = 1  # the place of shoulder_lift
 linux = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc, or forks")
+pytestmark = pytest.mark.usefixtures("bullet")
+load = partial(sm.load, backend="pybullet")
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and descriptors of POSIX")
-
-
-@pytest.fixture(autouse=True)
-def _engine() -> None:
-    need_engine("pybullet")
-
-
-def load(name: str | Path, **options: Any) -> sm.Model:
-    model = sm.load(name, backend="pybullet")
-    return model.replace(**options) if options else model
 
 
 def mjcf(folder: Path, inside: str, name: str = "m.xml") -> Path:
@@ -94,24 +96,6 @@ def same(one: dict[str, np.ndarray], two: dict[str, np.ndarray]) -> None:
     assert one.keys() == two.keys()
     for name, array in one.items():
         assert np.array_equal(array, two[name]), name
-
-
-def python(
-    code: str, folder: Path, *arguments: str, shell: str = "", **environment: str
-) -> subprocess.CompletedProcess[str]:
-    """Run a text in a process of its own, by way of a shell's redirection if one is given."""
-    command = [sys.executable, "-c", code, *arguments]
-    if shell:
-        command = ["/bin/sh", "-c", f'exec "$0" "$@" {shell}', *command]
-    return subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        check=False,
-    )
 
 
 # How near it comes to MuJoCo, at the 5 ms of the model.
@@ -283,8 +267,7 @@ def test_two_free_bodies_are_two(tmp_path: Path) -> None:
         data,
     ):
         free = [tree.body for tree in data.raw.trees if tree.free]
-        masses = [pb.getDynamicsInfo(body, -1, data.raw.client)[0] for body in free]
-        assert masses == [1.0, 3.0]
+        assert [pb.getDynamicsInfo(body, -1, data.raw.client)[0] for body in free] == [1.0, 3.0]
         sm.step(model, data, 200)
         # A millimetre into the floor is more than either sinks.
         assert np.abs(data.qpos[[2, 9]] - (0.1, 0.2)).max() < 0.001
@@ -308,14 +291,24 @@ for defaults in ("model", "engine"):
     sm.reset(model, data)
     sm.make_data(model)
     data.close()
-open(sys.argv[1], "w").write("done")
+open("mark", "w").write("done")
 """
 
 
 @posix
 @pytest.mark.parametrize("shell", ["", "<&- >&- 2>&-", ">&-", "2>&-", ">&- 2>&-"])
 def test_it_prints_nothing_and_works_without_streams(tmp_path: Path, shell: str) -> None:
-    done = python(_ALL, tmp_path, "mark", shell=shell)
+    """The shell takes streams away before Python starts."""
+    command = f"exec {shlex.quote(sys.executable)} -c {shlex.quote(_ALL)} {shell}"
+    done = subprocess.run(
+        ["/bin/sh", "-c", command],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert (tmp_path / "mark").read_text() == "done"
 
@@ -432,8 +425,7 @@ def test_a_contact_margin_is_told(tmp_path: Path) -> None:
     )
     with pytest.warns(EngineWarning, match=r"margin of 1 geoms \(the largest: 10 mm, skin\)"):
         sm.load(mjcf(tmp_path, text), backend="pybullet")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         sm.load(mjcf(tmp_path, text), backend="pybullet", contacts=False)
 
 
@@ -447,10 +439,14 @@ def test_what_is_switched_off_at_load_is_not_refused(tmp_path: Path) -> None:
             data.qvel[0] = 1.0
             sm.step(each, data, 10)
             assert data.time == pytest.approx(0.1)
-    with pytest.raises(UnsupportedError, match="hills"):
-        model.replace(contacts=True)
-    with pytest.raises(UnsupportedError, match="no option named 'contcts'"):
-        sm.load(file, backend="pybullet", contcts=False)
+    refused(
+        (UnsupportedError, "hills", lambda: model.replace(contacts=True)),
+        (
+            UnsupportedError,
+            "no option named 'contcts'",
+            lambda: sm.load(file, backend="pybullet", contcts=False),
+        ),
+    )
 
 
 def test_a_urdf_with_two_roots_is_no_crash(tmp_path: Path) -> None:
@@ -468,9 +464,7 @@ for backend in ("mujoco", "pybullet"):
 assert ends[0] == ends[1], ends
 print(ends[1][:2])
 """
-    done = python(code, tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.strip() == "(('world', 'c'), ('j',))"
+    runs_in_silence(code, tmp_path, "(('world', 'c'), ('j',))\n")
 
 
 @pytest.mark.parametrize("text", ["", "<mujoco>", "no XML at all"])
@@ -484,16 +478,13 @@ try:
 except sm.errors.StateMachineError as error:
     print(type(error).__name__)
 """
-        done = python(code, tmp_path)
-        assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "ModelError", "")
+        runs_in_silence(code, tmp_path, "ModelError\n")
 
 
 # PyBullet as its own users meet it.
 
 
-def _as_it_comes(**options: Any) -> sm.Model:
-    model = sm.load("so101/scene", backend="pybullet", defaults="engine")
-    return model.replace(**options) if options else model
+_as_it_comes = partial(load, "so101/scene", defaults="engine")
 
 
 def test_engine_defaults_are_pybullets() -> None:
@@ -511,14 +502,11 @@ def test_engine_defaults_are_pybullets() -> None:
         sm.step(model, data, 240)
         assert not data.qpos.any()  # no gravity, and the targets are where the arm is
     with sm.make_data(model.replace(gravity=[0, 0, -9.81])) as data:
-        parameters = pb.getPhysicsEngineParameters(data.raw.client)
-        assert parameters["gravityAccelerationZ"] == -9.81
+        assert pb.getPhysicsEngineParameters(data.raw.client)["gravityAccelerationZ"] == -9.81
 
 
 def test_engine_motors_hold_an_arm_that_nobody_drives() -> None:
-    model = _as_it_comes(gravity=[0, 0, -9.81], actuation=False)
-    with sm.make_data(model) as data:
-        sm.step(model, data, 240)
+    with opened(_as_it_comes(gravity=[0, 0, -9.81], actuation=False), nstep=240) as (_, data):
         # Limp, it falls 24° in half a second; 0.012° was measured.
         assert abs(np.degrees(data.qpos[LIFT])) < 0.1
         assert np.abs(np.degrees(data.qpos)).max() < 1.0  # the gripper moves 0.7°
@@ -528,9 +516,7 @@ def test_engine_motors_hold_an_arm_that_nobody_drives() -> None:
 
 
 def test_engine_servo_follows_without_droop() -> None:
-    model = _as_it_comes(gravity=[0, 0, -9.81])
-    with sm.make_data(model) as data:
-        sm.step(model, data, 480)
+    with opened(_as_it_comes(gravity=[0, 0, -9.81]), nstep=480) as (model, data):
         assert abs(np.degrees(data.qpos[LIFT])) < 0.001  # 0.033° with the servo of the model
         data.ctrl = HOLD
         sm.step(model, data, 480)
@@ -539,11 +525,10 @@ def test_engine_servo_follows_without_droop() -> None:
 
 def test_engine_bias_of_the_first_step_does_not_follow_writes() -> None:
     """That of a step right after a reset, of which the arrays are the only copy."""
-    model = sm.load("so101", backend="pybullet", defaults="engine").replace(gravity=(0, 0, -9.81))
+    model = load("so101", defaults="engine", gravity=(0, 0, -9.81))
     found = []
     for write in (False, True):
-        with sm.make_data(model) as data:
-            sm.step(model, data)
+        with opened(model, nstep=1) as (_, data):
             if write:
                 data.qpos[:] = 0.7
                 data.qvel[:] = 3.0
@@ -553,9 +538,7 @@ def test_engine_bias_of_the_first_step_does_not_follow_writes() -> None:
 
 
 def test_engine_does_not_tell_forces_by_part() -> None:
-    model = _as_it_comes()
-    with sm.make_data(model) as data:
-        sm.step(model, data)
+    with opened(_as_it_comes(), nstep=1) as (model, data):
         for name in ("qacc", "qfrc_contact", "qfrc_passive", "qfrc_friction", "qfrc_constraint"):
             with pytest.raises(UnsupportedError, match="forces by part"):
                 getattr(data, name)
@@ -681,8 +664,7 @@ for data in kept:
     sm.step(model, data)
 kept.pop().close()
 """
-    done = python(code, tmp_path)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    runs_in_silence(code, tmp_path)
 
 
 # Processes and threads.
@@ -711,8 +693,7 @@ while True:
             assert child.stdout is not None
             assert child.stdout.readline() == b"went\n"
             time.sleep(delay)
-            process = Path("/proc") / str(child.pid)
-            assert "/dev/shm" not in (process / "maps").read_text()
+            assert "/dev/shm" not in ((Path("/proc") / str(child.pid)) / "maps").read_text()
             rows = Path("/proc/sysvipc/shm").read_text().splitlines()[1:]
             assert str(child.pid) not in [row.split()[4] for row in rows]
         finally:
@@ -759,8 +740,7 @@ assert status == 0, status
 assert mine == theirs == go_on(alone)
 assert go_on(data) == go_on(alone)
 """
-    done = python(code, tmp_path)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    runs_in_silence(code, tmp_path)
 
 
 # Ctrl-C.
@@ -802,8 +782,7 @@ _PLACES = [
 def test_an_interrupted_step_leaves_nothing_in_the_engine(
     name: str, good: int, then: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = load("so101/scene_box")
-    with started(model) as data, started(model) as other:
+    with opened(load("so101/scene_box"), 0) as (model, data), started(model) as other:
         for each in (data, other):
             each.ctrl[0] += 0.1
         interrupted(monkeypatch, name, good, lambda: sm.step(model, data, 10))
@@ -830,8 +809,7 @@ def test_an_interrupted_step_leaves_what_is_derived(monkeypatch: pytest.MonkeyPa
 
 
 def test_an_interrupted_reading_is_read_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = load("so101/scene_box")
-    with started(model) as data:
+    with opened(load("so101/scene_box"), 0) as (model, data):
         digest(model, data, 40, seed=9)
         sm.forward(model, data)
         expected = data.qacc.copy()
@@ -856,8 +834,7 @@ def test_an_interrupted_restore_is_refused_until_it_is_repeated(
     model = load("so101/scene_box")
     ends = []
     for stop in (False, True):
-        with started(model) as data:
-            sm.step(model, data, 40)
+        with opened(model, 0, nstep=40) as (_, data):
             state = sm.get_state(model, data)
 
             def restore(data: sm.Data = data, state: sm.State = state) -> None:
@@ -882,9 +859,10 @@ def test_an_interrupted_restore_is_refused_until_it_is_repeated(
 @pytest.mark.parametrize("defaults", ["model", "engine"])
 def test_every_line_of_a_step_can_be_interrupted(defaults: Any) -> None:
     """Before each line of the backend in turn: then there was no step, or a whole one."""
-    model = sm.load("so101/scene_box", backend="pybullet", defaults=defaults)
-    with started(model) as data:
-        sm.step(model, data, 40)
+    with opened(sm.load("so101/scene_box", backend="pybullet", defaults=defaults), 0, nstep=40) as (
+        model,
+        data,
+    ):
         state = sm.get_state(model, data)
         sm.set_state(model, data, state)
         sm.step(model, data)
@@ -892,7 +870,7 @@ def test_every_line_of_a_step_can_be_interrupted(defaults: Any) -> None:
         torn, place, at = [], "", 0
         for at in range(1, 2_000):
             sm.set_state(model, data, state)
-            place = _interrupted_at(at, lambda: sm.step(model, data))
+            place = interrupted_at(at, lambda: sm.step(model, data), "backends")
             if not place:
                 break
             if sm.get_state(model, data) not in whole:
@@ -902,34 +880,13 @@ def test_every_line_of_a_step_can_be_interrupted(defaults: Any) -> None:
         assert torn == []
 
 
-def _interrupted_at(at: int, call: Callable[[], Any]) -> str:
-    """Where a call was interrupted, before the at-th line of the backends; "" if it ended."""
-    lines, place = iter(range(1, at + 1)), ""
-
-    def trace(frame: Any, event: str, _: Any) -> Any:
-        nonlocal place
-        if "backends" not in frame.f_code.co_filename:
-            return None
-        if event == "line" and next(lines, at) == at and not place:
-            place = f"{frame.f_code.co_qualname}:{frame.f_lineno}"
-            raise KeyboardInterrupt
-        return trace
-
-    sys.settrace(trace)
-    try:
-        call()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        sys.settrace(None)
-    return place
-
-
 def test_an_interrupted_reset_of_the_engines_own_can_be_repeated(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    model = sm.load("so101/scene_box", backend="pybullet", defaults="engine")
-    with sm.make_data(model) as data, sm.make_data(model) as other:
+    with (
+        opened(sm.load("so101/scene_box", backend="pybullet", defaults="engine")) as (model, data),
+        sm.make_data(model) as other,
+    ):
         sm.step(model, data, 3)
         interrupted(monkeypatch, "loadURDF", 1, lambda: sm.reset(model, data))
         sm.reset(model, data)

@@ -22,12 +22,9 @@ from statemachine.rotations import matrix_from_quat
 
 from . import conftest
 from . import test_pybullet_backend as ours
-from .conftest import Patch, need_engine, registered
+from .conftest import Patch, registered
 
-
-@pytest.fixture(autouse=True)
-def _engine() -> None:
-    need_engine("pybullet")
+pytestmark = pytest.mark.usefixtures("bullet")
 
 
 def _parts() -> Any:
@@ -226,11 +223,3 @@ def test_fault_is_caught(
         for test in tests:
             with pytest.raises(AssertionError):
                 test(tmp_path)
-
-
-def test_without_a_fault_nothing_is_caught(faulty: str, tmp_path: Path) -> None:
-    with conformance.Lab(faulty) as lab:
-        for check in set().union(*(checks for _, checks, _ in FAULTS.values())):
-            conformance.CHECKS[check](lab)
-    for test in dict.fromkeys(test for _, _, tests in FAULTS.values() for test in tests):
-        test(tmp_path)

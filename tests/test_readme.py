@@ -18,7 +18,7 @@ from statemachine.lessons import PATH
 from statemachine.lessons.questions import ASKED
 from statemachine.probes.conventions import QUESTIONS
 
-from .conftest import ROOT, Cli, need_engine, opened, written
+from .conftest import ROOT, Cli, assert_in, need_engine, opened, written
 
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text("utf-8")
@@ -189,8 +189,7 @@ def test_the_code_of_a_guide_runs(page: str, tmp_path: Path) -> None:
     if page in LONG:
         need_engine("pinocchio")
     out = _output(PYTHON[page], tmp_path)
-    for text in PRINTS[page]:
-        assert text in out
+    assert_in(out, *PRINTS[page])
     lines = {"docs/interface.md": slice(1), "docs/worlds.md": slice(-2, None)}.get(page, slice(0))
     shown = " ".join(PAGES[page].split())  # what it prints is there, too
     assert all(line in shown for line in out.splitlines()[lines])
@@ -223,8 +222,7 @@ def test_what_is_counted() -> None:
         "docs/audit.md": (f"{word[len(QUESTIONS)]} questions",),
     }
     for page, phrases in counted.items():
-        for phrase in phrases:
-            assert phrase in " ".join(PAGES[page].split()), page
+        assert_in(" ".join(PAGES[page].split()), *phrases)
 
 
 def test_what_is_to_be_installed_exists() -> None:
@@ -251,8 +249,7 @@ def test_numbers_of_the_models_readme() -> None:
     model = sm.load("so101")
     mass = model.raw.body_mass.sum()
     assert f"{mass:.2f} kg" in text
-    for value in ("0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744"):
-        assert value in text
+    assert_in(text, "0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744")
     assert model.dof_armature[0] == 0.028
     with opened(sm.load("so101/scene_box"), keyframe=0) as (box, data):
         sm.forward(box, data)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT, assert_in, need_engine
 
 RECIPES = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 # Where a recipe says "in QUANTITIES": how the line of the file begins after which its lines go.
@@ -91,8 +91,7 @@ def copy(tmp_path: Path) -> Copy:
 @pytest.mark.slow
 def test_a_lesson(copy: Copy) -> None:
     copy.follow("Add a lesson")
-    found = json.loads(copy.run("lesson", "coast", "--json"))["mujoco"]
-    assert 0 < found["angle"] < 1
+    assert 0 < json.loads(copy.run("lesson", "coast", "--json"))["mujoco"]["angle"] < 1
     assert "A push and nothing else" in copy.run()
     need_engine("pybullet")
     text = copy.run("lesson", "coast", "--backend", "all")
@@ -104,9 +103,7 @@ def test_a_lesson(copy: Copy) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_a_quantity(copy: Copy) -> None:
     copy.follow("Add a compared quantity")
-    text = copy.run("compare", "hold", "--seconds", "0.5", code=1)
-    assert "rad/s" in text
-    assert "joint speeds" in text
+    assert_in(copy.run("compare", "hold", "--seconds", "0.5", code=1), "rad/s", "joint speeds")
     given = ("--tolerance", "joint-speed=100rad/s", "--json")
     found = json.loads(copy.run("compare", "hold", "--seconds", "0.5", *given, code=1))
     verdicts = [

@@ -51,7 +51,7 @@ from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
-from .conftest import ROOT, Cli
+from .conftest import ROOT, Cli, assert_in, one_line, refused
 
 LIMIT = 2_000_000  # bytes
 Made = tuple[Comparison, Trace, Trace, SideDrawing]
@@ -59,7 +59,7 @@ Seen = Callable[..., Any]
 
 
 def of(one: Trace, two: Trace) -> Made:
-    return compare(one, two), one, two, look_of(one)
+    return of_look(one, two, look_of(one))
 
 
 def look_of(trace: Trace) -> SideDrawing:
@@ -95,39 +95,38 @@ def page(hold: Made, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_report(target, page_of(hold, command="statemachine compare hold --html hold.html"))
 
 
-def open_page(tab: Tab, path: Path) -> None:
-    tab.goto(path.as_uri())
-    tab.wait_for_timeout(300)
+@contextmanager
+def looking(page: Path, *scripts: str, **context: Any) -> Iterator[Tab]:
+    """A browser with a page, with which nothing is wrong; the scripts run before its own."""
+    with browser(**context) as tab:
+        for script in scripts:
+            tab.add_init_script(script)
+        tab.goto(page.as_uri())
+        tab.wait_for_timeout(300)
+        yield tab
+        tab.nothing_wrong()
 
 
 @pytest.fixture
 def tab(page: Path) -> Iterator[Tab]:
     """A browser with the page."""
-    with browser(height=1000) as opened:
-        open_page(opened, page)
+    with looking(page, height=1000) as opened:
         yield opened
-        opened.nothing_wrong()
 
 
 @pytest.fixture
 def seen(tmp_path: Path) -> Seen:
     """Opens the page of a comparison in a browser."""
 
-    @contextmanager
-    def opened(made: Made, **more: Any) -> Iterator[Tab]:
-        with browser(height=1000) as tab:
-            open_page(tab, write_report(tmp_path / "x.html", page_of(made, **more)))
-            yield tab
-            tab.nothing_wrong()
-
-    return opened
+    return lambda made, **more: looking(
+        write_report(tmp_path / "x.html", page_of(made, **more)), height=1000
+    )
 
 
 @pytest.fixture
 def bare(page: Path) -> Iterator[Tab]:
     """A browser with the page that runs no script."""
-    with browser(java_script_enabled=False) as opened:
-        open_page(opened, page)
+    with looking(page, java_script_enabled=False) as opened:
         yield opened
 
 
@@ -169,11 +168,9 @@ def go(tab: Tab, row: int) -> None:
 
 
 def test_it_asks_for_nothing_and_nothing_is_wrong(page: Path) -> None:
-    with browser(offline=True) as tab:
-        open_page(tab, page)
+    with looking(page, offline=True) as tab:
         assert tab.requests[0] == page.as_uri()
         assert {url.split(":")[0] for url in tab.requests[1:]} <= {"data"}
-        tab.nothing_wrong()
 
 
 def test_its_policy_lets_nothing_in(page: Path) -> None:
@@ -234,10 +231,8 @@ def test_it_is_small(name: str, tmp_path: Path) -> None:
     one = record_scenario(scenario, sm.load(scenario.model, defaults=kind), defaults=kind)
     text = page_of(of(one, shipped(experiment, "pybullet", kind)))
     assert len(text.encode()) <= LIMIT
-    with browser() as tab:
-        open_page(tab, write_report(tmp_path / "x.html", text))
+    with looking(write_report(tmp_path / "x.html", text)) as tab:
         assert tab.locator("#scene").is_visible()
-        tab.nothing_wrong()
 
 
 def test_a_long_run_is_small_too_and_keeps_the_moments_that_count() -> None:
@@ -367,8 +362,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
 
 def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
     text = page_of(hold, explanation=explanation_of(hold))
-    with browser(java_script_enabled=False) as tab:
-        open_page(tab, write_report(tmp_path / "x.html", text))
+    with looking(write_report(tmp_path / "x.html", text), java_script_enabled=False) as tab:
         (table,) = tab.locator("#why").locator("table").all()
         assert "explains" in table.inner_text()
 
@@ -430,8 +424,7 @@ def test_what_was_commanded(hold: Made) -> None:
 def test_a_link_only_to_what_is_there(hold: Made) -> None:
     models = Page("models", "", [Verdict("1 figure differs", False)])
     for header in (hold[2].header, dataclasses.replace(hold[2].header, defaults="engine")):
-        two = Trace(header, hold[2].columns)
-        text = page_of(of_look(hold[1], two, hold[3]), models=models)
+        text = page_of(of_look(hold[1], Trace(header, hold[2].columns), hold[3]), models=models)
         targets = set(re.findall(r'id="([^"]+)"', text))
         links = set(re.findall(r'href="#([^"]+)"', text))
         assert links <= targets
@@ -467,20 +460,17 @@ def test_between_compared_moments_the_figures_are_of_the_last_one() -> None:
     scenario = SCENARIOS["hold"]
     one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
     text = page_of(of(one, shipped("hold", "pybullet", "engine")))
-    assert "at the first common moment already, 0.025\u00a0s" in text
-    assert "meet every 25\u00a0ms" in text
+    assert_in(text, "at the first common moment already, 0.025\u00a0s", "meet every 25\u00a0ms")
     data = re.search(r'id="data">(.*?)</script>', text, re.S)
     assert data
     data = json.loads(data[1])
     shown, compared = (np.frombuffer(base64.b64decode(data[name])) for name in ("time", "compared"))
-    step = 0.025 * np.floor(shown / 0.025 + 1e-6)
-    assert compared == pytest.approx(step, abs=1e-9)
+    assert compared == pytest.approx(0.025 * np.floor(shown / 0.025 + 1e-6), abs=1e-9)
 
 
 @pytest.mark.slow
 def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
-    with browser(width=390, height=844) as tab:
-        open_page(tab, page)
+    with looking(page, width=390, height=844) as tab:
         scene, slider = (tab.locator(s).bounding_box() for s in ("#scene", "#slider"))
         assert 0 < slider["y"] - scene["y"] - scene["height"] < 100
         assert tab.locator(".kicker .against").is_visible()
@@ -530,8 +520,7 @@ def test_it_reads_without_a_script(bare: Tab) -> None:
     assert not bare.locator("#play").is_visible()
     assert not bare.locator(".cursor").first.is_visible()
     text = bare.locator("main").inner_text()
-    for heading in ("How far apart, over time", "What happens when", "Where this comes from"):
-        assert heading in text
+    assert_in(text, "How far apart, over time", "What happens when", "Where this comes from")
 
 
 # What moves.
@@ -566,8 +555,7 @@ def test_each_side_is_drawn_and_can_be_left_out(tab: Tab) -> None:
     before = picture(tab)
     for name in ("solid", "ghost", "marks", "trails"):
         tab.locator(f"#{name}").uncheck()
-        without = picture(tab)
-        assert changed(before, without) > 150, name
+        assert changed(before, picture(tab)) > 150, name
         tab.locator(f"#{name}").check()
         assert changed(before, picture(tab)) == 0, name
 
@@ -665,8 +653,7 @@ def test_it_can_be_used_by_keyboard(tab: Tab) -> None:
 @pytest.mark.slow
 def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
     # Else the page glides to its picture, and a press may miss what moves.
-    with browser(height=1000, reduced_motion="reduce") as tab:
-        open_page(tab, page)
+    with looking(page, height=1000, reduced_motion="reduce") as tab:
         button = tab.locator("#events button.go").first
         text = button.inner_text()
         button.click()
@@ -689,8 +676,7 @@ def test_the_view_turns_and_comes_back(tab: Tab) -> None:
     tab.mouse.up()
     assert changed(before, picture(tab)) > 2000
     tab.locator("#view-near").click()
-    near = picture(tab)
-    assert changed(before, near) > 2000
+    assert changed(before, picture(tab)) > 2000
     tab.locator("#view-all").click()
     assert changed(before, picture(tab)) == 0
 
@@ -701,8 +687,7 @@ def test_the_view_turns_and_comes_back(tab: Tab) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 768, 1280])
 def test_nothing_is_wider_than_the_screen(page: Path, width: int) -> None:
-    with browser(width=width, height=700) as tab:
-        open_page(tab, page)
+    with looking(page, width=width, height=700) as tab:
         for summary in tab.locator("summary").all():
             summary.click()
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
@@ -717,8 +702,7 @@ def test_dark_and_light(page: Path) -> None:
         colour = tab.evaluate("getComputedStyle(document.body).backgroundColor")
         return sum(map(int, re.findall(r"\d+", colour)[:3])) / 3
 
-    with browser(color_scheme="light") as tab:
-        open_page(tab, page)
+    with looking(page, color_scheme="light") as tab:
         assert paper(tab) > 230
         before = picture(tab)
         button = tab.get_by_role("button", name="Dark colours")
@@ -778,7 +762,8 @@ def test_the_sides_differ_for_the_colour_blind() -> None:
 @pytest.mark.slow
 def test_what_a_screen_reader_hears(tab: Tab) -> None:
     heard = tab.locator("body").aria_snapshot()
-    for part in (
+    assert_in(
+        heard,
         "- main:",
         "- contentinfo:",
         'heading "Joint wrist_flex is up to',
@@ -791,8 +776,7 @@ def test_what_a_screen_reader_hears(tab: Tab) -> None:
         '- rowheader "wrist_flex"',
         'img "wrist_flex, difference over time: at most 2.58° at 0.355 s',
         '- img "Both runs in three dimensions',
-    ):
-        assert part in heard, part
+    )
     levels = tab.evaluate(
         "[...document.querySelectorAll('h1,h2,h3,h4')].map((h) => Number(h.tagName[1]))"
     )
@@ -814,8 +798,7 @@ def test_what_a_screen_reader_hears(tab: Tab) -> None:
 
 @pytest.mark.slow
 def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
-    with browser(color_scheme="dark") as tab:
-        open_page(tab, page)
+    with looking(page, color_scheme="dark") as tab:
         # What a browser does when it prints, held still to be looked at.
         tab.evaluate("dispatchEvent(new Event('beforeprint'))")
         tab.emulate_media(media="print")
@@ -824,8 +807,7 @@ def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
             tab.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
         )
         text = tab.locator("main").inner_text()
-        for heading in tab.locator("h2").all_inner_texts():
-            assert heading in text
+        assert_in(text, *tab.locator("h2").all_inner_texts())
         assert "shoulder_pan" in tab.locator("#curves > details").inner_text()
         assert tab.locator("#printed").is_visible()
         assert picture(tab, "#printed").std() > 10
@@ -835,27 +817,21 @@ def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
         tab.evaluate("dispatchEvent(new Event('afterprint'))")
         assert tab.locator("#printed").count() == 0
         assert not tab.locator("#curves > details").evaluate("(e) => e.open")
-        pdf = tab.page.pdf(format="A4")
-        assert len(re.findall(rb"/Type\s*/Page\b", pdf)) >= 3
-        tab.nothing_wrong()
+        assert len(re.findall(rb"/Type\s*/Page\b", tab.page.pdf(format="A4"))) >= 3
 
 
 @pytest.mark.slow
 def test_it_says_so_without_webgl(page: Path, tmp_path: Path) -> None:
-    with browser() as tab:
-        tab.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
-        open_page(tab, page)
+    with looking(page, "HTMLCanvasElement.prototype.getContext = () => null") as tab:
         assert "no WebGL" in tab.locator("#no-scene").inner_text()
         assert not tab.locator("#scene").is_visible()
         go(tab, 100)
         assert tab.locator("#clock").inner_text() == "0.500 s"
-        tab.nothing_wrong()
 
 
 @pytest.mark.slow
 def test_it_does_not_move_by_itself_nor_smoothly_where_that_is_not_wanted(page: Path) -> None:
-    with browser(reduced_motion="reduce") as tab:
-        open_page(tab, page)
+    with looking(page, reduced_motion="reduce") as tab:
         before = tab.locator("#slider").input_value()
         tab.wait_for_timeout(500)
         assert tab.locator("#slider").input_value() == before
@@ -962,8 +938,7 @@ def test_a_mesh_keeps_its_surface() -> None:
     assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0, abs=1e-5)
     corners = mesh.vertices[mesh.faces].astype(float)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = (normal[:, None] * mesh.normals[mesh.faces]).sum(axis=2)
-    assert (facing > 0).mean() > 0.999
+    assert ((normal[:, None] * mesh.normals[mesh.faces]).sum(axis=2) > 0).mean() > 0.999
 
 
 def area(vertices: Any, faces: Any) -> float:
@@ -983,8 +958,7 @@ def test_too_many_triangles_are_made_fewer() -> None:
 
 
 def test_folded_normals_unfold() -> None:
-    random = np.random.default_rng(0)
-    n = random.normal(size=(1000, 3))
+    n = np.random.default_rng(0).normal(size=(1000, 3))
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     f = octahedral(n) / 32767
     z = 1 - np.abs(f).sum(axis=1)
@@ -1034,10 +1008,7 @@ def test_the_command_writes_it(cli: Cli, tmp_path: Path) -> None:
 def test_mistakes_are_one_line_before_anything_runs(
     cli: Cli, tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
-    done = cli("compare", *words, code=2)
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    assert said in done.stderr
-    assert done.stdout == ""
+    one_line(cli("compare", *words), said)
     assert not list(tmp_path.iterdir())
 
 
@@ -1045,26 +1016,24 @@ def test_a_folder_that_cannot_be_written_into(tmp_path: Path, monkeypatch: Any) 
     monkeypatch.setattr(
         "statemachine.report.html.page.os.access", lambda *_: False
     )  # root may write anywhere
-    with pytest.raises(BadInputError, match="cannot be written"):
-        check_target(tmp_path / "x.html")
     (tmp_path / "folder.html").mkdir()
-    with pytest.raises(BadInputError, match="is a folder"):
-        check_target(tmp_path / "folder.html")
+    refused(
+        (BadInputError, "cannot be written", lambda: check_target(tmp_path / "x.html")),
+        (BadInputError, "is a folder", lambda: check_target(tmp_path / "folder.html")),
+    )
 
 
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 def test_the_cause_is_on_the_page(cli: Cli, tmp_path: Path) -> None:
     assert cli("compare", "hold", "--html", "out.html").returncode == 1
-    with browser() as tab:
-        open_page(tab, tmp_path / "out.html")
+    with looking(tmp_path / "out.html") as tab:
         # The part that goes, as a bar: nearly all of it.
         row = tab.locator("#why table").first.locator("tr", has_text="Contact")
         bar, fill = (row.locator(s).first.bounding_box()["width"] for s in (".bar", ".bar i"))
         assert fill > 0.97 * bar
         assert tab.locator("#models details").count() == 1
         assert (tmp_path / "out.html").stat().st_size <= LIMIT
-        tab.nothing_wrong()
 
 
 def test_any_page_can_be_drawn() -> None:
@@ -1082,9 +1051,7 @@ def test_any_page_can_be_drawn() -> None:
     )
     text = report(page)
     assert "<script></script>" in text
-    for part in ("An origin", "First.", "●", "&lt;b&gt;", "<li>two</li>", 'data-t="1.500000"'):
-        assert part in text
+    assert_in(text, "An origin", "First.", "●", "&lt;b&gt;", "<li>two</li>", 'data-t="1.500000"')
     assert not page.holds
     written = markdown(page, lambda _: "")
-    assert "## More" in written
-    assert "<details><summary>Deep</summary>" in written
+    assert_in(written, "## More", "<details><summary>Deep</summary>")

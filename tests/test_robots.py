@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,7 +36,17 @@ from statemachine.runs import record_scenario
 from statemachine.runs.provenance import model_files
 from statemachine.runs.scenarios import scenario
 
-from .conftest import ROOT, Cli, need_engine, written
+from .conftest import (
+    ROOT,
+    Cli,
+    assert_in,
+    need_engine,
+    one_line,
+    processes_with,
+    refused,
+    soon,
+    written,
+)
 
 GOOD = """<mujoco><option timestep='0.002'/><worldbody>
 <body name='arm' pos='0 0 1'><joint name='j' axis='0 1 0' damping='0.1'/>
@@ -194,12 +204,15 @@ def test_a_gap_of_rounding_is_no_gap_of_engines(tmp_path: Path) -> None:
 def test_files_are_named_too(folder: Path) -> None:
     good, binary = folder / "good.xml", folder / "binary.mjb"
     assert [each.path for each in find([good, binary, good])] == [good, binary]
-    with pytest.raises(BadInputError, match="no file or folder"):
-        find([folder / "none"])
-    with pytest.raises(BadInputError, match="is no model"):
-        find([folder / "notes.txt"])
-    with pytest.raises(BadInputError, match="no models"):
-        find([folder / ".git" / "..", folder / ".git"][:0] or [_empty(folder)])
+    refused(
+        (BadInputError, "no file or folder", lambda: find([folder / "none"])),
+        (BadInputError, "is no model", lambda: find([folder / "notes.txt"])),
+        (
+            BadInputError,
+            "no models",
+            lambda: find([folder / ".git" / "..", folder / ".git"][:0] or [_empty(folder)]),
+        ),
+    )
 
 
 def _empty(folder: Path) -> Path:
@@ -359,16 +372,13 @@ def test_a_page_of_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
     show(page(survey))
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
-    assert "…" in out
-    assert "4e-4 h" in out
-    assert "refused" in out
+    assert_in(out, "…", "4e-4 h", "refused")
     assert "own 2e-16" in out or "own 1e-16" in out
     (row,) = [line for line in out.splitlines() if line.startswith("tendon")]
     assert row.split() == ["tendon", "3", "3", "3"]
     show(page(Survey("mujoco", (ROW,), (), "w")))
     out = capsys.readouterr().out
-    assert "pybullet refuses it: it has a tendon" in out
-    assert "pybullet warns: RK4" in out
+    assert_in(out, "pybullet refuses it: it has a tendon", "pybullet warns: RK4")
     assert max(map(len, out.splitlines())) <= 80
 
 
@@ -379,17 +389,15 @@ def test_the_command(cli: Cli, folder: Path) -> None:
     assert {"default", "models", "parts", "made_with", "wrong"} == set(told)
     row = told["models"][0]
     assert {"file", "sha256", "nq", "backends", "witness", "faults", "ended"} <= set(row)
-    done = cli("robots", str(folder / "good.xml"), "--quick")
+    done = cli("robots", str(folder / "good.xml"), "--quick", code=0)
     assert "gap without contacts" in done.stdout
-    assert done.returncode == 0
     for words, text in (
         (["--out", "t.txt"], "ends in .csv or .json"),
         (["--jobs", "0"], "jobs must be"),
         (["--seconds", "0"], "seconds must be"),
         (["--seed", "-1"], "seed must not"),
     ):
-        done = cli("robots", str(folder / "good.xml"), *words, code=2)
-        assert text in done.stderr
+        one_line(cli("robots", str(folder / "good.xml"), *words), text)
 
 
 @pytest.mark.slow
@@ -407,9 +415,7 @@ def test_an_interrupt_leaves_a_table_and_no_process(
         env={**os.environ, "PYTHONPATH": paths}, text=True, stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )  # fmt: skip
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline and not (table.exists() and len(tables.read(table)) == 6):
-        time.sleep(0.2)
+    assert soon(lambda: table.exists() and len(tables.read(table)) == 6, 120)
     process.send_signal(number)
     _, err = process.communicate(timeout=60)
     if number is signal.SIGINT:
@@ -418,21 +424,15 @@ def test_an_interrupt_leaves_a_table_and_no_process(
     else:
         assert process.returncode == -signal.SIGTERM
     assert len(tables.read(table)) == 6
-    for entry in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            words = entry.read_bytes()
-        except OSError:
-            continue
-        environment = entry.parent / "environ"
-        if b"robots.examine" in words:
-            assert str(sabotage).encode() not in environment.read_bytes()
+    for pid in processes_with("robots.examine"):
+        with suppress(OSError):
+            assert str(sabotage).encode() not in Path(f"/proc/{pid}/environ").read_bytes()
 
 
 def test_versions_and_settings_are_part_of_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
     quick, whole = many._made_with(True, 0), many._made_with(False, 1)
     assert quick.endswith(", quick")
-    assert "seed 1" in whole
-    assert "mujoco" in whole
+    assert_in(whole, "seed 1", "mujoco")
 
 
 def test_a_file_that_the_engine_alone_cannot_open_is_no_contradiction(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import subprocess
 import sys
 import threading
 
@@ -12,7 +11,7 @@ import pytest
 
 from statemachine.silence import silence
 
-from .conftest import ROOT
+from .conftest import ROOT, runs_in_silence
 
 pytestmark = pytest.mark.skipif(
     sys.platform not in ("linux", "darwin"), reason="C's streams can be exchanged in its library"
@@ -102,9 +101,7 @@ while printing.is_alive() or made < 3:
     sm.make_data(model).close()
     made += 1
 """
-    done = _python(code)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.split() == [str(k) for k in range(200)]
+    runs_in_silence(code, ROOT, "".join(f"{k}\n" for k in range(200)))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
@@ -137,8 +134,7 @@ ended.set()
 thread.join()
 assert status == 0, status
 """
-    done = _python(code)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "seen\n", "")
+    runs_in_silence(code, ROOT, "seen\n")
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
@@ -171,16 +167,4 @@ ended.set()
 thread.join()
 assert status == 0, status
 """
-    done = _python(code)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
-def _python(code: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(  # from 3.12 on Python itself warns of a fork beside threads
-        [sys.executable, "-W", "ignore::DeprecationWarning", "-c", code],
-        capture_output=True,
-        text=True,
-        timeout=60,  # it hangs
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        check=False,
-    )
+    runs_in_silence(code, ROOT)

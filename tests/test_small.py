@@ -31,8 +31,7 @@ def test_every_error_is_also_a_fitting_builtin_and_survives_a_pickle() -> None:
     ]
     assert len(kinds) > 10
     for kind in kinds:
-        error = kind("what happened", time=1.5, index=3)
-        copy = pickle.loads(pickle.dumps(error))
+        copy = pickle.loads(pickle.dumps(kind("what happened", time=1.5, index=3)))
         assert type(copy) is kind
         assert str(copy) == "what happened"
         assert (getattr(copy, "time"), getattr(copy, "index")) == (1.5, 3)  # noqa: B009

@@ -12,7 +12,7 @@ import pytest
 import statemachine as sm
 from statemachine.installed import ENGINES, require
 
-from .conftest import REQUIRED, ROOT
+from .conftest import REQUIRED, ROOT, in_its_own_python, one_line
 
 HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "viser", "xml.etree")
 
@@ -45,11 +45,8 @@ except SystemExit:
     pass
 print('loaded:', *[name for name in {HEAVY!r} if name in sys.modules])
 """
-    done = subprocess.run(
-        [sys.executable, "-c", probe], capture_output=True, text=True, cwd=ROOT, check=True
-    )
-    loaded = set(done.stdout.rpartition("loaded:")[2].split())
-    assert loaded <= allowed
+    done = in_its_own_python(probe, ROOT)
+    assert set(done.stdout.rpartition("loaded:")[2].split()) <= allowed, done.stderr
 
 
 def test_every_engine_that_is_required_is_here() -> None:
@@ -140,12 +137,7 @@ def test_a_missing_or_broken_engine_is_one_line(
         block = f"sys.path.insert(0, {str(tmp_path)!r})"
     command = ["fingertip"] if engine == "pinocchio" else ["lesson", "state"]
     code = f"import sys\n{block}\nfrom statemachine.cli import main\nsys.exit(main({command}))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
-    )
-    assert done.returncode == 3, done.stderr
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    assert words in done.stderr
+    one_line(in_its_own_python(code, ROOT), words, 3)
 
 
 def test_an_interrupt_is_no_engine_that_does_not_load(monkeypatch: pytest.MonkeyPatch) -> None:

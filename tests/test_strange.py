@@ -13,7 +13,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import EngineWarning, ModelError, StateMachineError
 
-from .conftest import in_its_own_python, opened, written
+from .conftest import in_its_own_python, one_line_error, opened, written
 from .small_models import model_of
 
 _BODY = (
@@ -84,18 +84,16 @@ UNUSUAL = [
 @pytest.mark.parametrize("named", STRANGE)
 def test_a_strange_number_is_refused_by_name(named: str, backend: str, tmp_path: Path) -> None:
     file = written(tmp_path / "m.xml", STRANGE[named])
-    with pytest.raises(ModelError, match=rf"m\.xml.*{named}") as caught:
+    with one_line_error(ModelError, match=rf"m\.xml.*{named}"):
         sm.load(file, backend=backend)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", NOT_UTF_8)
 def test_a_name_that_is_not_utf_8_is_refused(name: str, backend: str, tmp_path: Path) -> None:
     file = tmp_path / "m.xml"
     file.write_bytes(NOT_UTF_8[name].encode("latin-1"))
-    with pytest.raises(ModelError, match=r"m\.xml has a name that is not UTF-8: b'\\xe4") as caught:
+    with one_line_error(ModelError, match=r"m\.xml has a name that is not UTF-8: b'\\xe4"):
         sm.load(file, backend=backend)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("named", NEGATIVE)
@@ -110,8 +108,7 @@ def test_a_negative_number_that_engines_take_is_told(
 
 @pytest.mark.parametrize("text", UNUSUAL)
 def test_an_unusual_number_is_taken(text: str, backend: str, tmp_path: Path) -> None:
-    with opened(model_of(tmp_path, text, backend=backend)) as (model, data):
-        sm.step(model, data, 20)
+    with opened(model_of(tmp_path, text, backend=backend), nstep=20) as (_, data):
         assert np.isfinite(data.qpos).all()
 
 
@@ -153,8 +150,7 @@ for each in caught:
     print(each.category.__name__, each.message)
 """
     done = in_its_own_python(code, tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("EngineWarning MuJoCo")
+    assert (done.stdout[:20], done.stderr) == ("EngineWarning MuJoCo", "")
     assert "contains a 'NaN'" in done.stdout
     assert backend == "mujoco" or "m.xml" in done.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["m.xml"]
@@ -176,9 +172,8 @@ def test_a_load_gives_back_the_handler_of_others(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("model", [5, None, b"so101", ["so101"], 1.5, object()])
 def test_what_is_no_name_of_a_model(model: Any) -> None:
-    with pytest.raises(TypeError, match="its name or a path") as caught:
+    with one_line_error(TypeError, match="its name or a path"):
         sm.load(model)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("word", [[], {}, None, 5, np.array([1, 2]), b"mujoco", "mujcoo"])
@@ -199,9 +194,8 @@ def test_what_is_no_name_of_a_backend_or_of_defaults(argument: str, word: Any) -
 )  # fmt: skip
 def test_options_of_the_wrong_kind_are_one_line(option: str, value: Any) -> None:
     model = sm.load("so101")
-    with pytest.raises(StateMachineError) as caught:
+    with one_line_error(StateMachineError):
         model.replace(**{option: value})
-    assert "\n" not in str(caught.value)
 
 
 class Lines:
@@ -220,8 +214,7 @@ class Lines:
     ],
 )
 def test_a_repr_of_many_lines_is_one_line_of_a_message(call: Any) -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data, pytest.raises(StateMachineError) as caught:
+    with opened(sm.load("so101")) as (model, data), pytest.raises(StateMachineError) as caught:
         call(model, data, Lines())
     assert len(str(caught.value).splitlines()) == 1
     assert "\x1b" not in str(caught.value)

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,6 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main
 from statemachine.errors import BadInputError, MissingEngineError, StateMachineError
 from statemachine.runs import record_scenario
 from statemachine.runs.scenarios import scenario
@@ -40,7 +39,17 @@ from statemachine.sweep.folder import locked, settle_manifest
 from statemachine.sweep.rows import KEY, RowWriter, counted, remove_failed
 from statemachine.sweep.worker import differing, run_batch
 
-from .conftest import ROOT, in_its_own_python, need_engine, written
+from .conftest import (
+    ROOT,
+    Cli,
+    in_its_own_python,
+    need_engine,
+    one_line,
+    one_line_error,
+    refused,
+    soon,
+    written,
+)
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("joblib")
@@ -80,8 +89,7 @@ def mended(model, data, gain=1.0):
 @pytest.fixture
 def policy(tmp_path: Path) -> str:
     """A file of functions."""
-    file = written(tmp_path / "policy.py", POLICY)
-    return str(file)
+    return str(written(tmp_path / "policy.py", POLICY))
 
 
 def small(what: str, *vary: str, **others: Any) -> Sweep:
@@ -195,15 +203,13 @@ def test_what_is_refused_before_anything_runs(
     monkeypatch.chdir(Path(policy).parent)
     given = asked if isinstance(asked, dict) else {"vary": asked}
     sweep = dataclasses.replace(small("hold"), **given)
-    with pytest.raises(StateMachineError, match=re.escape(says)) as caught:
+    with one_line_error(StateMachineError, match=re.escape(says)):
         prepared(sweep)
-    assert "\n" not in str(caught.value)
 
 
-def test_many_cells_are_told_beforehand(capsys: pytest.CaptureFixture[str]) -> None:
+def test_many_cells_are_told_beforehand(here: Cli) -> None:
     assert any("20,000 cells" in line for line in prepared(small("hold", seeds=20_000)).said)
-    assert main(["sweep", "hold", "--out", ""]) == 2
-    assert "has no name" in capsys.readouterr().err
+    one_line(here("sweep", "hold", "--out", ""), "has no name")
 
 
 def test_the_points_of_a_design() -> None:
@@ -267,8 +273,7 @@ def test_a_cell_is_the_run_of_a_trace(backend: str) -> None:
     site = model.site_id("gripperframe")
     assert np.allclose(row["sample_tip"], trace["site_xpos"][rows, site], atol=1e-9)
     assert np.isclose(row["energy"], trace["energy"][-1].sum(), atol=1e-9)
-    touches = trace["contact_row"]
-    assert row["first_touch"] == trace.time[touches[0]]
+    assert row["first_touch"] == trace.time[trace["contact_row"][0]]
     assert row["touch"]
 
 
@@ -333,16 +338,16 @@ def test_a_request_is_kept_and_another_one_refused(tmp_path: Path) -> None:
     assert design_of(told) == first.design
     assert (told["cells"], told["points"]) == (2, 2)
     longer = prepared(small("hold", "timestep=0.005,0.01", seconds=0.1))
-    with pytest.raises(BadInputError, match=r"seconds 0.05 there, 0.1 here"):
-        settle_manifest(tmp_path, longer.manifest(), True)
     more = prepared(small("hold", "timestep=0.005,0.01", seeds=2))
-    with pytest.raises(BadInputError, match=r"seeds 1 there, 2 here.*--extend"):
-        settle_manifest(tmp_path, more.manifest(), False)
+    for another, extend, says in (
+        (longer, True, r"seconds 0.05 there, 0.1 here"),
+        (prepared(small("hold", "damping=1")), True, "varies timestep"),
+        (more, False, r"seeds 1 there, 2 here.*--extend"),
+    ):
+        with pytest.raises(BadInputError, match=says):
+            settle_manifest(tmp_path, another.manifest(), extend)
     settle_manifest(tmp_path, more.manifest(), True)
     assert read_manifest(tmp_path)["design"]["seeds"] == 2
-    other = prepared(small("hold", "damping=1"))
-    with pytest.raises(BadInputError, match="varies timestep"):
-        settle_manifest(tmp_path, other.manifest(), True)
 
 
 def test_two_drivers_are_refused(tmp_path: Path) -> None:
@@ -351,16 +356,21 @@ def test_two_drivers_are_refused(tmp_path: Path) -> None:
             "from pathlib import Path; from statemachine.sweep.folder import locked\n"
             f"with locked(Path({str(tmp_path)!r})): pass"
         )
-        done = in_its_own_python(code, tmp_path)
-        assert "another sweep runs in" in done.stderr
+        assert "another sweep runs in" in in_its_own_python(code, tmp_path).stderr
     with locked(tmp_path):  # it was let go
         pass
 
 
-def test_rows_are_written_whole_and_read_in_order(tmp_path: Path) -> None:
+@pytest.fixture
+def two_rows(tmp_path: Path) -> tuple[RowWriter, list[Any]]:
+    """Who writes a sweep of two cells into the folder, and their rows."""
     sweep = prepared(small("hold", "timestep=0.005,0.01"))
     rows = run_batch(sweep, list(sweep.cells("mujoco")), False)
-    writer = RowWriter(tmp_path, sweep.design.factors, {"request": {}})
+    return RowWriter(tmp_path, sweep.design.factors, {"request": {}}), rows
+
+
+def test_rows_are_written_whole_and_read_in_order(two_rows: Any, tmp_path: Path) -> None:
+    writer, rows = two_rows
     for row in rows:
         writer.add([row])
         writer.flush()
@@ -443,8 +453,7 @@ def test_other_readers_can_verify_the_pages(dataset: Path) -> None:
 
 
 def test_a_file_says_what_it_is_without_the_manifest(dataset: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
-    schema = parquet.read_schema(_part(dataset))
+    schema = pytest.importorskip("pyarrow.parquet").read_schema(_part(dataset))
     facts = {field.name: field.metadata for field in schema}
     assert all(facts.values())
     assert b"multiple of the model's own" in facts["vary.damping"][b"meaning"]
@@ -489,20 +498,24 @@ def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_
 
 def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(BadInputError, match=r"holds thesis.tex and no sweep\.json"):
-        run_sweep(prepared(small("hold")), tmp_path)
-    with pytest.raises(FileExistsError):
-        run_sweep(prepared(small("hold")), tmp_path / "thesis.tex")
+    refused(
+        (
+            BadInputError,
+            r"holds thesis.tex and no sweep\.json",
+            lambda: run_sweep(prepared(small("hold")), tmp_path),
+        ),
+        (FileExistsError, "", lambda: run_sweep(prepared(small("hold")), tmp_path / "thesis.tex")),
+    )
 
 
 def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> None:
     sweep = prepared(small("hold"))
     whole = json.dumps(sweep.manifest())
     (tmp_path / "cells").mkdir()
-    with pytest.raises(BadInputError, match=r"holds cells and no sweep\.json"):
-        run_sweep(sweep, tmp_path)
-    with pytest.raises(BadInputError, match=r"is no sweep: it has no sweep\.json"):
-        read_manifest(tmp_path)
+    refused(
+        (BadInputError, r"holds cells and no sweep\.json", lambda: run_sweep(sweep, tmp_path)),
+        (BadInputError, r"is no sweep: it has no sweep\.json", lambda: read_manifest(tmp_path)),
+    )
     for text in (
         whole[:200],
         '{"schema": 2}',
@@ -573,15 +586,6 @@ def slow_sweep(policy: str, *more: str) -> list[str]:
     return [*words, "--seconds", "0.1", "--backend", "mujoco", "--out", "out", *more]
 
 
-def _until(what: Callable[[], Any], seconds: float = 120.0) -> Any:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if found := what():
-            return found
-        time.sleep(0.1)
-    raise AssertionError("it did not happen")
-
-
 def _group(leader: int) -> list[str]:
     """The processes of a group."""
     listed = subprocess.run(["ps", "-eo", "pgid,args"], capture_output=True, text=True, check=True)
@@ -593,12 +597,12 @@ def _group(leader: int) -> list[str]:
 def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Start) -> None:
     words, out = slow_sweep(policy, "--jobs", "2", "--json"), tmp_path / "out"
     driver = start(*words)
-    _until(lambda: list(out.glob("cells/*/part-*.parquet")))
+    assert soon(lambda: list(out.glob("cells/*/part-*.parquet")), 120)
     os.kill(driver.pid, signal.SIGKILL)
     driver.communicate()
     before = dict(counted(out))
     assert 0 < len(before) < 60
-    _until(lambda: not _group(driver.pid))  # its workers end by themselves
+    assert soon(lambda: not _group(driver.pid), 120)  # its workers end by themselves
     second = start(*words)
     told, error = second.communicate()
     assert second.returncode == 0, error
@@ -613,6 +617,16 @@ def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Sta
 STOPPED = "statemachine: stopped; out has what was done. Type the same to go on\n"
 
 
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    """A scheduler of Dask on this machine, with two workers."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as running:
+        yield running
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no such signals")
 @pytest.mark.parametrize("jobs", ["1", "2"])
@@ -622,7 +636,7 @@ def test_a_sweep_that_is_stopped_keeps_what_was_done(
     policy: str, tmp_path: Path, start: Start, jobs: str, begun: str, how: str
 ) -> None:
     driver = start(*slow_sweep(policy, "--jobs", jobs))
-    _until(lambda: list((tmp_path / "out").glob(begun)))
+    assert soon(lambda: list((tmp_path / "out").glob(begun)), 120)
     time.sleep(0.4)  # its workers begin, and must not say that they were interrupted
     if how == "SIGTERM":  # of a batch system, to the driver alone
         os.kill(driver.pid, signal.SIGTERM)
@@ -638,31 +652,27 @@ def test_a_sweep_that_is_stopped_keeps_what_was_done(
     done = len(dict(counted(tmp_path / "out")))
     assert done < 60
     assert done or begun == "sweep.json"
-    _until(lambda: not _group(driver.pid), 10)
+    assert soon(lambda: not _group(driver.pid), 10)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no such signals")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_sweep_on_dask_that_is_stopped_goes_on(
-    policy: str, tmp_path: Path, start: Start, number: int
+    policy: str, tmp_path: Path, start: Start, number: int, cluster: Any
 ) -> None:
-    distributed = pytest.importorskip("distributed")
-    words = slow_sweep(policy, "--json", "--scheduler")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as cluster:
-        driver = start(*words, cluster.scheduler_address)
-        _until(lambda: list((tmp_path / "out").glob("cells/*/part-*.parquet")))
-        os.kill(driver.pid, number)
-        told, error = driver.communicate(timeout=20)
-        assert driver.returncode == (130 if number == signal.SIGINT else -number)
-        assert (told, error) == ("", STOPPED if number == signal.SIGINT else "")
-        before = len(dict(counted(tmp_path / "out")))
-        assert 0 < before < 60
-        _until(lambda: not _group(driver.pid), 10)
-        second = start(*words, cluster.scheduler_address)  # on the same workers
-        told, error = second.communicate(timeout=120)
+    words = slow_sweep(policy, "--json", "--scheduler", cluster.scheduler_address)
+    driver = start(*words)
+    assert soon(lambda: list((tmp_path / "out").glob("cells/*/part-*.parquet")), 120)
+    os.kill(driver.pid, number)
+    told, error = driver.communicate(timeout=20)
+    assert driver.returncode == (130 if number == signal.SIGINT else -number)
+    assert (told, error) == ("", STOPPED if number == signal.SIGINT else "")
+    before = len(dict(counted(tmp_path / "out")))
+    assert 0 < before < 60
+    assert soon(lambda: not _group(driver.pid), 10)
+    second = start(*words)  # on the same workers
+    told, error = second.communicate(timeout=120)
     assert second.returncode == 0, error
     summary = json.loads(told)
     assert (summary["done"], summary["ran"]) == (60, 60 - before)
@@ -708,10 +718,8 @@ def test_cells_that_failed_are_run_again_if_asked(
     assert read_cells(tmp_path / "out")["error"].null_count == 8
 
 
-def test_the_rows_of_failed_cells_are_removed_alone(tmp_path: Path) -> None:
-    sweep = prepared(small("hold", "timestep=0.005,0.01"))
-    rows = run_batch(sweep, list(sweep.cells("mujoco")), False)
-    writer = RowWriter(tmp_path, sweep.design.factors, {"request": {}})
+def test_the_rows_of_failed_cells_are_removed_alone(two_rows: Any, tmp_path: Path) -> None:
+    writer, rows = two_rows
     writer.add([{**rows[0], "status": "failed", "error_class": "DivergedError"}, rows[1]])
     writer.flush()
     remove_failed(tmp_path)
@@ -720,15 +728,9 @@ def test_the_rows_of_failed_cells_are_removed_alone(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
-def test_dask_with_a_worker_that_is_killed(policy: str, tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
+def test_dask_with_a_worker_that_is_killed(policy: str, tmp_path: Path, cluster: Any) -> None:
     sweep = small(f"{policy}:slow", "gain=1:24:24", seconds=0.2)
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
+    with cluster.get_client() as client:
         first = next(iter(client.run(os.getpid).values()))
         killed: list[int] = []
 

@@ -33,6 +33,8 @@ from statemachine.sweep.folder import design_of, read_manifest
 from statemachine.sweep.request import MANIFEST_VERSION
 from statemachine.sweep.rows import DONE, FAILED, RowWriter, read_cells, schema_of
 
+from .conftest import Cli, assert_in, one_line, refused
+
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
 TipOf = Callable[..., Any]
@@ -161,8 +163,7 @@ def test_sobol_indices_are_those_of_the_ishigami_function(tmp_path: Path) -> Non
 def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> None:
     factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
     design = Design(factors, samples=256, indices=True, seed=1)
-    points = list(design.points())
-    gone = points[300].values
+    gone = list(design.points())[300].values
     folder = made_up(
         tmp_path / "s", design, nowhere, ishigami, fails=lambda b, v, _: b == "mujoco" and v == gone
     )
@@ -171,8 +172,7 @@ def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> 
     assert found.quantity.counts["no runs"] == 1
     assert the(found.sensitivity).samples == 128
     assert "1 of 256 samples" in the(found.sensitivity).notes[0]
-    said = text(page(found))
-    assert "failed with DivergedError: 1" in said
+    assert "failed with DivergedError: 1" in text(page(found))
     assert shares(found)["y"][0] == pytest.approx(ISHIGAMI["y"][0], abs=0.15)
 
 
@@ -236,8 +236,11 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
         expected = None if (x, y) == (3.0, 0.0) else pytest.approx(1e-3 * (float(x) + float(y)))
         assert value == expected
     said = text(page(found))
-    assert "In 2 of 10 settings mujoco and pybullet agree within 1.5 mm" in said
-    assert "failed with DivergedError: 2" in said
+    assert_in(
+        said,
+        "In 2 of 10 settings mujoco and pybullet agree within 1.5 mm",
+        "failed with DivergedError: 2",
+    )
     assert "thereby have no gap: 1" in " ".join(said.split())
     assert max(map(len, said.splitlines())) <= 80
 
@@ -263,8 +266,7 @@ def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
     found, settings = agreement_of(data, "tip", width, ModelFacts(), tolerances)
     verdicts = {each.values[0]: each.verdict for each in settings if each.values[1] == 0}
     assert verdicts == {0: "agrees", 1: "agrees", 2: "chaos", 3: "no runs", 4: "differs"}
-    chart = gap_map(data, "tip", width, None)
-    assert the(chart).inside[0] == (True, True, True, False, False)
+    assert the(gap_map(data, "tip", width, None)).inside[0] == (True, True, True, False, False)
     assert found.counts["chaos"] == 2
 
 
@@ -275,8 +277,7 @@ def fitted(
     design = Design((grid("gain", 0, 2, 9, kind="parameter"), grid("y", 0, 1, 2)))
 
     def right(gain: float, _y: float, seed: int) -> list[float]:
-        shift = best + spread * (seed - (seeds - 1) / 2)
-        return [5e-3 * (gain - shift), least, 0.0]
+        return [5e-3 * (gain - (best + spread * (seed - (seeds - 1) / 2))), least, 0.0]
 
     folder = made_up(folder, design, nowhere, right, seeds)
     return of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])
@@ -414,23 +415,20 @@ def test_an_axis_says_what_its_values_are_in() -> None:
     }  # fmt: skip
 
 
-def test_what_does_not_go_together_is_said(tmp_path: Path, capsys: Any) -> None:
-    folder = str(agreement(tmp_path / "s"))
-
-    def says(*words: str) -> str:
-        assert main(["sweep", *words]) == 2
-        return str(capsys.readouterr().err)
-
-    assert "goes with --report" in says("hold", "--out", folder, "--fit", "x")
-    assert "--report DIR" in says("hold")
-    assert "takes no folder" in says("hold", "--out", "there", "--report", folder)
-    assert "is no sweep" in says("--report", str(tmp_path))
-    with pytest.raises(UnknownNameError, match="parameter"):
-        of(Path(folder), fit=["z"])
-    with pytest.raises(UnknownNameError, match="quantity"):
-        of(Path(folder), quantity="touch")
-    with pytest.raises(BadInputError, match="two engines"):
-        of(Path(folder), backends=["mujoco"])
+def test_what_does_not_go_together_is_said(tmp_path: Path, here: Cli) -> None:
+    folder = agreement(tmp_path / "s")
+    for words, says in (
+        (("hold", "--out", folder, "--fit", "x"), "goes with --report"),
+        (("hold",), "--report DIR"),
+        (("hold", "--out", "there", "--report", folder), "takes no folder"),
+        (("--report", tmp_path), "is no sweep"),
+    ):
+        one_line(here("sweep", *words), says)
+    refused(
+        (UnknownNameError, "parameter", lambda: of(Path(folder), fit=["z"])),
+        (UnknownNameError, "quantity", lambda: of(Path(folder), quantity="touch")),
+        (BadInputError, "two engines", lambda: of(Path(folder), backends=["mujoco"])),
+    )
 
 
 def test_runs_of_several_lengths_keep_their_last_moment_last() -> None:
@@ -489,8 +487,11 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
     assert found.verdict == "closer"
     assert found.cells == 2 * (1 + REFINED)
     said = " ".join(text(page(dataclasses.replace(report, together=(found,)))).split())
-    assert "gain = 0.625 ± 0.031 in both brings mujoco and pybullet closer" in said
-    assert "9 values from 0.5 to 0.75 were run, 0.03125 apart" in said
+    assert_in(
+        said,
+        "gain = 0.625 ± 0.031 in both brings mujoco and pybullet closer",
+        "9 values from 0.5 to 0.75 were run, 0.03125 apart",
+    )
     # Where it agrees with the fit nothing more is run.
     runner = _Runs(nowhere, lambda gain, _: along_x(5e-3 * (gain - 0.61)))
     folder = made_up(tmp_path / "t", Design((vary,)), *runner._of.values())

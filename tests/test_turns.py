@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import linecache
 import os
 import sys
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -25,7 +23,15 @@ from statemachine.errors import (
 )
 from statemachine.interface import DERIVED
 
-from .conftest import ROOT, in_its_own_python, need_engine, opened, registered
+from .conftest import (
+    ROOT,
+    interrupted_at,
+    opened,
+    raised_in_a_thread,
+    refused,
+    registered,
+    runs_in_silence,
+)
 from .small_models import crowded
 
 Use = Callable[[sm.Model, sm.Data], object]
@@ -47,30 +53,19 @@ USES: dict[str, Use] = {
 }
 
 
-@pytest.fixture(params=["mujoco", "pybullet"])
-def model(request: pytest.FixtureRequest) -> sm.Model:
-    need_engine(request.param)
-    return sm.load("so101/scene_box", backend=request.param)
+@pytest.fixture
+def model(box: sm.Model) -> sm.Model:
+    return box
 
 
-def _meanwhile(data: sm.Data, use: Callable[[], object]) -> list[Exception | None]:
+def _meanwhile(data: sm.Data, use: Callable[[], object]) -> list[BaseException | None]:
     """Let another thread use something in the middle of the next step; what it raised."""
     right, raised = data._advance, []
-
-    def work() -> None:
-        try:
-            use()
-        except Exception as error:
-            raised.append(error)
-        else:
-            raised.append(None)
 
     def advance(*args: object) -> None:
         object.__setattr__(data, "_advance", right)
         right(*args)
-        thread = threading.Thread(target=work)
-        thread.start()
-        thread.join()
+        raised.append(raised_in_a_thread(use))
 
     object.__setattr__(data, "_advance", advance)
     return raised
@@ -97,21 +92,12 @@ def test_a_reset_under_way_is_a_busy_data(
     model: sm.Model, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Not one that diverged: it is only in the middle of a reset."""
-    raised: list[Exception] = []
-
-    def use() -> None:
-        try:
-            USES[name](model, data)
-        except Exception as error:
-            raised.append(error)
-
+    raised: list[BaseException | None] = []
     with sm.make_data(model) as data:
         right = type(data)._reset
 
         def slow(self: Any, key: int | None) -> None:
-            thread = threading.Thread(target=use)
-            thread.start()
-            thread.join()
+            raised.append(raised_in_a_thread(lambda: USES[name](model, data)))
             right(self, key)
 
         with monkeypatch.context() as patch:
@@ -168,8 +154,7 @@ def test_two_data_in_two_threads_equal_serial(model: sm.Model) -> None:
 
     def run(seed: int) -> list[bytes]:
         generator, blobs = np.random.default_rng(seed), []
-        with sm.make_data(model) as data:
-            sm.reset(model, data, 0)
+        with opened(model, 0) as (_, data):
             for k in range(150):
                 data.ctrl[:] += generator.normal(scale=0.02, size=model.nu)
                 sm.step(model, data, 1 + k % 3)
@@ -189,37 +174,9 @@ def test_two_data_in_two_threads_equal_serial(model: sm.Model) -> None:
         sys.setswitchinterval(interval)
 
 
-def _interrupted(call: Callable[[], object], at: int) -> bool:
-    """Whether `call` was interrupted at its n-th line within the library."""
-    left = at
-
-    def trace(frame: Any, event: str, _arg: object) -> Any:
-        nonlocal left
-        if "statemachine" not in frame.f_code.co_filename:
-            return None
-        # No signal is looked at between the end of a lock's block and its release.
-        if linecache.getline(frame.f_code.co_filename, frame.f_lineno).strip().startswith("with "):
-            return trace
-        left -= 1
-        if left == 0:
-            raise KeyboardInterrupt
-        return trace
-
-    before = sys.gettrace()
-    sys.settrace(trace)
-    try:
-        call()
-    except KeyboardInterrupt:
-        return True
-    finally:
-        sys.settrace(before)
-    return False
-
-
 @pytest.mark.parametrize("verb", ["step", "reset", "set_state", "forward", "get_state"])
 def test_an_interrupted_verb_completes_or_undoes_or_refuses(verb: str) -> None:
-    model = sm.load("so101/scene_box")
-    with sm.make_data(model) as data, sm.make_data(model) as twin:
+    with opened(sm.load("so101/scene_box")) as (model, data), sm.make_data(model) as twin:
         sm.reset(model, data, 0)
         sm.step(model, data, 20)
         base = sm.get_state(model, data)
@@ -236,7 +193,7 @@ def test_an_interrupted_verb_completes_or_undoes_or_refuses(verb: str) -> None:
         calls[verb](model, twin)
         allowed = {start.blob, sm.get_state(model, twin).blob}
         at = 0
-        while _interrupted(lambda: calls[verb](model, data), at := at + 1):
+        while interrupted_at(at := at + 1, lambda: calls[verb](model, data), "statemachine"):
             if data._trouble:
                 assert "interrupted" in data._trouble
                 with pytest.raises(DivergedError, match="interrupted"):
@@ -248,8 +205,7 @@ def test_an_interrupted_verb_completes_or_undoes_or_refuses(verb: str) -> None:
 
 
 def test_a_state_that_is_refused_leaves_the_data_as_it_was() -> None:
-    with opened(sm.load("so101")) as (model, data):
-        sm.step(model, data, 3)
+    with opened(sm.load("so101"), nstep=3) as (model, data):
         before = sm.get_state(model, data)
 
         def refuse(self: MujocoData, state: sm.State) -> None:
@@ -281,10 +237,10 @@ def test_inputs_that_were_made_read_only_are_found_before_anything_moves(backend
 
 def test_an_engine_that_gives_up_in_forward_is_an_error_of_ours(tmp_path: Any) -> None:
     with opened(crowded(tmp_path, 30, "100K")) as (model, data):
-        with pytest.raises(EngineError, match="gave up"):
-            sm.forward(model, data)
-        with pytest.raises(DivergedError, match="gave up"):
-            sm.forward(model, data)
+        refused(
+            (EngineError, "gave up", lambda: sm.forward(model, data)),
+            (DivergedError, "gave up", lambda: sm.forward(model, data)),
+        )
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
@@ -339,8 +295,7 @@ ended.set()
 thread.join()
 raise SystemExit(status)
 """
-    done = in_its_own_python(code, ROOT)
-    assert done.returncode == 0, done.stderr[-300:]
+    runs_in_silence(code, ROOT)
 
 
 def test_a_data_closed_by_a_signal_handler_in_a_step_says_so() -> None:

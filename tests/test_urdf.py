@@ -162,8 +162,7 @@ def test_masses_and_inertias_survive(tmp_path: Path, pinocchio: None) -> None:
     built = pin.buildModelFromUrdf(str(file))
     order = [list(built.names).index(name) - 1 for name in model.joint_names]
     # Gravity as the root sees it.
-    turn = matrix_from_quat(model.raw.body_quat[1])
-    built.gravity.linear = turn.T @ np.array([0, 0, -9.81])
+    built.gravity.linear = matrix_from_quat(model.raw.body_quat[1]).T @ np.array([0, 0, -9.81])
     work, random = built.createData(), np.random.default_rng(4)
     data = mujoco.MjData(model.raw)
     for _ in range(5):

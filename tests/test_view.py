@@ -41,16 +41,10 @@ from statemachine.view.pace import Pacer
 from statemachine.view.recording import TraceSession
 from statemachine.view.session import LiveSession
 
-from .conftest import ROOT, Cli, one_line
+from .conftest import ROOT, Cli, assert_in, in_its_own_python, one_line, opened, refused
 from .small_models import ODD_DRIVES, model_of
 
 SCENE = "so101/scene_box"
-
-
-@pytest.fixture
-def viser() -> None:
-    """Only where viser is."""
-    pytest.importorskip("viser")
 
 
 @pytest.fixture
@@ -69,8 +63,10 @@ def session(backend: str) -> Iterator[LiveSession]:
 
 def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -> None:
     """Bit by bit, with the box in the jaws, seen after every step and never."""
-    model = sm.load(SCENE, backend=backend)
-    with sm.make_data(model) as plain, LiveSession([model], "held") as session:
+    with (
+        opened(sm.load(SCENE, backend=backend)) as (model, plain),
+        LiveSession([model], "held") as session,
+    ):
         sm.reset(model, plain, "held")
         frame = session.frame()
         for k in range(150):
@@ -221,14 +217,16 @@ def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
 
 def test_a_session_refuses_what_does_not_fit(odd: sm.Model) -> None:
     scene = sm.load("so101/scene")
-    with pytest.raises(BadInputError, match="another model"):
-        LiveSession([scene, odd])
-    with pytest.raises(BadInputError, match="timesteps differ"):
-        LiveSession([scene, scene.replace(timestep=0.001)])
-    with pytest.raises(UnknownNameError, match="hled"):
-        LiveSession([sm.load(SCENE)], "hled")
-    with pytest.raises(UnknownNameError):
-        LiveSession([scene], site="nose")
+    refused(
+        (BadInputError, "another model", lambda: LiveSession([scene, odd])),
+        (
+            BadInputError,
+            "timesteps differ",
+            lambda: LiveSession([scene, scene.replace(timestep=0.001)]),
+        ),
+        (UnknownNameError, "hled", lambda: LiveSession([sm.load(SCENE)], "hled")),
+        (UnknownNameError, "", lambda: LiveSession([scene], site="nose")),
+    )
 
 
 def test_sliders_speak_degrees_where_an_angle_is_asked_for(odd: sm.Model) -> None:
@@ -259,10 +257,8 @@ def test_the_fingertip_is_the_usual_site_or_the_one_that_was_named(odd: sm.Model
 
 def test_the_pacer_counts_the_steps_of_the_clock() -> None:
     pacer = Pacer(0.005, 1.0, now=100.0)
-    assert pacer.due(100.0) == 0
-    assert pacer.due(100.0049) == 0
-    assert pacer.due(100.005) == 1
-    assert pacer.due(101.0) == 200
+    for now, due in ((100.0, 0), (100.0049, 0), (100.005, 1), (101.0, 200)):
+        assert pacer.due(now) == due
     pacer.took(200, 101.0)
     assert pacer.due(101.0) == 0
     assert pacer.factor(101.0) == pytest.approx(1)
@@ -358,8 +354,7 @@ def test_an_engine_that_is_too_slow_is_said_and_does_not_lag_ever_more() -> None
         assert pace.reached == pytest.approx(1.0, abs=0.02)
         assert not pace.late
         # What it lost is not made up for in a rush: a quarter of a second at most.
-        after = np.diff([shown[0].time for shown in hand.shown])[len(gaps) :]
-        assert after.sum() < 3.0 + 0.26
+        assert np.diff([shown[0].time for shown in hand.shown])[len(gaps) :].sum() < 3.0 + 0.26
 
 
 def test_time_that_stood_is_not_owed() -> None:
@@ -458,10 +453,14 @@ def test_a_recording_is_played_and_sought() -> None:
 
 def test_recordings_that_do_not_fit_are_refused(odd: sm.Model) -> None:
     one = record(sm.load("so101/scene"), seconds=0.05)
-    with pytest.raises(TraceError, match="another model"):
-        TraceSession([one, record(odd, seconds=0.05)])
-    with pytest.raises(TraceError, match="cannot be drawn"):
-        TraceSession([record(sm.load("so101/scene"), seconds=0.05, derive=False)])
+    refused(
+        (TraceError, "another model", lambda: TraceSession([one, record(odd, seconds=0.05)])),
+        (
+            TraceError,
+            "cannot be drawn",
+            lambda: TraceSession([record(sm.load("so101/scene"), seconds=0.05, derive=False)]),
+        ),
+    )
 
 
 def test_moments_that_are_not_the_same_are_not_compared() -> None:
@@ -513,13 +512,14 @@ class Viewer:
         assert self.process.stdout is not None
         return self.process.stdout.readline()
 
-    def end(self) -> tuple[int, str, str]:
-        """Exit code, the rest of what it said, and its complaints."""
+    def end(self) -> str:
+        """The rest of what it said; it ended well, and complained of nothing."""
         assert self.process.stdout is not None
         rest = self.process.stdout.read()
         code = self.process.wait(timeout=30)
         self._said.seek(0)
-        return code, rest, self._said.read()
+        assert (code, self._said.read()) == (0, "")
+        return rest
 
     def __enter__(self) -> Self:
         return self
@@ -565,7 +565,7 @@ def test_it_listens_on_loopback_alone_and_ctrl_c_ends_it(tmp_path: Path) -> None
             with pytest.raises(OSError):  # who listens everywhere listens here too
                 socket.create_connection(("127.0.0.2", port), timeout=5)
         viewer.process.send_signal(signal.SIGINT)
-        assert viewer.end() == (0, "", "")
+        assert viewer.end() == ""
     with socket.socket() as again:
         again.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         again.bind(("127.0.0.1", port))
@@ -580,8 +580,7 @@ def test_a_taken_port_is_said_and_the_next_one_is_taken(tmp_path: Path) -> None:
         with Viewer(tmp_path, "--port", str(port), "--seconds", "0.1") as viewer:
             assert viewer.line() == f"port {port} is taken, so it is {port + 1}\n"
             assert f"http://localhost:{port + 1}" in viewer.line()
-            code, _, said = viewer.end()
-            assert (code, said) == (0, "")
+            viewer.end()
 
 
 @pytest.mark.usefixtures("viser")
@@ -590,8 +589,7 @@ def test_it_says_nothing_but_its_own_lines(tmp_path: Path) -> None:
     port = _free_pair()
     taken = {"_VISER_PORT_OVERRIDE": str(port + 1)}
     with Viewer(tmp_path, "--port", str(port), "--seconds", "0.2", "--paused", **taken) as viewer:
-        code, text, said = viewer.end()
-        assert (code, said) == (0, "")
+        text = viewer.end()
         assert len(text.splitlines()) == 4
         assert max(map(len, text.splitlines())) <= 80
         assert "viser" not in text
@@ -630,10 +628,7 @@ def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(tmp_path: Path) -> 
     file = write(record(model, seconds=0.1, keyframe=0, experiment="box"), tmp_path / "box.npz")
     port = str(_free_pair())
     with Viewer(tmp_path, str(file), str(file), "--port", port, "--seconds", "0.3") as viewer:
-        code, text, said = viewer.end()
-        assert (code, said) == (0, "")
-        assert "box of so101/scene_box" in text
-        assert f"mujoco {model.engine_version}" in text
+        assert_in(viewer.end(), "box of so101/scene_box", f"mujoco {model.engine_version}")
 
 
 def test_without_viser_the_extra_is_named(tmp_path: Path) -> None:
@@ -641,12 +636,7 @@ def test_without_viser_the_extra_is_named(tmp_path: Path) -> None:
         "import sys; sys.modules['viser'] = None\n"
         "from statemachine.cli import main; sys.exit(main(['view']))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
-    )
-    assert done.returncode == 3
-    assert "pip install 'statemachine-sim[view]'" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    one_line(in_its_own_python(code, ROOT), "pip install 'statemachine-sim[view]'", 3)
 
 
 def test_nobody_opens_a_tunnel_from_here(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,13 +13,9 @@ from statemachine.errors import MissingEngineError
 from statemachine.view import server as serving
 from statemachine.view.door import Door
 
-from .conftest import REQUIRED
+from .conftest import assert_in
 
-
-@pytest.fixture(autouse=True)
-def _viser() -> None:
-    if "browser" not in REQUIRED:
-        pytest.importorskip("viser")
+pytestmark = pytest.mark.usefixtures("viser")
 
 
 class Served:
@@ -82,8 +78,7 @@ def test_the_address_with_its_token_opens_the_page(served: Served) -> None:
     opened = served.get(f"/?token={served.door.token}")
     assert opened.status == 200
     kept = opened.headers["Set-Cookie"]
-    assert "HttpOnly" in kept
-    assert "SameSite=Strict" in kept
+    assert_in(kept, "HttpOnly", "SameSite=Strict")
     cookie = kept.partition(";")[0]
     assert served.get("/", Cookie=cookie).status == 200
     assert served.connects(Cookie=cookie, Origin=f"http://{served.own}")

@@ -31,7 +31,7 @@ from statemachine.errors import (
 )
 from statemachine.interface.worlds import WRITABLE
 
-from .conftest import SHARED, in_its_own_python, need_engine
+from .conftest import SHARED, opened, refused, runs_in_silence
 from .small_models import RICH, loaded, model_of
 
 N = 4
@@ -46,11 +46,6 @@ def worlds_of(model: sm.Model, n: int = N, **options: Any) -> many.Worlds:
 @pytest.fixture(params=["so101", "so101/scene_box"])
 def model(request: pytest.FixtureRequest, backend: str) -> sm.Model:
     return sm.load(request.param, backend=backend)
-
-
-@pytest.fixture
-def box(backend: str) -> sm.Model:
-    return sm.load("so101/scene_box", backend=backend)
 
 
 @pytest.fixture
@@ -178,13 +173,13 @@ def test_a_record_is_what_a_loop_reads(box: sm.Model, every: int, commanded: boo
             data.close()
 
 
-def single_error(model: sm.Model, spoil: Any, nstep: int) -> tuple[sm.Data, Any]:
-    data = sm.make_data(model)
-    sm.reset(model, data, 0)
-    spoil(data)
-    with pytest.raises(StateMachineError) as error:
-        sm.step(model, data, nstep)
-    return data, error.value
+def single_error(model: sm.Model, spoil: Any, nstep: int) -> Any:
+    """What a step of one Data raises after something was spoilt."""
+    with opened(model, 0) as (_, data):
+        spoil(data)
+        with pytest.raises(StateMachineError) as error:
+            sm.step(model, data, nstep)
+    return error.value
 
 
 SPOILS = {
@@ -211,8 +206,7 @@ def test_a_world_that_diverges_leaves_the_others_alone(
     model = worlds.model
     many.reset(worlds, keyframe=0)
     SPOILS[what](Row(worlds, 1))
-    step = 1 if recorded else 20
-    _, wanted = single_error(model, SPOILS[what], step)
+    wanted = single_error(model, SPOILS[what], 1 if recorded else 20)
     rows = {}
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
@@ -297,16 +291,14 @@ def test_assignment_copies_a_row_or_all(worlds: many.Worlds) -> None:
     worlds.time = 3
     many.step(worlds)
     assert worlds.time == pytest.approx([3 + model.timestep] * N)
-    refused: list[tuple[type[Exception], str, Any]] = [
+    wrong: list[tuple[type[Exception], str, Any]] = [
         *((BadInputError, "ctrl", np.zeros(shape)) for shape in ((N, model.nu + 1), (N + 1, 6))),
         *((BadInputError, "ctrl", bad) for bad in ("x", [[1], [1, 2]])),
         (BadInputError, "qvel", np.full((N, model.nv), np.inf)),
         (BadInputError, "qpos", np.zeros((N, model.nq))),  # with a quaternion of zeros
         *((ReadOnlyError, name, 1) for name in ("xpos", "n", "anything")),
     ]
-    for error, name, value in refused:
-        with pytest.raises(error):
-            setattr(worlds, name, value)
+    refused(*((error, "", partial(setattr, worlds, *rest)) for error, *rest in wrong))
     with pytest.raises(ValueError, match="read-only"):
         worlds.xpos[0] = 1
     assert np.array_equal(kept, 2 * commands(model, N))
@@ -325,7 +317,7 @@ def test_arguments_are_checked(worlds: many.Worlds) -> None:
     ctrls = [np.zeros((N, 4, model.nu)), np.zeros(model.nu), np.full((2, model.nu), np.nan)]
     makes: list[Any] = [{"n": 0}, {"n": 2, "workers": 0}, {"n": 2, "timestep": [0.1]}]
     anything: Any = many  # what is given to it is not always of the type that it wants
-    refused: dict[type[Exception], list[Callable[[], object]]] = {
+    wrong: dict[type[Exception], list[Callable[[], object]]] = {
         BadInputError: [
             *(partial(verb, worlds, ids=i) for i in ids
               for verb in (many.step, many.forward, many.reset)),
@@ -347,10 +339,7 @@ def test_arguments_are_checked(worlds: many.Worlds) -> None:
         ],
         UnsupportedError: [partial(many.make_worlds, model, 2, colour=[1, 2])],
     }  # fmt: skip
-    for error, calls in refused.items():
-        for call in calls:
-            with pytest.raises(error):
-                call()
+    refused(*((error, "", call) for error, calls in wrong.items() for call in calls))
     many.step(worlds, ids=[])
     assert not worlds.time.any()
     assert not worlds.xpos.any()
@@ -392,10 +381,10 @@ def test_what_is_not_kept_is_not_there(box: sm.Model) -> None:
         many.step(worlds)
         assert worlds.derived == ("xpos",)
         assert worlds.xpos.shape == (2, box.nbody, 3)
-        with pytest.raises(AttributeError, match="do not keep 'qacc'"):
-            _ = worlds.qacc
-        with pytest.raises(UnknownNameError):
-            many.record(worlds, 1, ["qacc"])
+        refused(
+            (AttributeError, "do not keep 'qacc'", lambda: worlds.qacc),
+            (UnknownNameError, "", lambda: many.record(worlds, 1, ["qacc"])),
+        )
 
 
 def test_closed_worlds_keep_their_inputs_and_refuse(box: sm.Model) -> None:
@@ -467,19 +456,9 @@ def test_worlds_belong_to_the_process_that_made_them(worlds: many.Worlds) -> Non
     assert worlds.time.all()
 
 
-@pytest.fixture
-def mujoco_() -> None:
-    need_engine("mujoco")
-
-
-@pytest.fixture
-def rich(mujoco_: None, tmp_path: Path) -> sm.Model:
-    return model_of(tmp_path, RICH)
-
-
 @pytest.mark.parametrize("substeps", [1, 2])
-def test_what_a_file_may_have(rich: sm.Model, substeps: int) -> None:
-    model = rich.replace(substeps=substeps)
+def test_what_a_file_may_have(tmp_path: Path, substeps: int) -> None:
+    model = model_of(tmp_path, RICH, substeps=substeps)
     with worlds_of(model, 5, workers=3) as worlds:
         follow(model, worlds)
         data = sm.make_data(model)
@@ -503,39 +482,36 @@ ROBOTS = {
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_robots_of_others(mujoco_: None, name: str) -> None:
+def test_robots_of_others(name: str) -> None:
     path = SHARED / "robots" / "models" / ROBOTS[name]
     if not path.exists():
         pytest.skip(f"no {path.relative_to(SHARED.parent)} beside the checkout")
-    model = sm.load(path)
-    with worlds_of(model, 3) as worlds:
-        follow(model, worlds, 4)
+    with worlds_of(sm.load(path), 3) as worlds:
+        follow(worlds.model, worlds, 4)
 
 
-def test_where_the_engine_resets_by_itself(mujoco_: None) -> None:
+def test_where_the_engine_resets_by_itself() -> None:
     model = sm.load("so101/scene_box", defaults="engine")
     with worlds_of(model) as worlds:
         many.reset(worlds, keyframe=0)
         worlds.qvel[1] = 1e9
-        _, wanted = single_error(model, SPOILS["too fast"], 20)
+        wanted = single_error(model, SPOILS["too fast"], 20)
         with pytest.warns(DivergedWarning):
             many.step(worlds, 20)
         assert str(worlds.diverged[1]).split(".")[0] == str(wanted).split(".")[0]
 
 
-def test_sleep_is_run_or_refused(mujoco_: None, tmp_path: Path) -> None:
+def test_sleep_is_run_or_refused(tmp_path: Path) -> None:
     flag = '<option timestep="0.002"><flag sleep="enable"/></option>'
-    text = RICH.replace('<option timestep="0.002"/>', flag)
-    model = model_of(tmp_path, text)
+    model = model_of(tmp_path, RICH.replace('<option timestep="0.002"/>', flag))
     with worlds_of(model, 3) as worlds:
         follow(model, worlds)
 
 
-def test_a_python_callback_is_refused(mujoco_: None) -> None:
+def test_a_python_callback_is_refused() -> None:
     import mujoco
 
-    model = sm.load("so101")
-    with worlds_of(model) as worlds:
+    with worlds_of(sm.load("so101")) as worlds:
         mujoco.set_mjcb_passive(lambda _m, _d: None)
         try:
             with pytest.raises(UnsupportedError, match="worlds"):
@@ -546,7 +522,7 @@ def test_a_python_callback_is_refused(mujoco_: None) -> None:
         assert worlds.time.all()
 
 
-def test_a_record_goes_on_past_a_warning_that_ends_nothing(mujoco_: None, tmp_path: Path) -> None:
+def test_a_record_goes_on_past_a_warning_that_ends_nothing(tmp_path: Path) -> None:
     """The engine's own rollout stops a world at any warning."""
     balls = "".join(
         f'<body pos="{0.05 * (k % 5)} {0.05 * (k // 5)} .04"><freejoint/><geom size=".05"/></body>'
@@ -568,7 +544,7 @@ def test_a_record_goes_on_past_a_warning_that_ends_nothing(mujoco_: None, tmp_pa
     assert {str(w.message) for w in ours} == {str(w.message) for w in single}
 
 
-def test_the_engine_prints_nothing_and_writes_no_log(mujoco_: None, tmp_path: Path) -> None:
+def test_the_engine_prints_nothing_and_writes_no_log(tmp_path: Path) -> None:
     code = """
 import warnings, numpy as np, statemachine as sm
 from statemachine import worlds as many
@@ -582,8 +558,7 @@ for _ in range(5):
     many.reset(worlds)
 worlds.close()
 """
-    done = in_its_own_python(code, tmp_path)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    runs_in_silence(code, tmp_path)
     assert not list(tmp_path.iterdir())
 
 

@@ -39,7 +39,7 @@ from statemachine.worlds import (
 )
 
 from . import faulty_world as faulty
-from .conftest import ROOT, lives, registered
+from .conftest import ROOT, lives, opened, registered, soon
 from .test_worlds import follow
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
@@ -70,12 +70,7 @@ def running(numbers: Iterable[int]) -> list[int]:
 
 
 def all_end(numbers: Iterable[int], seconds: float = 10.0) -> bool:
-    deadline = time.monotonic() + seconds
-    while running(numbers):
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.02)
-    return True
+    return soon(lambda: not running(numbers), seconds)
 
 
 def bits(array: Any) -> bytes:
@@ -207,8 +202,7 @@ def test_ctrl_c_ends_a_step_at_once_and_each_world_is_whole(
     worlds.ctrl[:] = 0
     step(worlds, 2)
     assert worlds.time == pytest.approx(times + 0.01)
-    with sm.make_data(model) as data:
-        sm.step(model, data, 2)
+    with opened(model, nstep=2) as (_, data):
         assert bits(worlds.qpos[2]) == bits(data.qpos)
 
 
@@ -265,8 +259,7 @@ def test_engines_are_silent_and_warn_once(
             step(worlds, 2)
         assert len(told) == 1
         assert told[0].filename == __file__
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             step(worlds, 2)
     assert capfd.readouterr() == ("", "")
 

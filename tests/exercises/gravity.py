@@ -115,8 +115,7 @@ def printed_only(model, seconds=4):
 
 @wrong("gravity", "ForeignDataError")
 def data_of_the_other_model(model, seconds=4):
-    data = sm.make_data(model)
-    return _fall(model, seconds), _fall(_limp(model), seconds, data=data)
+    return _fall(model, seconds), _fall(_limp(model), seconds, data=sm.make_data(model))
 
 
 @wrong("gravity", "are they its speed, qvel, or another joint? shoulder_lift is at qpos[")
@@ -142,8 +141,7 @@ def a_step_after_the_last_reading(model, seconds=4):
 
 @right("gravity")
 def limp_first_in_one_data_each(model, seconds=4):
-    off = _fall(_limp(model), seconds, ctrl=0.0)
-    return _fall(model, seconds), off
+    return _fall(model, seconds), _fall(_limp(model), seconds, ctrl=0.0)
 
 
 @right("gravity", raw=True)
