@@ -42,7 +42,7 @@ from statemachine.report.compare import page as compared
 from statemachine.report.events import events_of
 from statemachine.report.finding import headline
 from statemachine.report.html import SideDrawing, check_target, report, write_report
-from statemachine.report.html.geometry import bones_of, mesh_of, octahedral
+from statemachine.report.html.geometry import bones_of, mesh_as_data, mesh_of
 from statemachine.report.html.timeline import frames_of
 from statemachine.report.markdown import markdown
 from statemachine.report.over_time import CHARTS_SHOWN, charts_of
@@ -935,10 +935,6 @@ def test_a_mesh_keeps_its_surface() -> None:
     wanted = sum(area(p.vertices, p.faces) for p in drawing.parts if not p.endless)
     assert area(mesh.vertices, mesh.faces) == pytest.approx(wanted, rel=1e-5)
     assert not mesh.simplified
-    assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0, abs=1e-5)
-    corners = mesh.vertices[mesh.faces].astype(float)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert ((normal[:, None] * mesh.normals[mesh.faces]).sum(axis=2) > 0).mean() > 0.999
 
 
 def area(vertices: Any, faces: Any) -> float:
@@ -957,15 +953,20 @@ def test_too_many_triangles_are_made_fewer() -> None:
     assert not whole.simplified
 
 
-def test_folded_normals_unfold() -> None:
-    n = np.random.default_rng(0).normal(size=(1000, 3))
-    n /= np.linalg.norm(n, axis=1, keepdims=True)
-    f = octahedral(n) / 32767
-    z = 1 - np.abs(f).sum(axis=1)
-    t = np.maximum(-z, 0)[:, None]
-    found = np.column_stack([f - np.where(f >= 0, t, -t), z])
-    found /= np.linalg.norm(found, axis=1, keepdims=True)
-    assert np.abs(found - n).max() < 1e-4
+def test_normals_are_those_of_the_faces(tab: Tab) -> None:
+    mesh = mesh_of(drawing_of(sm.load("so101/scene")))
+    code = (ROOT / "statemachine" / "report" / "html" / "gl.js").read_text("utf-8")
+    found = tab.evaluate(
+        f"(mesh) => {{ {code}; const made = creased(mesh);"
+        "  return [[...made.points], [...made.normals]]; }",
+        mesh_as_data(mesh),
+    )
+    points, normals = (np.reshape(values, (-1, 3, 3)) for values in found)
+    corners = np.ptp(mesh.vertices, axis=0) * points + mesh.vertices.min(axis=0)
+    assert np.abs(corners - mesh.vertices[mesh.faces]).max() < 1e-4
+    assert np.linalg.norm(normals, axis=2) == pytest.approx(1.0, abs=1e-5)
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert ((face[:, None] * normals).sum(axis=2) > 0).mean() > 0.999
 
 
 def test_bones_reach_from_body_to_body(hold: Made) -> None:

@@ -14,22 +14,19 @@ from ...drawing import Drawing, Part, lathe
 from ...interface import Array
 from ...runs import Trace
 
-_CREASE = np.cos(np.radians(35.0))  # faces that meet at less than this are one round surface
-
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles of all parts of a drawing, in the frames of their bodies.
 
     Attributes:
-        vertices: (v, 3) [m]; normals: (v, 3) of unit length.
+        vertices: (v, 3) [m].
         faces: (f, 3) numbers of vertices.
         parts: (body, first index, count of indices, colour) of each part.
         simplified: How many triangles there were before, if they were too many; else 0.
     """
 
     vertices: NDArray[np.float32]
-    normals: NDArray[np.float32]
     faces: NDArray[np.int64]
     parts: tuple[tuple[int, int, int, tuple[float, float, float]], ...]
     simplified: int
@@ -48,22 +45,18 @@ def mesh_of(drawing: Drawing, most: int = 24_000) -> Mesh:
         shapes = [_snapped(part, cell) for part in parts]
         cell *= 1.4
     vertices: list[Any] = []
-    normals: list[Any] = []
     faces: list[Any] = []
     placed, corner, index = [], 0, 0
     for part, (points, triangles) in zip(parts, shapes, strict=True):
         if not len(triangles):
             continue
-        v, n, f = _creased(points, triangles)
-        vertices.append(v)
-        normals.append(n)
-        faces.append(f + corner)
-        placed.append((part.body, index, f.size, part.rgba[:3]))
-        corner, index = corner + len(v), index + f.size
+        vertices.append(points)
+        faces.append(triangles + corner)
+        placed.append((part.body, index, triangles.size, part.rgba[:3]))
+        corner, index = corner + len(points), index + triangles.size
     none = np.empty((0, 3))
     return Mesh(
         np.concatenate([none, *vertices]).astype(np.float32),
-        np.concatenate([none, *normals]).astype(np.float32),
         np.concatenate([none, *faces]).astype(np.int64),
         tuple(placed),
         before if before > most else 0,
@@ -83,35 +76,6 @@ def _snapped(part: Part, cell: float) -> tuple[Any, Any]:
     faces = faces[(a != b) & (b != c) & (c != a)]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     return means, faces[np.sort(first)]
-
-
-def _creased(points: Any, faces: Any) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Normals for each corner: the mean over faces around it that meet at a small angle."""
-    points = np.asarray(points, dtype=np.float64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    weighted = np.cross(b - a, c - a)  # twice the area long
-    length = np.linalg.norm(weighted, axis=1, keepdims=True)
-    unit = weighted / np.where(length > 0, length, 1.0)
-    corner = faces.reshape(-1)
-    face = np.repeat(np.arange(len(faces)), 3)
-    order = np.argsort(corner, kind="stable")
-    at, of = corner[order], face[order]
-    start = np.searchsorted(at, at)
-    count = np.searchsorted(at, at, side="right") - start
-    place = np.arange(len(at)) - start
-    total = weighted[of].copy()
-    for turn in range(1, int(count.max(initial=1))):
-        some = np.flatnonzero(turn < count)
-        other = of[start[some] + (place[some] + turn) % count[some]]
-        near = (unit[of[some]] * unit[other]).sum(axis=1) > _CREASE
-        total[some[near]] += weighted[other[near]]
-    size = np.linalg.norm(total, axis=1, keepdims=True)
-    normal = np.empty_like(total)
-    normal[order] = total / np.where(size > 0, size, 1.0)
-    # Corners with the same point and nearly the same normal become one.
-    key = np.column_stack([corner, np.round(normal * 100).astype(np.int64)])
-    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    return points[corner[first]], normal[first], number.reshape(-1, 3)
 
 
 def bones_of(trace: Trace) -> Drawing:
@@ -176,18 +140,6 @@ def quantised(values: Any, low: Any, span: Any) -> Any:
     return np.round(np.clip(scaled, 0.0, 1.0) * 65535)
 
 
-def octahedral(normals: Any) -> Any:
-    """Unit vectors as two whole numbers each, -32767 to 32767 (Cigolle et al., JCGT 2014)."""
-    n = np.asarray(normals, dtype=np.float64)
-    size = np.abs(n).sum(axis=1, keepdims=True)
-    n = n / np.where(size > 0, size, 1.0)
-    flat = n[:, :2].copy()
-    below = n[:, 2] < 0
-    signs = np.where(flat[below] >= 0, 1.0, -1.0)
-    flat[below] = (1 - np.abs(flat[below][:, ::-1])) * signs
-    return np.round(np.clip(flat, -1, 1) * 32767)
-
-
 def mesh_as_data(mesh: Mesh) -> dict[str, Any]:
     """A mesh as JSON."""
     low = mesh.vertices.min(axis=0) if len(mesh.vertices) else np.zeros(3)
@@ -195,7 +147,6 @@ def mesh_as_data(mesh: Mesh) -> dict[str, Any]:
     wide = len(mesh.vertices) > 65535
     return {
         "position": packed(quantised(mesh.vertices, low, span), "u2"),
-        "normal": packed(octahedral(mesh.normals), "i2"),
         "index": packed(mesh.faces.reshape(-1), "u4" if wide else "u2"),
         "wide": wide,
         "low": _floats(low),

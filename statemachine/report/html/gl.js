@@ -11,6 +11,30 @@ const cross = (a, b) =>
 const size = (a) => Math.hypot(a[0], a[1], a[2]);
 const unit = (a) => { const s = size(a) || 1; return [a[0] / s, a[1] / s, a[2] / s]; };
 
+// Corners of a mesh's triangles, each with its normal: the mean, by area, of the faces around its
+// point that meet at less than 35°. Points (0 to 1) are as the mesh has them, of `span`.
+const creased = (mesh) => {
+  const grid = numbers(mesh.position, Uint16Array);
+  const faces = numbers(mesh.index, mesh.wide ? Uint32Array : Uint16Array);
+  const point = (c) => [0, 1, 2].map((i) => mesh.span[i] * grid[3 * c + i] / 65535);
+  const around = Array.from({ length: grid.length / 3 }, () => []);
+  const areas = [], units = [];
+  for (let f = 0; 3 * f < faces.length; f += 1) {
+    const [a, b, c] = [0, 1, 2].map((k) => point(faces[3 * f + k]));
+    areas.push(cross(sub(b, a), sub(c, a)));
+    units.push(unit(areas[f]));
+    for (let k = 0; k < 3; k += 1) around[faces[3 * f + k]].push(f);
+  }
+  const points = new Float32Array(3 * faces.length), normals = new Float32Array(3 * faces.length);
+  faces.forEach((corner, k) => {
+    const own = units[Math.floor(k / 3)];
+    const near = around[corner].filter((f) => dot(own, units[f]) > Math.cos(35 * Math.PI / 180));
+    normals.set(unit(near.reduce((sum, f) => add(sum, areas[f]), [0, 0, 0])), 3 * k);
+    for (let i = 0; i < 3; i += 1) points[3 * k + i] = grid[3 * corner + i] / 65535;
+  });
+  return { points, normals };
+};
+
 // Matrices 4 × 4 by columns, as WebGL takes them.
 const product = (a, b) => {
   const out = new Float32Array(16);
@@ -71,20 +95,13 @@ const program = (gl, vertex, fragment) => {
 };
 
 const SHAPE_VERTEX = `
-in vec3 position; in vec2 normal;
+in vec3 position, normal;
 uniform mat4 pose, view, lens; uniform vec3 low, span;
 out vec3 seen, facing;
-vec3 unfold(vec2 f) {
-  vec3 n = vec3(f, 1.0 - abs(f.x) - abs(f.y));
-  float t = max(-n.z, 0.0);
-  n.x += n.x >= 0.0 ? -t : t;
-  n.y += n.y >= 0.0 ? -t : t;
-  return normalize(n);
-}
 void main() {
   vec4 p = view * pose * vec4(low + span * position, 1.0);
   seen = p.xyz;
-  facing = mat3(view) * mat3(pose) * unfold(normal);
+  facing = mat3(view) * mat3(pose) * normal;
   gl_Position = lens * p;
 }`;
 

@@ -44,28 +44,23 @@ const strongest = (sides) => {
   return most;
 };
 
-// An arrow of length 1 along z and of width 1, as triangles with normals.
+// An arrow of length 1 along z and of width 1, as corners of triangles with normals.
 const arrow_shape = () => {
   const around = 20, profile = [[0.5, 0], [0.5, 0.72], [1.3, 0.72], [0, 1]];
-  const points = [], folded = [], faces = [];
+  const points = [], normals = [];
   for (let p = 0; p + 1 < profile.length; p += 1) {
     const [[r, z], [s, y]] = [profile[p], profile[p + 1]];
     for (let k = 0; k < around; k += 1) {
-      const angle = (2 * Math.PI * k) / around, c = Math.cos(angle), d = Math.sin(angle);
-      const n = unit([c, d, p === 2 ? 0.6 : p === 1 ? -9 : 0]);
-      const f = Math.abs(n[0]) + Math.abs(n[1]) + Math.abs(n[2]);
-      let u = n[0] / f, v = n[1] / f;
-      if (n[2] < 0) {
-        [u, v] = [(1 - Math.abs(v)) * Math.sign(u || 1), (1 - Math.abs(u)) * Math.sign(v || 1)];
-      }
-      points.push(r * c, r * d, z, s * c, s * d, y);
-      folded.push(u, v, u, v);
-      const base = 2 * around * p, here = base + 2 * k, next = base + 2 * ((k + 1) % around);
-      faces.push(here, next, here + 1, next, next + 1, here + 1);
+      const [here, next] = [k, k + 1].map((at) => {
+        const angle = (2 * Math.PI * at) / around, c = Math.cos(angle), d = Math.sin(angle);
+        return { low: [r * c, r * d, z], high: [s * c, s * d, y],
+          normal: unit([c, d, p === 2 ? 0.6 : p === 1 ? -9 : 0]) };
+      });
+      points.push(...here.low, ...next.low, ...here.high, ...next.low, ...next.high, ...here.high);
+      for (const corner of [here, next, here, next, next, here]) normals.push(...corner.normal);
     }
   }
-  return { points: new Float32Array(points), folded: new Float32Array(folded),
-    faces: new Uint16Array(faces) };
+  return { points: new Float32Array(points), normals: new Float32Array(normals) };
 };
 
 class Scene {
@@ -107,11 +102,8 @@ class Scene {
     this.outline = program(gl, WHOLE_VERTEX, OUTLINE_FRAGMENT);
     this.floor = program(gl, FLOOR_VERTEX, FLOOR_FRAGMENT);
     this.line = program(gl, LINE_VERTEX, LINE_FRAGMENT);
-    this.meshes = this.data.meshes.map((mesh) => this.shape(
-      numbers(mesh.position, Uint16Array), numbers(mesh.normal, Int16Array),
-      mesh.wide ? numbers(mesh.index, Uint32Array) : numbers(mesh.index, Uint16Array)));
-    const arrow = arrow_shape();
-    this.arrow = this.shape(arrow.points, arrow.folded, arrow.faces);
+    this.meshes = this.data.meshes.map((mesh) => this.shape(creased(mesh)));
+    this.arrow = this.shape(arrow_shape());
     this.square = gl.createVertexArray();
     gl.bindVertexArray(this.square);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
@@ -123,26 +115,20 @@ class Scene {
     this.layers = null;
   }
 
-  shape(points, folded, faces) {
+  shape({ points, normals }) {
     const gl = this.gl, array = gl.createVertexArray();
     gl.bindVertexArray(array);
-    const fill = (name, values, width, kind) => {
+    for (const [name, values] of [['position', points], ['normal', normals]]) {
       gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
       gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
       for (const made of [this.solid, this.ghost]) {
         // Both programs take the same places: they share their vertex shader.
         const place = made.attribute(name);
         gl.enableVertexAttribArray(place);
-        gl.vertexAttribPointer(place, width, kind, kind !== gl.FLOAT, 0, 0);
+        gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 0, 0);
       }
-    };
-    fill('position', points, 3, points instanceof Uint16Array ? gl.UNSIGNED_SHORT : gl.FLOAT);
-    fill('normal', folded, 2, folded instanceof Int16Array ? gl.SHORT : gl.FLOAT);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
-    const wide = faces instanceof Uint32Array;
-    return { array, kind: wide ? gl.UNSIGNED_INT : gl.UNSIGNED_SHORT, width: wide ? 4 : 2,
-      count: faces.length };
+    }
+    return { array, count: points.length / 3 };
   }
 
   way(points) {
@@ -256,7 +242,7 @@ class Scene {
       if (colours) gl.uniform3fv(made.at('colour'), colours(r, g, b));
       gl.uniformMatrix4fv(made.at('pose'), false,
         pose(run.place(this.row, body), run.turn(this.row, body)));
-      gl.drawElements(gl.TRIANGLES, count, built.kind, first * built.width);
+      gl.drawArrays(gl.TRIANGLES, first, count);
     }
     gl.colorMask(true, true, true, true);
   }
@@ -362,7 +348,7 @@ class Scene {
         const long = extent * 0.4 * Math.sqrt(strength / this.most);
         const vector = unit(force).map((v) => v * long);
         gl.uniformMatrix4fv(made.at('pose'), false, along(at, vector, 0.008 * extent));
-        gl.drawElements(gl.TRIANGLES, this.arrow.count, this.arrow.kind, 0);
+        gl.drawArrays(gl.TRIANGLES, 0, this.arrow.count);
       }
     });
   }
