@@ -389,8 +389,8 @@ def test_what_was_done_to_the_text_is_told(tmp_path: Path) -> None:
         "mixed euler angles": "euler in another order written as axes: 1",
         "several roots, some of them free": "root bodies put below one body that stands still: 3",
         "a site of a body that stands still on a jointed one": "written as bodies: 1",
-        "a root with a pose": "places of root bodies without a joint kept by a body around them: 1",
-        "a root with a quaternion": "places of root bodies without a joint",
+        "a root with a pose": "root bodies without a joint, each put into a body that has its place: 1",
+        "a root with a quaternion": "root bodies without a joint, each",
     }.items():
         assert said in " ".join(sm.Kinematics(_write(tmp_path, TRAPS[trap])).prepared), trap
     (said,) = sm.Kinematics("so101").prepared  # its baseframe

@@ -153,12 +153,12 @@ def run(options: argparse.Namespace) -> int:
 
 _NEXT = f"""\
 Where to go next:
-  {PROGRAM}                    everything that there is
-  {PROGRAM} lesson gravity --backend all     on all engines, side by side
-  {PROGRAM} lesson questions   check yourself
-  python exercises/step_loop.py   then four functions for you to write
-  {PROGRAM} compare hold --html hold.html     where two engines part, and why
-  {PROGRAM} doctor             what this machine has, and what to do
+  {PROGRAM} lesson questions              six questions: check yourself
+  python exercises/step_loop.py              four functions for you to write
+  {PROGRAM} check exercises/step_loop.py  what they do, judged
+  {PROGRAM} lesson gravity --backend all  on all engines, side by side
+  {PROGRAM} compare hold --why            where two engines differ, and why
+  {PROGRAM} --help                        every command
 """
 
 

@@ -17,7 +17,7 @@ from .template import by_engine, differences
 _SHOWN = 12  # rows of a table of tips
 _ROWS: Mapping[str, Callable[[Certificate], str]] = {
     "grade": lambda r: r.grade,
-    "frames apart": lambda r: _offset(r.frames),
+    "distance of the two frames": lambda r: _offset(r.frames),
     "default pose [m]": lambda r: vector(r.default_pose),
     "position, worst [m]": lambda r: _figure(r.position_worst),
     "position, median [m]": lambda r: _figure(r.position_median),
@@ -72,7 +72,7 @@ def _tips(name: str, result: Certificate) -> Table:
         (tip.site, _figure(tip.position_worst), _figure(tip.rotation_worst), _offset(tip.frames))
         for tip in result.tips[:_SHOWN]
     ]
-    head = ("tip", "position, worst [m]", "rotation matrix, worst", "frames apart")
+    head = ("tip", "position, worst [m]", "rotation matrix, worst", "distance of the two frames")
     worst = f"the worst of {len(result.tips)}"
     title = f"{name} against the witness, {worst} ({result.grade})"
     return Table(head, rows, title=title, wide=frozenset({3}))

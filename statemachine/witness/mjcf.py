@@ -310,8 +310,8 @@ _CHANGES = {
     "zaxis": "zaxis written as axes: {}",
     "fromto": "fromto of a site written as pos and axes: {}",
     "still sites": "sites of bodies without a joint written as bodies: {}",
-    "root places": "places of root bodies without a joint kept by a body around them: {}",
-    "root sites": "sites of the world or a root body without a joint kept by a body around: {}",
+    "root places": "root bodies without a joint, each put into a body that has its place: {}",
+    "root sites": "sites of the world, or of a root body without a joint, each put into a body: {}",
     "root bodies": "root bodies put below one body that stands still: {}",
 }
 
