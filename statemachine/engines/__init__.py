@@ -66,6 +66,20 @@ def _needed(method: Method) -> Method:
     return cast("Method", lacking)
 
 
+def function_of(place: str) -> Any:
+    """A method that is a function, or a class, and is imported when the method is called.
+
+    Args:
+        place: "package.module:function", from this package on.
+    """
+    module, _, name = place.partition(":")
+
+    def call(_self: RawEngine, *arguments: Any, **named: Any) -> Any:
+        return getattr(importlib.import_module(module, __name__), name)(*arguments, **named)
+
+    return call
+
+
 class RawEngine:
     """An engine as its own users drive it; each method is optional.
 

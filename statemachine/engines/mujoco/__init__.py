@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -12,17 +12,12 @@ import numpy as np
 
 from ...errors import MissingEngineError
 from ...installed import require
-from .. import RawEngine
+from .. import RawEngine, function_of
 
 if TYPE_CHECKING:
     from ...description.records import Robot
-    from ...drawing.camera import Camera
-    from ...drawing.shots import Drawer
     from ...interface import Array, Data, Model
-    from ..auditing import Driver
-    from ..call_watch import CallWatch
     from ..measured import Phrases
-    from ..records import Counterparts, Edit, ModelDifference
 
 _OPTIONS = ("disableflags", "enableflags", "timestep", "gravity", "integrator")
 
@@ -34,6 +29,18 @@ class MujocoEngine(RawEngine):
     sharper = 2  # drawn so many times as large, and made smaller: edges are smooth then
     steps = ("mj_step", "mj_step2")
     forwards = ("mj_forward", "mj_kinematics", "mj_fwdPosition")
+    driver = function_of(".mujoco.audit:MujocoDriver")
+    call_watch = function_of(".mujoco.calls:MujocoWatch")
+    read_file = function_of(".mujoco.description:read_file")
+    differences = function_of(".mujoco.differences:differences")
+    sensors = function_of(".mujoco.differences:sensors")
+    entries = function_of(".mujoco.differences:entries")
+    edited = function_of(".mujoco.differences:edited")
+    counts = function_of(".mujoco.given:counts")
+    with_parts = function_of(".mujoco.given:with_parts")
+    drawer = function_of(".mujoco.rendering:MujocoDrawer")
+    drawing_environment = function_of(".mujoco._opengl:environment")
+    drawing_diagnosis = function_of(".mujoco._opengl:diagnosis")
 
     def plain_run(self, path: Path, commands: Array, keyframe: int | None) -> Array | None:
         """By MjModel.from_xml_path and mj_step; None: it looks for no ROS packages."""
@@ -69,18 +76,6 @@ class MujocoEngine(RawEngine):
 
         return PHRASES
 
-    def driver(self, model: Model, seed: int) -> Driver:
-        """MjModel, MjData, mj_step."""
-        from .audit import MujocoDriver
-
-        return MujocoDriver(model, seed)
-
-    def call_watch(self) -> CallWatch:
-        """An MjData and an MjModel show all that is in them."""
-        from .calls import MujocoWatch
-
-        return MujocoWatch()
-
     def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
         """That of the state that the derived arrays of `data` belong to."""
         mass = np.zeros((model.nv, model.nv))
@@ -99,61 +94,11 @@ class MujocoEngine(RawEngine):
 
         return loaded(path, name, "engine")
 
-    def read_file(self, path: Path, name: str) -> Robot:
-        """What an MJCF says itself; one some of whose meshes are missing is read without them."""
-        from .description import read_file
-
-        return read_file(path, name)
-
     def describe(self, compiled: Any, name: str) -> Robot:
         """The description in an mjModel."""
         from .description import description_of
 
         return description_of(compiled, name, f"mujoco {require('mujoco').__version__}", "MJCF")
-
-    def differences(
-        self, one: Any, two: Any, pairs: Counterparts, *, world: bool = True
-    ) -> tuple[ModelDifference, ...]:
-        """All that two mjModels differ in and that can change a motion."""
-        from .differences import differences
-
-        return differences(one, two, pairs, world=world)
-
-    def sensors(self, one: Any, two: Any, pairs: Counterparts) -> list[ModelDifference]:
-        """What their sensors differ in."""
-        from .differences import sensors
-
-        return sensors(one, two, pairs)
-
-    def entries(self, two: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
-        """A difference by its single entries."""
-        from .differences import entries
-
-        return entries(two, difference)
-
-    def edited(self, raw: Any, edits: Iterable[Edit]) -> Any:
-        """A copy of an mjModel with these edits."""
-        from .differences import edited
-
-        return edited(raw, edits)
-
-    def counts(self, compiled: Any) -> dict[str, int]:
-        """Its actuators, and the planes of the world."""
-        from .given import counts
-
-        return counts(compiled)
-
-    def with_parts(
-        self,
-        taker: Path,
-        giver: Path,
-        parts: Collection[str],
-        names: Mapping[str, Mapping[str, str]],
-    ) -> Any:
-        """By MjSpec."""
-        from .given import with_parts
-
-        return with_parts(taker, giver, parts, names)
 
     def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
         """By mj_energyPos and mj_energyVel."""
@@ -187,24 +132,6 @@ class MujocoEngine(RawEngine):
     def drawn_by(self, opengl: str) -> str:
         """With the OpenGL that it was told."""
         return f"MuJoCo (MUJOCO_GL={opengl})" if opengl else "MuJoCo"
-
-    def drawer(self, file: Path, size: tuple[int, int], camera: Camera, ghost: bool) -> Drawer:
-        """An OpenGL context without a window."""
-        from .rendering import MujocoDrawer
-
-        return MujocoDrawer(file, size, camera, ghost)
-
-    def drawing_environment(self, opengl: str, known: dict[str, str]) -> dict[str, str]:
-        """With MUJOCO_GL."""
-        from ._opengl import environment
-
-        return environment(opengl, known)
-
-    def drawing_diagnosis(self) -> tuple[bool, str, str]:
-        """By drawing, each OpenGL in a process of its own."""
-        from ._opengl import diagnosis
-
-        return diagnosis()
 
     def watched_data(self) -> type[Data]:
         """Its verbs are mj_step and mj_forward."""

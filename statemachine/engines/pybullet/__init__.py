@@ -4,25 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from ...installed import require
-from .. import RawEngine
+from .. import RawEngine, function_of
 
 if TYPE_CHECKING:
     from ...backends import pybullet_backend as backend
-    from ...description.records import Robot
-    from ...drawing.camera import Camera
-    from ...drawing.shots import Drawer
     from ...interface import Array, Data, Model
-    from ..auditing import Driver
-    from ..call_watch import CallWatch
     from ..measured import Phrases
-    from ..records import Dials, LeftAlone, Term, WayBack
+    from ..records import Dials
 
 
 class PybulletEngine(RawEngine):
@@ -34,24 +28,13 @@ class PybulletEngine(RawEngine):
     primes = (
         "the contact and friction forces that its servos work against; the engine takes nothing"
     )
-
-    def terms(self, model: Model) -> tuple[Term, ...]:
-        """What the interface's names are here, by looking at a loaded model."""
-        from .as_it_comes import terms
-
-        return terms(model)
-
-    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
-        """In the engine's own timestep."""
-        from .as_it_comes import left_alone
-
-        return left_alone(model, seconds, joint)
-
-    def ways_back(self, model: Model) -> tuple[WayBack, ...]:
-        """In the middle of contact."""
-        from .as_it_comes import ways_back
-
-        return ways_back(model)
+    terms = function_of(".pybullet.as_it_comes:terms")
+    left_alone = function_of(".pybullet.as_it_comes:left_alone")
+    ways_back = function_of(".pybullet.as_it_comes:ways_back")
+    driver = function_of(".pybullet.audit:PybulletDriver")
+    call_watch = function_of(".pybullet.calls:PybulletWatch")
+    read = function_of(".pybullet.reading:read")
+    drawer = function_of(".pybullet.rendering:PybulletDrawer")
 
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
         """Of a Model with `defaults="engine"`."""
@@ -77,18 +60,6 @@ class PybulletEngine(RawEngine):
         from .phrasebook import PHRASES
 
         return PHRASES
-
-    def driver(self, model: Model, seed: int) -> Driver:
-        """A client, stepSimulation, its own motors and its own ways to save."""
-        from .audit import PybulletDriver
-
-        return PybulletDriver(model, seed)
-
-    def call_watch(self) -> CallWatch:
-        """Worlds that are told apart by a number only."""
-        from .calls import PybulletWatch
-
-        return PybulletWatch()
 
     def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
         """With the rotors that the backend adds.
@@ -123,12 +94,6 @@ class PybulletEngine(RawEngine):
                 parts[part][:] = before[force]
         set_state(model, data, replace(state, blob=np.concatenate(list(parts.values())).tobytes()))
 
-    def read(self, path: Path, name: str) -> Robot:
-        """Of a URDF what loadURDF leaves, else what the backend loads."""
-        from .reading import read
-
-        return read(path, name)
-
     def opengl(self) -> str:
         """Nothing that it needs beside itself."""
         require("pybullet")
@@ -137,12 +102,6 @@ class PybulletEngine(RawEngine):
     def drawn_by(self, opengl: str) -> str:
         """It needs no OpenGL."""
         return "PyBullet's software renderer"
-
-    def drawer(self, file: Path, size: tuple[int, int], camera: Camera, ghost: bool) -> Drawer:
-        """A world for each side."""
-        from .rendering import PybulletDrawer
-
-        return PybulletDrawer(file, size, camera, ghost)
 
     def backend(self) -> ModuleType:
         """The backend, which takes what MuJoCo's compiler makes of a file."""
