@@ -641,7 +641,7 @@ BROUGHT: dict[str, tuple[str, str, list[str], dict[str, Any]]] = {
         TABLE, TABLE.replace('pos="0.6 0 0.05"', 'pos="0.64 0 0.05"'), ["place of top"], BALL
     ),
     "the coefficient of a fixed tendon": (
-        *(ARM.replace("<actuator>", TENDON.format(coef)) for coef in (1, 1.5)),
+ARM.replace("<actuator>", TENDON.format(1)), ARM.replace("<actuator>", TENDON.format(1.5)),
         ["coefficients of band"],
         {},
     ),
