@@ -27,7 +27,7 @@ from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.grading.watch import engine_watched
 from statemachine.grading.worlds import ExerciseWorld, Scenes
 
-from .conftest import ROOT, Cli, assert_in, need_engine, one_line, processes_with, written
+from .conftest import ROOT, Cli, assert_in, need_engine, one_line, processes_with, written_all
 from .exercises import RIGHT, WRONG, Attempt
 
 for _module in ("gravity", "state", "forward", "replay"):
@@ -263,8 +263,8 @@ _SLOW = ("what never returns or ends the process", "a long print, which has an e
     "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in _SLOW)) for n in HANDED_IN]
 )
 def test_what_is_handed_in_is_judged(name: str, tmp_path: Path) -> None:
-    (tmp_path / "helper.py").write_text("def helps():\n    return 1 / 0\n")
-    (tmp_path / "broken.py").write_text("def f(:\n")
+    texts = {"helper.py": "def helps():\n    return 1 / 0\n", "broken.py": "def f(:\n"}
+    written_all(tmp_path, texts)
     functions, patterns = zip(*HANDED_IN[name], strict=True)
     found = _grade(tmp_path, *functions, limit=1.0 if name == _SLOW[0] else 5.0)
     for judgement, pattern in zip(found.values(), patterns, strict=False):
@@ -374,22 +374,17 @@ def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
 
 
 def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
-    student = written(
-        tmp_path / "student.py", "import helper\nfrom tools import more\nDATA = 'table.json'\n"
-    )
-    (tmp_path / "helper.py").write_text("import deeper\n")
-    for name in ("deeper.py", "table.json", "unnamed.py", ".hidden.py", "tools.txt"):
-        (tmp_path / name).write_text("")
-    (tmp_path / "tools").mkdir()
-    (tmp_path / "tools" / "__init__.py").write_text("from more import demo_gravity\n")
-    (tmp_path / "more.py").write_text("def demo_gravity(model): return bob\n")
-    assert set(own_files.named_by(student)) == {
+    empty = "deeper.py", "table.json", "unnamed.py", ".hidden.py", "tools.txt", "env/pyvenv.cfg"
+    texts = {
+        "student.py": "import helper\nfrom tools import more\nDATA = 'table.json'\n",
+        "helper.py": "import deeper\n",
+        "tools/__init__.py": "from more import demo_gravity\n",
+        "more.py": "def demo_gravity(model): return bob\n",
+    }
+    written_all(tmp_path, texts | dict.fromkeys((*empty, "env/x.py"), ""))
+    assert set(own_files.named_by(tmp_path / "student.py")) == {
         "student.py", "helper.py", "deeper.py", "table.json", "tools/__init__.py", "tools.txt",
     }  # fmt: skip
-    env = tmp_path / "env"
-    env.mkdir()
-    for name in ("pyvenv.cfg", "x.py"):
-        (env / name).write_text("")
     whole = own_files.in_folder(tmp_path)
     assert {"more.py", "unnamed.py", "tools/__init__.py"} < set(whole)
     assert not {"env/x.py", ".hidden.py"} & set(whole)
