@@ -185,6 +185,14 @@ def written(file: Path, text: str) -> Path:
     return file
 
 
+def written_all(folder: Path, texts: dict[str, str]) -> Path:
+    """A folder with texts, by their paths in it."""
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        written(folder / name, text)
+    return folder
+
+
 @contextmanager
 def opened(
     model: Model, keyframe: int | str | None = None, *, ctrl: Any = None, nstep: int = 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import types
 import urllib.error
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -144,12 +145,19 @@ def test_of_another_robot_a_lesson_shows_code_tables_and_curves(model: Any) -> N
 
 
 def test_what_has_no_servo_is_pointed_to_what_runs_it(model: Any) -> None:
-    for name in ("hold", "gravity"):
-        says = rf"compare {name} --model robot.xml, or statemachine trace record {name} --model"
-        with pytest.raises(errors.BadInputError, match=says):
-            lesson(name, model(FLOATING))
-    with pytest.raises(errors.BadInputError, match="no position servo drives lift"):
-        lesson("gravity", model(MIXED.format(rest="")), joint="lift")
+    floating, mixed = model(FLOATING), model(MIXED.format(rest=""), "mixed.xml")
+    says = "compare {0} --model robot.xml, or statemachine trace record {0} --model"
+    refused(
+        *(
+            (errors.BadInputError, says.format(name), partial(lesson, name, floating))
+            for name in ("hold", "gravity")
+        ),
+        (
+            errors.BadInputError,
+            "no position servo drives lift",
+            lambda: lesson("gravity", mixed, joint="lift"),
+        ),
+    )
 
 
 def test_what_makes_no_sense_is_refused_with_what_does(model: Any) -> None:
@@ -163,9 +171,12 @@ def test_what_makes_no_sense_is_refused_with_what_does(model: Any) -> None:
         (record_scenario, SCENARIOS["gravity"], still, r"no joints: nothing in it can move$"),
         (lesson, "questions", passive, "about the SO-101"),
     ]
-    for ask, name, robot, says in wrong:
-        with pytest.raises(errors.BadInputError, match=says):
-            ask(name, robot)
+    refused(
+        *(
+            (errors.BadInputError, says, partial(ask, name, robot))
+            for ask, name, robot, says in wrong
+        )
+    )
 
 
 def test_the_command_says_it_in_a_line(model: Any, here: Cli) -> None:

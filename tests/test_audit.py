@@ -36,7 +36,8 @@ from statemachine.probes.audit.points import points
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
-from .conftest import Cli, Patch, around, assert_in, need_engine, one_line, registered, written
+from .conftest import Cli, Patch, around, assert_in, need_engine, one_line, registered
+from .small_models import loaded, model_of
 
 SCENE = "so101/scene_box"
 
@@ -204,16 +205,16 @@ def _experiments(one: audit.Audited) -> set[str]:
     return {each.experiment for each in one.findings}
 
 
-def test_everything_is_asked_of_mujoco(of_mujoco: audit.Audit) -> None:
-    engine, interface = of_mujoco.audited
-    assert _experiments(engine) == COMMON | {"reset", "step(n)", "pools", "leave one out"}
-    assert _experiments(interface) == COMMON | {"reset", "step(n)", "pickled State"}
-
-
-@pytest.mark.slow
-def test_everything_is_asked_of_pybullet(of_pybullet: audit.Audit) -> None:
-    engine, interface = of_pybullet.audited
-    assert _experiments(engine) == COMMON | {"forgets", "contacts off"}
+@pytest.mark.parametrize(
+    ("of", "more"),
+    [
+        ("of_mujoco", {"reset", "step(n)", "pools", "leave one out"}),
+        pytest.param("of_pybullet", {"forgets", "contacts off"}, marks=pytest.mark.slow),
+    ],
+)
+def test_everything_is_asked(of: str, more: set[str], request: pytest.FixtureRequest) -> None:
+    engine, interface = request.getfixturevalue(of).audited
+    assert _experiments(engine) == COMMON | more
     assert _experiments(interface) == COMMON | {"reset", "step(n)", "pickled State"}
 
 
@@ -226,12 +227,9 @@ MODELS = {
 
 @pytest.mark.parametrize("body", MODELS)
 def test_any_model_has_save_points(body: str, tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "model.xml",
-        '<mujoco><worldbody><geom type="plane" size="3 3 1"/><body pos="0 0 .5">'
-        f"{MODELS[body]}</body></worldbody></mujoco>",
-    )
-    result = audit.run(sm.load(file), steps=20)
+    floor = '<geom type="plane" size="3 3 1"/>'
+    model = loaded(tmp_path, f'{floor}<body pos="0 0 .5">{MODELS[body]}</body>')
+    result = audit.run(model, steps=20)
     assert result.holds
     assert {each.point for each in result.audited[0].points} == {"default", "motion"}
     assert {line.partition(":")[0] for line in result.without} == {
@@ -246,38 +244,34 @@ def test_any_model_has_save_points(body: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_components_of_other_models_are_tried(tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "model.xml",
+    model = model_of(
+        tmp_path,
         """<mujoco><worldbody><body name="m" mocap="true" pos="1 0 1"><geom size=".05"/></body>
         <body pos="0 0 1"><joint name="j" axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>
         <body name="f" pos="0 -1 .5"><freejoint/><geom size=".05"/></body></worldbody>
         <equality><weld body1="f" body2="m"/></equality><actuator>
         <general joint="j" dyntype="filter" dynprm=".1" gainprm="5"/></actuator></mujoco>""",
     )
-    found = audit.run(sm.load(file), steps=20).audited[0].conclusion
+    found = audit.run(model, steps=20).audited[0].conclusion
     assert {"act", "eq_active", "mocap_pos"} <= {each.field for each in found.missing}
     assert found.smallest is True
 
 
 def test_a_model_without_anything_that_moves_is_refused(tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "model.xml", '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>'
-    )
+    still = loaded(tmp_path, '<geom size="1"/>')
     with pytest.raises(BadInputError, match="nothing moves"):
-        audit.run(sm.load(file))
+        audit.run(still)
 
 
 @pytest.mark.slow
 def test_where_a_run_diverges_it_is_not_saved(tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "model.xml",
-        """<mujoco><worldbody><body>
-        <joint name="j" axis="0 1 0" stiffness="-3e4" damping="10"/>
-        <geom size=".1" pos=".3 0 0"/></body></worldbody>
-        <actuator><position joint="j" kp="9e4" ctrlrange="-1 1"/></actuator></mujoco>""",
-    )
     with pytest.warns(EngineWarning, match="stiffness of joint j is negative"):
-        model = sm.load(file)
+        model = loaded(
+            tmp_path,
+            """<body><joint name="j" axis="0 1 0" stiffness="-3e4" damping="10"/>
+            <geom size=".1" pos=".3 0 0"/></body>""",
+            '<actuator><position joint="j" kp="9e4" ctrlrange="-1 1"/></actuator>',
+        )
     with warnings.catch_warnings(action="error"):  # nothing is said of it but that
         result = audit.run(model, steps=20)
     assert result.holds
@@ -402,6 +396,12 @@ def one_disturbs_the_other(right: Any, model: Any, raw: Any) -> Callable[..., No
     return stepped
 
 
+@around(lambda: require("pybullet"), "getContactPoints")
+def read_of_pybullet_perturbs(right: Any, *, physicsClientId: int, **named: Any) -> Any:  # noqa: N803
+    require("pybullet").setGravity(0, 0, -9.80000001, physicsClientId)
+    return right(physicsClientId=physicsClientId, **named)
+
+
 STATE = "get_state, set_state"
 FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
     "a restore forgets the warm start": (
@@ -431,6 +431,11 @@ FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
         after("_find_contacts", nudge),
         ("interface", "reading what is derived"),
     ),
+    "a read of PyBullet perturbs": (
+        "look",
+        read_of_pybullet_perturbs,
+        ("engine", "getContactPoints"),
+    ),
     "several steps are one too many": ("step(n)", bulk_is_one_long, ("interface", "step(n)")),
     "several steps of the engine are one too few": (
         "step(n)",
@@ -454,8 +459,10 @@ FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     question, apply, finder = FAULTS[fault]
+    backend = "pybullet" if "PyBullet" in fault else "mujoco"
+    need_engine(backend)
     apply(monkeypatch)
-    assert finder in broken(asked(question))
+    assert finder in broken(asked(question, backend))
 
 
 @pytest.mark.slow
@@ -492,19 +499,6 @@ def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.Monk
     assert {each.into for each in found if not each.holds} == {"each other"}
     engine = conclude([each for each in found if each.layer == "engine"])
     assert "taken apart + targets" not in engine.agree
-
-
-@pytest.mark.usefixtures("bullet")
-def test_a_read_of_pybullet_that_perturbs(monkeypatch: pytest.MonkeyPatch) -> None:
-    pb: Any = require("pybullet")
-    right = pb.getContactPoints
-
-    def faulty(**named: Any) -> Any:
-        pb.setGravity(0, 0, -9.80000001, named["physicsClientId"])
-        return right(**named)
-
-    monkeypatch.setattr(pb, "getContactPoints", faulty)
-    assert ("engine", "getContactPoints") in broken(asked("look", "pybullet", only=("limp",)))
 
 
 def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:

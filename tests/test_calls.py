@@ -36,7 +36,7 @@ from statemachine.report import calls as words
 from statemachine.report import terminal
 from statemachine.report.as_json import dumps
 
-from .conftest import assert_in, need_engine
+from .conftest import Patch, around, assert_in, need_engine, refused
 
 # A little of everything: a keyframe in mid-contact, a write, both verbs, each kind of
 # derived array, a State, a variant of the model, two Data.
@@ -104,27 +104,25 @@ def owners(engine: str) -> list[Any]:
     return [mujoco, mujoco.MjModel, mujoco.MjData, mujoco.MjSpec, *more]
 
 
-def methods(owner: type) -> dict[int, str]:
+def functions_of(owner: Any) -> dict[int, str]:
+    """The names of what is called into C, by the id under which a profile tells it."""
+    if isinstance(owner, type):
+        return {
+            id(value.__func__): f"{owner.__name__}.{name}"
+            for name, value in vars(owner).items()
+            if type(value).__name__ in ("instancemethod", "staticmethod") and name != "__init__"
+        }
     return {
-        id(value.__func__): f"{owner.__name__}.{name}"
+        id(value): name
         for name, value in vars(owner).items()
-        if type(value).__name__ in ("instancemethod", "staticmethod") and name != "__init__"
+        if type(value).__name__ == "builtin_function_or_method"
     }
 
 
 @contextlib.contextmanager
 def profiled(engine: str, heard: Callable[[Any, str], None]) -> Any:
     """Python's own account of calls into C: (frame, name) of each that is the engine's."""
-    functions: dict[int, str] = {}
-    for owner in owners(engine):
-        if isinstance(owner, type):
-            functions |= methods(owner)
-        else:
-            functions |= {
-                id(value): name
-                for name, value in vars(owner).items()
-                if type(value).__name__ == "builtin_function_or_method"
-            }
+    functions = {key: name for owner in owners(engine) for key, name in functions_of(owner).items()}
 
     def profile(frame: Any, event: str, argument: Any) -> None:
         if event == "c_call" and id(argument) in functions:
@@ -166,7 +164,7 @@ def is_a_look(frame: Any) -> bool:
     return (file.parts[-3::2] == ("engines", "calls.py")) or file == Path(calls.__file__)
 
 
-def around(engine: str, run: Callable[[], object]) -> set[str]:
+def past_the_recorder(engine: str, run: Callable[[], object]) -> set[str]:
     """The engine's functions that are called while a run is recorded, past the recorder."""
     names: set[str] = set()
 
@@ -182,7 +180,7 @@ def around(engine: str, run: Callable[[], object]) -> set[str]:
 @pytest.mark.slow
 def test_no_call_goes_round_the_recorder(engine: str) -> None:
     """What holds on to an engine's function from before would not be heard."""
-    assert not around(engine, lambda: record(WHOLE.format(engine=engine), engine))
+    assert not past_the_recorder(engine, lambda: record(WHOLE.format(engine=engine), engine))
 
 
 def test_early_hold_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,7 +188,7 @@ def test_early_hold_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) ->
     early, lines = mujoco.mj_forward, list[Statement]()
     monkeypatch.setattr(MujocoData, "_recompute", lambda self: early(self._home.raw, self.raw))
     run = functools.partial(short, "mujoco", "sm.forward(model, data)")
-    assert around("mujoco", lambda: lines.extend(run())) == {"mj_forward"}
+    assert past_the_recorder("mujoco", lambda: lines.extend(run())) == {"mj_forward"}
     assert lines[0].calls == ()
     assert "data.xpos" in lines[0].changed
 
@@ -271,22 +269,30 @@ def test_isinstance_holds_while_recording() -> None:
     assert line.printed == "True False\n"
 
 
-def test_forward_on_mujoco_is_one_call() -> None:
-    write, forward = short("mujoco", "data.qpos[1] = 0.8\nsm.forward(model, data)")
+@pytest.mark.parametrize(
+    ("code", "function", "first", "changed", "unchanged"),
+    [
+        (
+            "sm.forward(model, data)",
+            "mj_forward",
+            (),
+            {"xpos", "xquat", "site_xpos", "qacc"},
+            {"time", "qpos", "qvel", "ctrl", "act", "qacc_warmstart"},
+        ),
+        ("sm.step(model, data, 800)", "mj_step", ("time", "qpos", "qvel"), set(), {"ctrl"}),
+    ],
+)
+def test_a_verb_on_mujoco_is_one_call(
+    code: str, function: str, first: tuple[str, ...], changed: set[str], unchanged: set[str]
+) -> None:
+    write, line = short("mujoco", f"data.qpos[1] = 0.8\n{code}")
     assert (write.calls, write.changed) == ((), ("data.qpos[1]",))
-    (call,) = forward.calls
-    assert (call.function, call.on, call.count) == ("mj_forward", "data", 1)
-    assert {"xpos", "xquat", "site_xpos", "qacc"} <= set(call.changed)
-    assert not {"time", "qpos", "qvel", "ctrl", "act", "qacc_warmstart"} & set(call.changed)
-    assert forward.changed == ()
-
-
-def test_many_steps_on_mujoco_are_one_call() -> None:
-    (line,) = short("mujoco", "sm.step(model, data, 800)")
     (call,) = line.calls
-    assert (call.function, call.on, call.count) == ("mj_step", "data", 1)
-    assert call.changed[:3] == ("time", "qpos", "qvel")
-    assert "ctrl" not in call.changed
+    assert (call.function, call.on, call.count) == (function, "data", 1)
+    assert call.changed[: len(first)] == first
+    assert changed <= set(call.changed)
+    assert not unchanged & set(call.changed)
+    assert line.changed == ()
 
 
 def test_a_read_on_mujoco_is_no_call() -> None:
@@ -446,59 +452,62 @@ def test_every_call_of_the_backend_says_its_client() -> None:
     assert seen > 20
 
 
-def test_a_forward_that_steps_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        MujocoData, "_recompute", lambda self: mujoco.mj_step(self._home.raw, self.raw)
-    )
+@around(MujocoData, "_recompute")
+def forward_that_steps(_right: Any, self: Any) -> None:
+    mujoco.mj_step(self._home.raw, self.raw)
+
+
+@around(mujoco, "mj_forward")
+def write_in_a_call(right: Any, model: Any, data: Any) -> None:
+    right(model, data)
+    data.qpos[0] = np.nextafter(data.qpos[0], 1)
+    model.dof_damping[0] += 1
+
+
+@around(MujocoData, "_recompute")
+def write_beside_a_call(_right: Any, self: Any) -> None:
+    mujoco.mj_forward(self._home.raw, self.raw)
+    self.raw.qvel[2] = 1e-300
+    mujoco.mj_forward(self._home.raw, self.raw)
+
+
+@pytest.mark.parametrize(
+    ("patch", "call", "of_the_call", "beside"),
+    [
+        (forward_that_steps, ("mj_step", 1), {"time", "qvel"}, ()),
+        (write_in_a_call, ("mj_forward", 1), {"qpos", "model.raw.dof_damping"}, ()),
+        (write_beside_a_call, ("mj_forward", 2), {"xpos"}, ("data.qvel[2]",)),
+    ],
+)
+def test_what_a_forward_should_not_do_is_seen(
+    patch: Patch,
+    call: tuple[str, int],
+    of_the_call: set[str],
+    beside: tuple[str, ...],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    patch(monkeypatch)
     (line,) = short("mujoco", "sm.forward(model, data)")
-    (call,) = line.calls
-    assert call.function == "mj_step"
-    assert "time" in call.changed
-
-
-def test_a_hidden_write_in_a_call_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = mujoco.mj_forward
-
-    def wrong(model: Any, data: Any) -> None:
-        right(model, data)
-        data.qpos[0] = np.nextafter(data.qpos[0], 1)
-        model.dof_damping[0] += 1
-
-    monkeypatch.setattr(mujoco, "mj_forward", wrong)
-    (line,) = short("mujoco", "sm.forward(model, data)")
-    (call,) = line.calls
-    assert call.function == "mj_forward"
-    assert {"qpos", "model.raw.dof_damping"} <= set(call.changed)
-    assert line.changed == ()
-
-
-def test_a_hidden_write_beside_a_call_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    def wrong(self: Any) -> None:
-        mujoco.mj_forward(self._home.raw, self.raw)
-        self.raw.qvel[2] = 1e-300
-        mujoco.mj_forward(self._home.raw, self.raw)
-
-    monkeypatch.setattr(MujocoData, "_recompute", wrong)
-    (line,) = short("mujoco", "sm.forward(model, data)")
-    (call,) = line.calls
-    assert call.count == 2
-    assert "qvel" not in call.changed
-    assert line.changed == ("data.qvel[2]",)
+    (seen,) = line.calls
+    assert (seen.function, seen.count) == call
+    assert of_the_call <= set(seen.changed)
+    assert line.changed == beside
+    assert not beside or "qvel" not in seen.changed
 
 
 @pytest.mark.usefixtures("bullet")
 def test_a_getter_that_moves_the_world_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     pb: Any = installed.require("pybullet")
-    right = pb.getJointStates
 
-    def wrong(body: int, joints: Any, client: int) -> Any:
+    @around(pb, "getJointStates")
+    def wrong(right: Any, body: int, joints: Any, client: int) -> Any:
         found = right(body, joints, client)
         pb.resetJointState(body, joints[0], 0.25, 0.0, client)
         return found
 
     code = SHORT.format(engine="pybullet", code="sm.step(model, data)")
     run_plainly(code)
-    monkeypatch.setattr(pb, "getJointStates", wrong)
+    wrong(monkeypatch)
     line = record(code, "pybullet").statements[-1]
     read = [call for call in line.calls if call.function == "getJointStates"]
     assert "joint positions" in read[0].changed
@@ -514,11 +523,10 @@ def test_a_refusal_ends_the_run(engine: str) -> None:
 
 
 def test_what_cannot_be_recorded_is_refused() -> None:
-    with pytest.raises(UnknownNameError, match="mujoco, pybullet"):
-        record("", "mujco")
+    refused((UnknownNameError, "mujoco, pybullet", lambda: record("", "mujco")))
     need_engine("pybullet")
-    with pytest.raises(BadInputError, match="on pybullet"):
-        record(SHORT.format(engine="pybullet", code=""), "mujoco")
+    other = SHORT.format(engine="pybullet", code="")
+    refused((BadInputError, "on pybullet", lambda: record(other, "mujoco")))
     nested = 'from statemachine.probes.calls import record\nrecord("", "mujoco")'
     assert "cannot record another" in str(record(nested, "mujoco").error)
 

@@ -27,7 +27,7 @@ from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.grading.watch import engine_watched
 from statemachine.grading.worlds import ExerciseWorld, Scenes
 
-from .conftest import ROOT, Cli, assert_in, need_engine, one_line, processes_with, written
+from .conftest import ROOT, Cli, assert_in, need_engine, one_line, processes_with, written_all
 from .exercises import RIGHT, WRONG, Attempt
 
 for _module in ("gravity", "state", "forward", "replay"):
@@ -148,23 +148,129 @@ def _one(judgement: Judgement) -> str:
     return remark
 
 
-@pytest.mark.slow
-def test_what_never_returns_or_ends_the_process_is_reported(tmp_path: Path) -> None:
-    found = _grade(
-        tmp_path,
-        "def demo_gravity(model, seconds=4):\n    while True:\n        pass",
-        "def demo_state(model):\n    sys.exit(0)",
-        "def demo_forward(model):\n    os._exit(0)",
-        "def demo_replay(model, ctrl, nstep=600):\n    sum(range(10**15))",  # never lets go
-        limit=1.0,
-    )
-    assert "it took longer than 1 s of computing: a loop" in _one(found["gravity"])
-    assert _one(found["gravity"]).startswith(("line 7:", "line 8:"))
-    assert _one(found["state"]) == (
-        "line 10: it ends the program (sys.exit with 0) where it should return (in `sys.exit(0)`)"
-    )
-    assert "it ended the process with code 0" in _one(found["forward"])
-    assert _one(found["replay"]).startswith("line 14: it took longer than 1 s")
+_SAYS = """
+def says(stage, **facts):
+    frame = sys._getframe()
+    while 'say' not in frame.f_locals: frame = frame.f_back
+    frame.f_locals['say'](stage, **facts)
+    os._exit(0)
+def row(*values):
+    import base64
+    return {"array": ["<f8", [len(values)], base64.b64encode(np.array(values)).decode()]}
+NOTHING = {name: {'tuple': []} for name in ("memory", "live", "runs", "forwards", "ends")}
+NOTHING['changed'] = {'dict': []}
+"""
+_NO_RECORD = r"what its process recorded is no record of a run \("
+_REPLACED_JUDGE = """
+from statemachine.grading import judges
+for name in judges.JUDGES:
+    judges.judge_of(name).judge = lambda *_: 'patched'
+    judges.judge_of(name).right = lambda _: None
+judges.judged = lambda *_: judges.Judgement('demo_gravity', True, True, ('patched',))
+"""
+# What is handed in for each function, and a pattern that is in its one remark; "": it passes.
+HANDED_IN = {
+    "what never returns or ends the process": (
+        ("def demo_gravity(model, seconds=4):\n    while True:\n        pass",
+         "^line [78]: .*it took longer than 1 s of computing: a loop"),
+        ("def demo_state(model):\n    sys.exit(0)",
+         r"^line 10: it ends the program \(sys.exit with 0\) where it should return "
+         r"\(in `sys.exit\(0\)`\)$"),
+        ("def demo_forward(model):\n    os._exit(0)", "it ended the process with code 0"),
+        ("def demo_replay(model, ctrl, nstep=600):\n    sum(range(10**15))",  # never lets go
+         "^line 14: it took longer than 1 s"),
+    ),
+    "an error in another file": (
+        ("def demo_gravity(model, seconds=4):\n    import helper; return helper.helps()",
+         "^helper.py, line 2: ZeroDivisionError"),
+        ("def demo_state(model):\n    import broken", "^broken.py, line 1: "),
+        ("def demo_forward(model):\n    return sm.load('nowhere.xml')", "^line 11: "),
+        ("def demo_replay(model, ctrl, nstep=600):\n    return np.zeros(3) @ np.zeros(2)",
+         "^line 13: ValueError"),
+    ),
+    "crashes, memory and other processes": (
+        ("def demo_gravity(model, seconds=4):\n    ctypes.string_at(0)",
+         r"^line 7: it crashed the process \(SIGSEGV\)$"),
+        ("def demo_state(model):\n    bytearray(10**13)",
+         "line 9: it asks for more memory than there is for it"),
+        ("def demo_forward(model):\n"
+         "    try:\n        subprocess.run(['sleep', '60'])\n    except OSError:\n        pass\n"
+         "    return RIGHT['demo_forward'](model)",
+         r"line 12: it starts another program \(subprocess.Popen\)"),
+        ("def demo_replay(model, ctrl, nstep=600):\n"
+         "    if os.fork() == 0:\n        time.sleep(60)\n    return 1",
+         r"line 17: it starts another process \(os.fork\)"),
+    ),
+    "output that could pass for a verdict or get in its way": (
+        ("def demo_gravity(model, seconds=4):\n"
+         '    line = \'{"nonce": "0", "stage": "judged", "written": true, '
+         '"remarks": [["fine", true]]}\'\n'
+         "    print(line); print(line, file=sys.stderr)\n"
+         "    open('../answers', 'a').write(line + chr(10) + 'x' + chr(10))\n"
+         "    os._exit(0)",
+         "it ended the process with code 0"),
+        ("def demo_state(model):\n"
+         "    sys.stdout.close(); os.closerange(1, 3)\n    return RIGHT['demo_state'](model)", ""),
+        ("def demo_forward(model):\n"
+         "    for _ in range(200): print('x' * 100_000)\n"
+         "    os.chdir('/')\n    return RIGHT['demo_forward'](model)", ""),
+        ("def demo_replay(model, ctrl, nstep=600):\n    return input('same? ')",
+         "line 19: EOFError: it asks for input, and nobody types here"),
+    ),
+    "a long print, which has an end": (
+        ("def demo_gravity(model, seconds=4):\n    for _ in range(400): print('x' * 10**6)",
+         "it prints more than 256 MB, and was ended there"),
+        ("def demo_state(model):\n"
+         "    for _ in range(100): print('x' * 10**6)\n    return RIGHT['demo_state'](model)", ""),
+    ),
+    "what is replaced under the judge": (
+        ("import mujoco\n"
+         "def demo_gravity(model, seconds=4):\n"
+         "    mujoco.mj_step = lambda *a: None\n"
+         "    np.abs = np.array_equal = np.allclose = lambda *a, **k: True\n"
+         "    return RIGHT['demo_gravity'](model, seconds)", "is expected"),
+        ("def demo_state(model):\n    sm.reset = None\n    return RIGHT['demo_state'](model)",
+         "'NoneType' object is not callable"),
+        ("def demo_forward(model):\n    socket.create_connection(('127.0.0.1', 9))",
+         "it wants to use the network"),
+        ("def demo_replay(model, ctrl, nstep=600):\n"
+         "    sm.step = lambda *a: None\n"
+         "    threading.Thread(target=time.sleep, args=(60,)).start()\n"
+         "    return RIGHT['demo_replay'](model, ctrl, nstep)", "no step was taken"),
+    ),
+    "a forged record": (
+        (_SAYS + "def demo_gravity(model, seconds=4):\n"
+         "    result = {'tuple': [[0] * 5] * 2}\n"
+         "    says('answer', answer={'Answer': {'result': result, **NOTHING}})",
+         "no step was taken"),
+        ("def demo_state(model):\n    says('refused', kind='SystemExit', text='boo')", _NO_RECORD),
+        ("def demo_forward(model):\n    time.sleep(0.5); os.unlink('../answers')\n    os._exit(0)",
+         rf"{_NO_RECORD}.*it is gone\)"),
+        ("def demo_replay(model, ctrl, nstep=600):\n"
+         "    result = {'tuple': [True, row(1), row(1)]}\n"
+         "    says('answer', answer={'Answer': {'result': result, **NOTHING}})", _NO_RECORD),
+    ),
+    "a judge that is replaced, which is another process's": (
+        (f"{_REPLACED_JUDGE}def demo_gravity(*_): return 1", "^it returns an int: 1"),
+        *((f"def {name}(*_): return 1", "^it returns an int: 1") for name in [*JUDGES][1:]),
+    ),
+}  # fmt: skip
+_OF_SEVERAL = ("is expected", "no step was taken")  # patterns of the first of several remarks
+_SLOW = ("what never returns or ends the process", "a long print, which has an end")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in _SLOW)) for n in HANDED_IN]
+)
+def test_what_is_handed_in_is_judged(name: str, tmp_path: Path) -> None:
+    texts = {"helper.py": "def helps():\n    return 1 / 0\n", "broken.py": "def f(:\n"}
+    written_all(tmp_path, texts)
+    functions, patterns = zip(*HANDED_IN[name], strict=True)
+    found = _grade(tmp_path, *functions, limit=1.0 if name == _SLOW[0] else 5.0)
+    for judgement, pattern in zip(found.values(), patterns, strict=False):
+        remark = judgement.remarks[0] if not pattern or pattern in _OF_SEVERAL else _one(judgement)
+        assert re.search(pattern, remark), judgement.remarks
+        assert judgement.passed == (not pattern), judgement.remarks
 
 
 def test_what_does_not_get_ready_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -239,132 +345,6 @@ def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) 
     assert processes_with(here) == []
 
 
-def test_an_error_in_another_file_is_told_with_its_name(tmp_path: Path) -> None:
-    (tmp_path / "helper.py").write_text("def helps():\n    return 1 / 0\n")
-    (tmp_path / "broken.py").write_text("def f(:\n")
-    found = _grade(
-        tmp_path,
-        "def demo_gravity(model, seconds=4):\n    import helper; return helper.helps()",
-        "def demo_state(model):\n    import broken",
-        "def demo_forward(model):\n    return sm.load('nowhere.xml')",
-        "def demo_replay(model, ctrl, nstep=600):\n    return np.zeros(3) @ np.zeros(2)",
-    )
-    assert _one(found["gravity"]).startswith("helper.py, line 2: ZeroDivisionError")
-    assert _one(found["state"]).startswith("broken.py, line 1: ")
-    assert _one(found["forward"]).startswith("line 11: ")
-    assert _one(found["replay"]).startswith("line 13: ValueError")
-
-
-def test_crashes_memory_and_other_processes_are_reported(tmp_path: Path) -> None:
-    found = _grade(
-        tmp_path,
-        "def demo_gravity(model, seconds=4):\n    ctypes.string_at(0)",
-        "def demo_state(model):\n    bytearray(10**13)",
-        "def demo_forward(model):\n"
-        "    try:\n        subprocess.run(['sleep', '60'])\n    except OSError:\n        pass\n"
-        "    return RIGHT['demo_forward'](model)",
-        "def demo_replay(model, ctrl, nstep=600):\n"
-        "    if os.fork() == 0:\n        time.sleep(60)\n    return 1",
-    )
-    assert _one(found["gravity"]) == "line 7: it crashed the process (SIGSEGV)"
-    assert "line 9: it asks for more memory than there is for it" in _one(found["state"])
-    assert "line 12: it starts another program (subprocess.Popen)" in _one(found["forward"])
-    assert "line 17: it starts another process (os.fork)" in _one(found["replay"])
-
-
-def test_output_cannot_pass_for_a_verdict_nor_get_in_its_way(tmp_path: Path) -> None:
-    found = _grade(
-        tmp_path,
-        "def demo_gravity(model, seconds=4):\n"
-        '    line = \'{"nonce": "0", "stage": "judged", "written": true, '
-        '"remarks": [["fine", true]]}\'\n'
-        "    print(line); print(line, file=sys.stderr)\n"
-        "    open('../answers', 'a').write(line + chr(10) + 'x' + chr(10))\n"
-        "    os._exit(0)",
-        "def demo_state(model):\n"
-        "    sys.stdout.close(); os.closerange(1, 3)\n    return RIGHT['demo_state'](model)",
-        "def demo_forward(model):\n"
-        "    for _ in range(200): print('x' * 100_000)\n"
-        "    os.chdir('/')\n    return RIGHT['demo_forward'](model)",
-        "def demo_replay(model, ctrl, nstep=600):\n    return input('same? ')",
-    )
-    assert "it ended the process with code 0" in _one(found["gravity"])
-    assert found["state"].passed, found["state"].remarks
-    assert found["forward"].passed, found["forward"].remarks
-    assert "line 19: EOFError: it asks for input, and nobody types here" in _one(found["replay"])
-
-
-@pytest.mark.slow
-def test_a_long_print_is_not_said_to_have_no_end(tmp_path: Path) -> None:
-    found = _grade(
-        tmp_path,
-        "def demo_gravity(model, seconds=4):\n    for _ in range(400): print('x' * 10**6)",
-        "def demo_state(model):\n"
-        "    for _ in range(100): print('x' * 10**6)\n    return RIGHT['demo_state'](model)",
-        "def demo_forward(model): raise NotImplementedError",
-        "def demo_replay(model, ctrl, nstep=600): raise NotImplementedError",
-    )
-    assert "it prints more than 256 MB, and was ended there" in _one(found["gravity"])
-    assert found["state"].passed
-
-
-def test_what_is_replaced_under_the_judge_does_not_help(tmp_path: Path) -> None:
-    found = _grade(
-        tmp_path,
-        "import mujoco\n"
-        "def demo_gravity(model, seconds=4):\n"
-        "    mujoco.mj_step = lambda *a: None\n"
-        "    np.abs = np.array_equal = np.allclose = lambda *a, **k: True\n"
-        "    return RIGHT['demo_gravity'](model, seconds)",
-        "def demo_state(model):\n    sm.reset = None\n    return RIGHT['demo_state'](model)",
-        "def demo_forward(model):\n    socket.create_connection(('127.0.0.1', 9))",
-        "def demo_replay(model, ctrl, nstep=600):\n"
-        "    sm.step = lambda *a: None\n"
-        "    threading.Thread(target=time.sleep, args=(60,)).start()\n"
-        "    return RIGHT['demo_replay'](model, ctrl, nstep)",
-    )
-    assert "is expected" in found["gravity"].remarks[0]
-    assert "'NoneType' object is not callable" in _one(found["state"])
-    assert "it wants to use the network" in _one(found["forward"])
-    assert "no step was taken" in found["replay"].remarks[0]
-
-
-_SAYS = """
-def says(stage, **facts):
-    frame = sys._getframe()
-    while 'say' not in frame.f_locals: frame = frame.f_back
-    frame.f_locals['say'](stage, **facts)
-    os._exit(0)
-def row(*values):
-    import base64
-    return {"array": ["<f8", [len(values)], base64.b64encode(np.array(values)).decode()]}
-"""
-
-
-def test_a_forged_record_is_judged_like_any_other(tmp_path: Path) -> None:
-    names = ("memory", "live", "runs", "forwards", "ends")
-    nothing = (
-        ", ".join(f"'{name}': {{'tuple': []}}" for name in names) + ", 'changed': {'dict': []}"
-    )
-    found = _grade(
-        tmp_path,
-        _SAYS,
-        "def demo_gravity(model, seconds=4):\n"
-        "    result = {'tuple': [[0] * 5] * 2}\n"
-        f"    says('answer', answer={{'Answer': {{'result': result, {nothing}}}}})",
-        "def demo_state(model):\n    says('refused', kind='SystemExit', text='boo')",
-        "def demo_forward(model):\n    time.sleep(0.5); os.unlink('../answers')\n    os._exit(0)",
-        "def demo_replay(model, ctrl, nstep=600):\n"
-        "    result = {'tuple': [True, row(1), row(1)]}\n"
-        f"    says('answer', answer={{'Answer': {{'result': result, {nothing}}}}})",
-    )
-    assert "no step was taken" in found["gravity"].remarks[0]
-    assert not found["gravity"].passed
-    for name in ("state", "forward", "replay"):
-        assert "what its process recorded is no record of a run (" in _one(found[name])
-    assert "(it is gone)" in _one(found["forward"])
-
-
 def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
     (tmp_path / "bob.py").write_text(SOLUTION.read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "notes.txt").write_text("hello")
@@ -394,39 +374,20 @@ def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
 
 
 def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
-    student = written(
-        tmp_path / "student.py", "import helper\nfrom tools import more\nDATA = 'table.json'\n"
-    )
-    (tmp_path / "helper.py").write_text("import deeper\n")
-    for name in ("deeper.py", "table.json", "unnamed.py", ".hidden.py", "tools.txt"):
-        (tmp_path / name).write_text("")
-    (tmp_path / "tools").mkdir()
-    (tmp_path / "tools" / "__init__.py").write_text("from more import demo_gravity\n")
-    (tmp_path / "more.py").write_text("def demo_gravity(model): return bob\n")
-    assert set(own_files.named_by(student)) == {
+    empty = "deeper.py", "table.json", "unnamed.py", ".hidden.py", "tools.txt", "env/pyvenv.cfg"
+    texts = {
+        "student.py": "import helper\nfrom tools import more\nDATA = 'table.json'\n",
+        "helper.py": "import deeper\n",
+        "tools/__init__.py": "from more import demo_gravity\n",
+        "more.py": "def demo_gravity(model): return bob\n",
+    }
+    written_all(tmp_path, texts | dict.fromkeys((*empty, "env/x.py"), ""))
+    assert set(own_files.named_by(tmp_path / "student.py")) == {
         "student.py", "helper.py", "deeper.py", "table.json", "tools/__init__.py", "tools.txt",
     }  # fmt: skip
-    env = tmp_path / "env"
-    env.mkdir()
-    for name in ("pyvenv.cfg", "x.py"):
-        (env / name).write_text("")
     whole = own_files.in_folder(tmp_path)
     assert {"more.py", "unnamed.py", "tools/__init__.py"} < set(whole)
     assert not {"env/x.py", ".hidden.py"} & set(whole)
-
-
-def test_a_judge_that_is_replaced_is_another_process_s(tmp_path: Path) -> None:
-    found = _grade(
-        tmp_path,
-        "from statemachine.grading import judges",
-        "for name in judges.JUDGES:",
-        "    judges.judge_of(name).judge = lambda *_: 'patched'",
-        "    judges.judge_of(name).right = lambda _: None",
-        "judges.judged = lambda *_: judges.Judgement('demo_gravity', True, True, ('patched',))",
-        *(f"def {name}(*_): return 1" for name in JUDGES),
-    )
-    for judgement in found.values():
-        assert _one(judgement).startswith("it returns an int: 1")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="it is shut in on Linux only")

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from statemachine.report import gradescope
 from statemachine.report.classroom import page
 from statemachine.runs.whole import csv_text, replace_csv
 
-from .conftest import ROOT, Cli, assert_in, one_line, refused, written
+from .conftest import ROOT, Cli, assert_in, one_line, refused, written, written_all
 
 TEMPLATE = ROOT / "exercises" / "step_loop.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
@@ -43,20 +44,23 @@ SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
 def folder(tmp_path: Path) -> Path:
     """Files and folders as students hand them in."""
     home = tmp_path / "class"
-    for name in ("ann", "bob", "cy", "dee", "__pycache__", ".git"):
-        (home / name).mkdir(parents=True)
-    (home / "ann" / "my_solution.py").write_text(SOLUTION.read_text())
-    (home / "ann" / "helper.py").write_text("X = 1\n")
-    (home / "bob" / "deep").mkdir()
-    (home / "bob" / "deep" / "step_loop.py").write_text(TEMPLATE.read_text())
-    (home / "cy" / "notes.txt").write_text("none\n")
-    for name in ("a.py", "b.py"):
-        (home / "dee" / name).write_text("def demo_gravity(model): ...\n")
-    (home / "__pycache__" / "x.py").write_text("def demo_gravity(model): ...\n")
-    (home / "eve.py").write_text("def demo_gravity(:\n")
-    (home / "fay.py").write_text("# the same\n" + SOLUTION.read_text().replace("\n\n\n", "\n\n"))
-    (home / "grades.txt").write_text("no Python\n")
-    return home
+    (home / ".git").mkdir(parents=True)
+    one_function = "def demo_gravity(model): ...\n"
+    return written_all(
+        home,
+        {
+            "ann/my_solution.py": SOLUTION.read_text(),
+            "ann/helper.py": "X = 1\n",
+            "bob/deep/step_loop.py": TEMPLATE.read_text(),
+            "cy/notes.txt": "none\n",
+            "dee/a.py": one_function,
+            "dee/b.py": one_function,
+            "__pycache__/x.py": one_function,
+            "eve.py": "def demo_gravity(:\n",
+            "fay.py": "# the same\n" + SOLUTION.read_text().replace("\n\n\n", "\n\n"),
+            "grades.txt": "no Python\n",
+        },
+    )
 
 
 @pytest.fixture
@@ -97,18 +101,18 @@ def test_what_is_a_submission(folder: Path) -> None:
 
 
 def test_the_folder_of_one_student_is_no_class(tmp_path: Path, judged: list[str]) -> None:
-    ida = tmp_path / "ida"
-    ida.mkdir()
-    (ida / "step_loop.py").write_text(SOLUTION.read_text())
-    (ida / "test_arm.py").write_text("def test_nothing(): ...\n")
-    (ida / "helper.py").write_text("X = 1\n")
+    texts = {
+        "step_loop.py": SOLUTION.read_text(),
+        "test_arm.py": "def test_nothing(): ...\n",
+        "helper.py": "X = 1\n",
+    }
+    ida = written_all(tmp_path / "ida", texts)
     assert is_one_students(ida)
     (found,) = submissions([ida])
     assert (found.name, found.path, found.folder) == ("ida", ida / "step_loop.py", ida)
     assert [each.name for each in submissions([ida, tmp_path / "ida"])] == [ida.as_posix()]
     assert not_looked_at([ida]) == []
-    (ida / "old").mkdir()
-    (ida / "old" / "step_loop.py").write_text(TEMPLATE.read_text())
+    written_all(ida, {"old/step_loop.py": TEMPLATE.read_text()})
     assert not is_one_students(ida)  # whose is the other one?
     assert not is_one_students(tmp_path)
 
@@ -120,8 +124,7 @@ def test_a_class_beside_the_template_stays_a_class(folder: Path) -> None:
 
 
 def test_of_several_files_the_exercises_own_name_counts(tmp_path: Path) -> None:
-    for name in ("step_loop.py", "mine.py"):
-        (tmp_path / name).write_text(TEMPLATE.read_text())
+    written_all(tmp_path, dict.fromkeys(("step_loop.py", "mine.py"), TEMPLATE.read_text()))
     assert submission_in(tmp_path) == tmp_path / "step_loop.py"
 
 
@@ -149,9 +152,8 @@ def test_a_huge_file_is_refused_unread(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_what_is_not_looked_at_is_told(folder: Path, judged: list[str]) -> None:
-    for name in ("gus.ipynb", "hal.zip", ".hidden"):
-        (folder / name).write_text("")
-    (folder / "IDA.PY").write_text("return 1\n")
+    ignored_ones = dict.fromkeys(("gus.ipynb", "hal.zip", ".hidden"), "")
+    written_all(folder, ignored_ones | {"IDA.PY": "return 1\n"})
     (folder / "__MACOSX").mkdir()
     found = submissions([folder])
     assert "IDA.PY" in [each.name for each in found]
@@ -166,9 +168,7 @@ def test_what_is_not_looked_at_is_told(folder: Path, judged: list[str]) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 def test_what_was_skipped_is_a_row_with_the_reason(folder: Path, judged: list[str]) -> None:
-    (folder / "gus.ipynb").write_text("{}")
-    (folder / "cy" / "mine.ipynb").write_text("{}")
-    (folder / "hal.zip").write_text("")
+    written_all(folder, {"gus.ipynb": "{}", "cy/mine.ipynb": "{}", "hal.zip": ""})
     (folder / "ida.py").symlink_to("nowhere.py")
     os.mkfifo(folder / "jo.py")
     entries = judge_all(submissions([folder]), "mujoco")
@@ -243,9 +243,8 @@ def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path
 def test_a_roster_gives_every_student_a_row(
     folder: Path, judged: list[str], tmp_path: Path
 ) -> None:
-    (folder / "Lee_Bo_41017_assignment.py").write_text("return 1\n")
-    (folder / "x_41018.py").write_text("return 1\n")
-    (folder / "x_again_41018.py").write_text("return 1\n")
+    names = "Lee_Bo_41017_assignment.py", "x_41018.py", "x_again_41018.py"
+    written_all(folder, dict.fromkeys(names, "return 1\n"))
     roster = tmp_path / "roster.csv"
     roster.write_text(
         "name;number;file\nAnn Smith;1;ann\nBo Lee;41017\nCy;41018\n\nZoë;99;\n",
@@ -288,12 +287,16 @@ def test_tests_and_predictions_are_in_the_same_table(
         return Examination(file.name, backend, "4", ("test_x",), bad, () if bad else trials)
 
     monkeypatch.setattr(classroom, "examine", examined)
-    for name, text in (("ann", "good"), ("bob", "bad"), ("cy", "good")):
-        (folder / name / "test_arm.py").write_text(text)
     answers = [{"lesson": "a", "question": str(k), "right": k > 0} for k in range(3)]
     record = {"kind": "statemachine predictions", "score": 99, "answers": answers}
-    (folder / "ann" / "lesson.json").write_text(json.dumps(record))
-    (folder / "bob" / "lesson.json").write_text("{}")
+    texts = {
+        "ann/test_arm.py": "good",
+        "bob/test_arm.py": "bad",
+        "cy/test_arm.py": "good",
+        "ann/lesson.json": json.dumps(record),
+        "bob/lesson.json": "{}",
+    }
+    written_all(folder, texts)
     table = tmp_path / "t.csv"
     for _ in range(2):
         main(["check", str(folder), "--csv", str(table), "--tests"])
@@ -310,9 +313,9 @@ def test_tests_and_predictions_are_in_the_same_table(
 
 
 def test_two_folders_may_have_files_of_one_name(tmp_path: Path, judged: list[str]) -> None:
-    for name in ("monday", "tuesday"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "ann.py").write_text(f"return # {name}\n")
+    written_all(
+        tmp_path, {f"{name}/ann.py": f"return # {name}\n" for name in ("monday", "tuesday")}
+    )
     entries = judge_all(submissions([tmp_path / "monday", tmp_path / "tuesday"]), "mujoco")
     assert len(entries) == 2
     assert len({entry.name for entry in entries}) == 2
@@ -349,10 +352,8 @@ def test_functions_that_are_alike_are_told_whatever_is_named_how(
 
 
 def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
-    (folder / "helper.py").write_text("ANSWER = 1\n")
     text = SOLUTION.read_text().replace("import math", "import helper\nimport math")
-    for place in (folder / "gus.py", folder / "ann" / "my_solution.py"):
-        place.write_text(text)
+    written_all(folder, {"helper.py": "ANSWER = 1\n", "gus.py": text, "ann/my_solution.py": text})
     found = [each for each in submissions([folder]) if each.name in ("ann", "gus.py")]
     ann, gus = judge_all(found, "mujoco")
     assert ann.right == 4
@@ -412,12 +413,10 @@ def test_jobs_must_be_some(folder: Path) -> None:
 
 
 def test_all_of_a_students_folder_belongs_to_the_file(tmp_path: Path) -> None:
-    (tmp_path / "step_loop.py").write_text("from mine import *\n")
-    (tmp_path / "mine.py").write_text(SOLUTION.read_text())
+    texts = {"step_loop.py": "from mine import *\n", "mine.py": SOLUTION.read_text()}
+    written_all(tmp_path, texts)
     assert main(["check", str(tmp_path), "--gradescope", str(tmp_path / "r.json")]) == 0
-    hidden = tmp_path / "class" / "ann" / ".old"
-    hidden.mkdir(parents=True)
-    (hidden / "a.py").write_text("def demo_gravity(:\n")
+    written_all(tmp_path, {"class/ann/.old/a.py": "def demo_gravity(:\n"})
     (entry,) = judge_all(submissions([tmp_path / "class"]), "mujoco")
     assert entry.judged
 
@@ -445,9 +444,7 @@ def test_what_gradescope_reads(judged: list[str]) -> None:
 @pytest.mark.slow
 def test_a_folder_from_the_command_line(cli: Cli, folder: Path, tmp_path: Path) -> None:
     for name in ("cy", "dee"):
-        for file in (folder / name).iterdir():
-            file.unlink()
-        (folder / name).rmdir()
+        shutil.rmtree(folder / name)
     (folder / "hal.py").write_text("def demo_gravity(model, seconds=4):\n    while True: pass\n")
     table = tmp_path / "grades.csv"
     command = ("check", str(folder), "--csv", str(table), "--time-limit", "2")

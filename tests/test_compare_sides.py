@@ -27,7 +27,7 @@ from statemachine.report import compare as report
 from statemachine.runs import record, write
 from statemachine.runs.controllers import function_scenario
 
-from .conftest import Cli, need_engine, one_line, one_line_error, written
+from .conftest import Cli, need_engine, one_line, one_line_error, written, written_all
 from .small_models import BENT, TWO_LINKS, TWO_SERVOS
 
 _FUNCTION = """
@@ -73,33 +73,35 @@ def leaves(model, data):
 
 def ends(model, data):
     raise SystemExit(3)
+
+def looks(model, data):
+    return [0.5 if "keyless" in model.path.name else 0.2, 0]
+
+def by_place(model, data):
+    return [0.2, 0.1]
 """
 
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
     """A folder with an arm in several forms, and the user's functions."""
-    keys = BENT.format(qpos=".2 -.3")
-    arm = TWO_LINKS.format(mass="0.2", drives="".join(TWO_SERVOS), keys=keys)
-    (tmp_path / "arm.xml").write_text(arm)
-    (tmp_path / "heavy.xml").write_text(
-        TWO_LINKS.format(mass="0.4", drives="".join(TWO_SERVOS), keys=keys)
+    keys, servos = BENT.format(qpos=".2 -.3"), "".join(TWO_SERVOS)
+    arm = TWO_LINKS.format(mass="0.2", drives=servos, keys=keys)
+    turned = "".join(reversed(TWO_SERVOS))
+    return written_all(
+        tmp_path,
+        {
+            "arm.xml": arm,
+            "heavy.xml": TWO_LINKS.format(mass="0.4", drives=servos, keys=keys),
+            "keyless.xml": TWO_LINKS.format(mass="0.2", drives=servos, keys=""),
+            "turned.xml": TWO_LINKS.format(mass="0.2", drives=turned, keys=""),
+            "renamed.xml": arm.replace("elbow", "Gelenk_2").replace("shoulder", "Gelenk_1"),
+            "old/robot/arm.xml": arm,
+            "new/robot/arm.xml": arm.replace('damping=".3"', 'damping=".2"'),
+            "own.py": _FUNCTION,
+            "helper_of_two_sides.py": "WANTED = [0.2, 0.1]\n",
+        },
     )
-    (tmp_path / "keyless.xml").write_text(
-        TWO_LINKS.format(mass="0.2", drives="".join(TWO_SERVOS), keys="")
-    )
-    turned = TWO_LINKS.format(mass="0.2", drives="".join(reversed(TWO_SERVOS)), keys="")
-    (tmp_path / "turned.xml").write_text(turned)
-    renamed = arm.replace("elbow", "Gelenk_2").replace("shoulder", "Gelenk_1")
-    (tmp_path / "renamed.xml").write_text(renamed)
-    for folder in ("old", "new"):
-        (tmp_path / folder / "robot").mkdir(parents=True)
-        (tmp_path / folder / "robot" / "arm.xml").write_text(
-            arm if folder == "old" else arm.replace('damping=".3"', 'damping=".2"')
-        )
-    (tmp_path / "own.py").write_text(_FUNCTION)
-    (tmp_path / "helper_of_two_sides.py").write_text("WANTED = [0.2, 0.1]\n")
-    return tmp_path
 
 
 def asked(what: str, left: Side, right: Side, **others: Any) -> Request:
@@ -406,11 +408,8 @@ def test_feedback_and_the_machine_are_told_apart(files: Path) -> None:
 
 def test_feedback_that_makes_the_difference_and_a_machine_that_is_the_same(files: Path) -> None:
     """The function looks at who it drives: in open loop nothing differs."""
-    (files / "two.py").write_text(
-        "def f(model, data):\n    return [0.5 if 'keyless' in model.path.name else 0.2, 0]\n"
-    )
     sides = Side(str(files / "arm.xml")), Side(str(files / "keyless.xml"))
-    run = run_sides(asked(f"{files / 'two.py'}:f", *sides))
+    run = run_sides(asked(f"{files / 'own.py'}:looks", *sides))
     closed, opened = compare(run.left, run.right), compare(run.left, run.played)
     assert not closed.agrees
     assert largest(opened) == 0
@@ -419,10 +418,8 @@ def test_feedback_that_makes_the_difference_and_a_machine_that_is_the_same(files
 
 def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
     sides = Side(str(files / "arm.xml")), Side(str(files / "turned.xml"))
-    (files / "two.py").write_text(
-        "def f(model, data):\n    return [0.2, 0.1]\n"  # by place: another robot is told another
-    )
-    run = run_sides(asked(f"{files / 'two.py'}:f", *sides))
+    # By place: another robot is told another.
+    run = run_sides(asked(f"{files / 'own.py'}:by_place", *sides))
     assert run.commands == "its own"
     assert largest(compare(run.left, run.played)) < 1e-12
     assert largest(compare(run.left, run.right)) > 0.01
@@ -530,8 +527,7 @@ def test_what_a_side_has_nothing_of_is_said_first_and_its_switch_shows_the_rest(
     tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    written(tmp_path / "whole.xml", _WITH.format(damping=0.3))
-    written(tmp_path / "bare.xml", _bare(0.5))
+    written_all(tmp_path, {"whole.xml": _WITH.format(damping=0.3), "bare.xml": _bare(0.5)})
     words = ("compare", "hold", "whole.xml", "bare.xml", "--seconds", "0.5")
     for more in ((), ("--why",)):
         lines = [line for line in cli(*words, *more).stdout.splitlines() if "gives" in line]
@@ -549,8 +545,8 @@ def test_parts_that_cannot_be_given_are_one_clear_line(
     tmp_path: Path, here: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    written(tmp_path / "whole.xml", _WITH.format(damping=0.3))
-    written(tmp_path / "nosite.xml", re.sub("<site.*?/>", "", _bare(0.3)))
+    siteless = re.sub("<site.*?/>", "", _bare(0.3))
+    written_all(tmp_path, {"whole.xml": _WITH.format(damping=0.3), "nosite.xml": siteless})
     sides = ("whole.xml", "nosite.xml")
     one_line(here("compare", "hold", *sides, "--actuators", "left"), "that is 'end'")
     whole: Any = sm.load("whole.xml")

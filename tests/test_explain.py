@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,6 +118,14 @@ def _kv(text: str) -> str:
     return text[start : text.index('"', start + 4) + 1]
 
 
+def with_changes(text: str, changes: list[tuple[str, str]]) -> str:
+    """A text with changes, each of a piece that is there once."""
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
 SAME = {
     "fullinertia": [
         (
@@ -175,27 +184,13 @@ def _swapped(text: str) -> str:
 
 def said_otherwise(name: str) -> str:
     """The arm in other words."""
-    right = ARM
-    for old, new in SAME[name]:
-        assert right.count(old) == 1
-        right = right.replace(old, new)
+    right = with_changes(ARM, SAME[name])
     if name == "permuted bodies":  # and with them the order of qpos
         start, end = right.index('<body name="ball"'), right.index('<body name="weight"')
         ball = right[start:end]
         right = right.replace(ball, "").replace('<body name="upper"', f'{ball}<body name="upper"')
         right = right.replace('qpos="0 0  0.6 0 0.2 1 0 0 0  0"', 'qpos="0.6 0 0.2 1 0 0 0 0 0 0"')
     return _swapped(right) if name == "permuted actuators" else right
-
-
-@pytest.mark.parametrize("name", SAME)
-def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
-    found = explained(tmp_path, ARM, said_otherwise(name), scenario=HOME)
-    # The order of ctrl matters to who writes it by number.
-    assert [each.name for each in found.shares] == (
-        ["order of ctrl"] if name == "permuted actuators" else []
-    )
-    assert found.is_rounding
-    assert found.is_explained
 
 
 EQUIVALENT = {
@@ -218,14 +213,6 @@ EQUIVALENT = {
     ),
     "mocap body fixed": (ledge('mocap="true"'), ledge("")),
 }
-
-
-@pytest.mark.parametrize("name", EQUIVALENT)
-def test_equivalent_meshes_equalities_and_still_bodies_are_no_difference(name, tmp_path):
-    left, right = EQUIVALENT[name]
-    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
-    assert [each.name for each in found.shares if each.name != "start"] == []
-    assert found.is_explained
 
 
 BROUGHT_OVER = [
@@ -291,15 +278,6 @@ SHARED = [
 ]
 
 
-@pytest.mark.parametrize(("left", "right", "causes"), SHARED)
-def test_a_mesh_that_geoms_share_is_brought_over(left, right, causes, tmp_path):
-    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
-    assert found.gap > 100 * found.negligible
-    assert sorted(shares(found)) == sorted(causes)
-    assert found.brought == 0.0
-    assert found.is_explained
-
-
 @pytest.mark.parametrize("other", ["margin", "exclude"])
 def test_a_pair_that_is_taken_away_is_as_its_geoms_are_then(other, tmp_path):
     """Its geoms have another margin, or do not touch by themselves, until that is brought over."""
@@ -318,13 +296,6 @@ def test_a_mesh_that_another_geom_keeps_is_refused_with_its_reason(mesh_of_the_o
     found = explained(tmp_path, left, balls("n", "n", n=LARGE), scenario=HOME, quantity="ball")
     assert {each.note for each in found.shares} == {"another geom keeps this mesh, or gets a third"}
     assert not found.is_explained
-
-
-def test_a_function_that_writes_by_number_meets_other_actuators(tmp_path):
-    right = _swapped(ARM)
-    by_number = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: [0.8, -0.5])
-    found = explained(tmp_path, ARM, right, scenario=by_number)
-    assert shares(found) == {"order of ctrl": pytest.approx(1.0)}
 
 
 EXTRA = (
@@ -369,20 +340,6 @@ def test_the_robot_of_a_urdf_is_that_of_the_mjcf():
     kinds = {each.kind for each in found.shares if abs(each.share or 0.0) > 1e-3}
     assert kinds <= {"option", "joint"}
     assert found.unexplained == pytest.approx(0.0, abs=1e-6)
-
-
-def test_names_can_be_given(tmp_path):
-    right = ARM.replace('"elbow"', '"e"').replace('"shoulder"', '"s"').replace("_shape", "_s")
-
-    def fixed(_model: sm.Model, _seed: int):
-        return lambda _time, _data: [0.8, -0.5]
-
-    by_number = replace(HOME, controller=fixed)
-    found = explained(
-        tmp_path, ARM, right, scenario=by_number, names={"elbow": "e", "shoulder": "s"}
-    )
-    assert found.shares == ()
-    assert found.is_rounding
 
 
 def test_a_finer_list_has_every_difference(tmp_path):
@@ -566,114 +523,159 @@ EASILY_MISSED = {
 }
 
 
-@pytest.mark.parametrize("name", EASILY_MISSED)
-def test_what_is_easily_missed(name, tmp_path):
+BALL = {"quantity": "ball"}
+BY_NUMBER = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: [0.8, -0.5])
+# As in a run of two sides: what the left was told last holds, and each begins with its own.
+TOLD_ONCE = replace(
+    HOME, controller=lambda _m, _s: lambda time, _d: [0.8, -0.5] if time < 0.1 else None
+)
+PUSHED = ARM.replace(
+    "</actuator>", '<general name="push" site="tip" gear="0 0 0 0 1 0" gainprm="1"/></actuator>'
+).replace('ctrl="0 0"', 'ctrl="0 0 0.1"')
+OTHER_CTRL = with_changes(
+    ARM, [('0.6 0 0.2 1 0 0 0  0" ctrl="0 0"', '0.6 0 0.2 1 0 0 0  0" ctrl="0.3 0"')]
+)
+# Two sides that move alike, and what is asked of them.
+ALIKE: dict[str, tuple[str, str, dict[str, Any]]] = {
+    **{name: (ARM, said_otherwise(name), {}) for name in SAME},
+    **{name: (*sides, BALL) for name, sides in EQUIVALENT.items()},
+    "names that are given": (
+        ARM,
+        ARM.replace('"elbow"', '"e"').replace('"shoulder"', '"s"').replace("_shape", "_s"),
+        {"scenario": BY_NUMBER, "names": {"elbow": "e", "shoulder": "s"}},
+    ),
+    "a site that is found by its place": (PUSHED, PUSHED.replace('"tip"', '"end"'), {}),
+    "no command after a while": (ARM, ARM.replace('kp="20"', 'kp="20.0"'), {"scenario": TOLD_ONCE}),
+    "a start that is the left's": (
+        OTHER_CTRL, ARM[: ARM.index("<keyframe>")] + "</mujoco>", {"scenario": HOME_LEAVE}
+    ),
+    "a mocap body and a cord": (LED, LED, {"scenario": HOME_LEAVE}),
+    "a mocap body, a cord and another site": (
+        LED, with_changes(LED, [(_CORE, '<site name="first"/>' + _CORE)]), {"scenario": HOME_LEAVE}
+    ),
+    "a mocap body, a cord and a colour": (
+        LED,
+        with_changes(LED, [('name="side"', 'name="side" rgba="1 0 0 1"')]),
+        {"scenario": HOME_LEAVE},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
+    left, right, how = ALIKE[name]
+    found = explained(tmp_path, left, right, **{"scenario": HOME, **how})
+    # The order of ctrl matters to who writes it by number.
+    assert [each.name for each in found.shares] == (
+        ["order of ctrl"] if name == "permuted actuators" else []
+    )
+    assert found.is_rounding
+    assert found.is_explained
+
+
+def _easily_missed(name: str) -> tuple[str, str, list[str], dict[str, Any]]:
     both, other, cause, *quantity = EASILY_MISSED[name]
     left = with_changes(LED, both)
     # A delay shows only where the command changes.
-    scenario = HOME if "delay" in name else HOME_LEAVE
-    found = explained(
-        tmp_path, left, with_changes(left, other), scenario=scenario, quantity=(*quantity, None)[0]
+    how: dict[str, Any] = {"scenario": HOME if "delay" in name else HOME_LEAVE}
+    return (
+        left,
+        with_changes(left, other),
+        [cause],
+        how | ({"quantity": quantity[0]} if quantity else {}),
     )
-    assert found.gap > 100 * found.negligible
-    assert list(shares(found)) == [cause]
-    assert is_brought(found)
 
 
-@pytest.mark.parametrize(
-    "change",
+# A joint more, or an equality that holds one of them.
+SEVERAL = with_changes(
+    LED,
+    [('<site name="low"',
+      '<joint name="twist" axis="1 0 0" damping="0.1"/><site name="low"')],
+)  # fmt: skip
+HELD = with_changes(LED, [("<equality>", '<equality><joint joint1="shoulder" joint2="elbow"/>')])
+ANOTHER_ZERO = [('name="elbow" axis', 'name="elbow" ref="0.2" axis')]
+# A ball joint, which is not among the hinges.
+HIP = with_changes(
+    ARM,
     [
-        [],
-        [(_CORE, '<site name="first"/>' + _CORE)],
-        [('name="side"', 'name="side" rgba="1 0 0 1"')],
+        ('<body name="weight"',
+         '<body pos="1 0 1"><joint name="hip" type="ball" stiffness="0.1"/>'
+         '<geom type="capsule" size="0.02" fromto="0 0 0 0.1 0 -0.2" mass="0.3"/></body>'
+         '<body name="weight"'),
+        ('0 0.2 1 0 0 0  0"', '0 0.2 1 0 0 0  1 0 0 0  0"'),
     ],
+)  # fmt: skip
+ASLEEP = with_changes(ARM, [('implicitfast"/>', 'implicitfast"><flag sleep="enable"/></option>')])
+# A floating body falls onto a table that was moved: the table moved, not the robot.
+TABLE = with_changes(
+    ARM,
+    [('<body name="ball"',
+      '<body name="table" pos="0.6 0 0.05"><geom name="top" type="box" size=".03 .03 .05"/></body>'
+      '<body name="ball"')],
+)  # fmt: skip
+TENDON = (
+    '<tendon><fixed name="band" stiffness="5" springlength="0.1">'
+    '<joint joint="elbow" coef="{}"/></fixed></tendon><actuator>'
 )
-def test_a_mocap_body_and_a_cord_are_no_difference(change, tmp_path):
-    assert not explained(tmp_path, LED, with_changes(LED, change), scenario=HOME_LEAVE).shares
+# Two sides, their causes, and what is asked of them.
+BROUGHT: dict[str, tuple[str, str, list[str], dict[str, Any]]] = {
+    **{name: _easily_missed(name) for name in EASILY_MISSED},
+    **{f"shared mesh {k}": (*row, BALL) for k, row in enumerate(SHARED)},
+    "another zero of one of several joints": (
+        SEVERAL, with_changes(SEVERAL, ANOTHER_ZERO), ["zero of lower", "start"], {"scenario": STAY}
+    ),
+    "another zero of a joint that an equality holds": (
+        HELD, with_changes(HELD, ANOTHER_ZERO), ["zero of lower", "start"], {"scenario": STAY}
+    ),
+    "a spring beside the hinges": (
+        HIP, with_changes(HIP, [('stiffness="40"', 'stiffness="50"')]), ["spring of spring"], {}
+    ),
+    "a spring of a ball joint": (HIP, with_changes(HIP, [BALL_SPRING]), ["spring of hip"], {}),
+    "what sleeps from the start": (
+        ASLEEP,
+        with_changes(ASLEEP, [('<body name="ball"', '<body name="ball" sleep="init"')]),
+        ["sleep policy of ball"],
+        BALL,
+    ),
+    "what is fixed elsewhere": (
+        TABLE, TABLE.replace('pos="0.6 0 0.05"', 'pos="0.64 0 0.05"'), ["place of top"], BALL
+    ),
+    "the coefficient of a fixed tendon": (
+ARM.replace("<actuator>", TENDON.format(1)), ARM.replace("<actuator>", TENDON.format(1.5)),
+        ["coefficients of band"],
+        {},
+    ),
+    "how a floating body turns": (
+        ARM,
+        ARM.replace('name="ball_shape"', 'name="ball_shape" pos="0.001 0 0"'),
+        ["place of ball_shape"],
+        {"scenario": HOME_LEAVE, "quantity": "ball, rotation"},
+    ),
+    "other actuators for who writes by number": (
+        ARM, _swapped(ARM), ["order of ctrl"], {"scenario": BY_NUMBER}
+    ),
+    "no command on either side": (
+        ARM, OTHER_CTRL, ["ctrl of the start"], {"scenario": HOME_LEAVE}
+    ),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("held", [True, False])
-def test_another_zero_of_several_joints_or_of_one_that_an_equality_holds(held, tmp_path):
-    more = '<joint name="twist" axis="1 0 0" damping="0.1"/><site name="low"'
-    keep = '<equality><joint joint1="shoulder" joint2="elbow"/>'
-    left = with_changes(LED, [("<equality>", keep)] if held else [('<site name="low"', more)])
-    right = with_changes(left, [('name="elbow" axis', 'name="elbow" ref="0.2" axis')])
-    found = explained(tmp_path, left, right, scenario=STAY)
-    assert set(shares(found)) == {"zero of lower", "start"}
-    assert is_brought(found)
-
-
-@pytest.mark.parametrize(("old", "new"), [('stiffness="40"', 'stiffness="50"'), BALL_SPRING])
-def test_what_the_hinges_do_not_show_is_no_agreement(old, new, tmp_path):
-    ball = '<body pos="1 0 1"><joint name="hip" type="ball" stiffness="0.1"/>'
-    ball += '<geom type="capsule" size="0.02" fromto="0 0 0 0.1 0 -0.2" mass="0.3"/></body>'
-    left = with_changes(ARM, [('<body name="weight"', f'{ball}<body name="weight"')])
-    left = left.replace('0 0.2 1 0 0 0  0"', '0 0.2 1 0 0 0  1 0 0 0  0"')
-    found = explained(tmp_path, left, with_changes(left, [(old, new)]), scenario=HOME)
-    assert not found.is_rounding
-    assert len(found.shares) == 1
-    assert found.brought == 0
-
-
-def test_what_sleeps_from_the_start(tmp_path):
-    left = with_changes(ARM, [('implicitfast"/>', 'implicitfast"><flag sleep="enable"/></option>')])
-    right = with_changes(left, [('<body name="ball"', '<body name="ball" sleep="init"')])
-    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
-    assert found.gap > 0.01
-    assert list(shares(found)) == ["sleep policy of ball"]
-    assert found.brought == 0
-
-
-def test_what_is_fixed_elsewhere_does_not_move_the_world(tmp_path):
-    """A floating body falls onto a table that was moved: the table moved, not the robot."""
-    top = '<geom name="top" type="box" size=".03 .03 .05"/>'
-    table = f'<body name="table" pos="0.6 0 0.05">{top}</body>'
-    left = ARM.replace('<body name="ball"', f'{table}<body name="ball"')
-    right = left.replace('pos="0.6 0 0.05"', 'pos="0.64 0 0.05"')
-    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
-    assert set(shares(found)) == {"place of top"}
-    assert found.brought == 0
-
-
-def with_changes(text: str, changes: list[tuple[str, str]]) -> str:
-    """A text with changes, each of a piece that is there once."""
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    return text
-
-
-def test_the_coefficient_of_a_fixed_tendon_is_brought_over(tmp_path):
-    tendon = (
-        '<tendon><fixed name="band" stiffness="5" springlength="0.1">'
-        '<joint joint="elbow" coef="{}"/></fixed></tendon><actuator>'
-    )
-    left, right = (ARM.replace("<actuator>", tendon.format(coef)) for coef in (1, 1.5))
-    found = explained(tmp_path, left, right, scenario=HOME)
-    assert shares(found) == {"coefficients of band": pytest.approx(1.0)}
-    assert found.brought == pytest.approx(0.0, abs=1e-12)
-
-
-def test_a_site_with_another_name_is_found_by_its_place(tmp_path):
-    drive = '<general name="push" site="tip" gear="0 0 0 0 1 0" gainprm="1"/></actuator>'
-    left = ARM.replace("</actuator>", drive).replace('ctrl="0 0"', 'ctrl="0 0 0.1"')
-    found = explained(tmp_path, left, left.replace('"tip"', '"end"'), scenario=HOME)
-    assert found.shares == ()
-    assert found.is_rounding
-
-
-def test_how_a_floating_body_turns_is_measured(tmp_path):
-    fall = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: None)
-    right = ARM.replace('name="ball_shape"', 'name="ball_shape" pos="0.001 0 0"')
-    found = explained(tmp_path, ARM, right, scenario=fall, quantity="ball, rotation")
-    assert found.unit == "rad"
-    assert shares(found) == {"place of ball_shape": pytest.approx(1.0)}
+@pytest.mark.parametrize("name", BROUGHT)
+def test_causes_are_brought_over(name, tmp_path):
+    left, right, causes, how = BROUGHT[name]
+    found = explained(tmp_path, left, right, **{"scenario": HOME, **how})
+    assert found.gap > 100 * found.negligible
+    told = shares(found)
+    assert sorted(told) == sorted(causes)
+    assert len(told) > 1 or told[causes[0]] == pytest.approx(1.0)
+    assert found.brought == 0.0
+    assert found.is_explained
+    assert found.unit == "rad" or "rotation" not in how.get("quantity", "")
 
 
 def test_a_finer_list_goes_down_to_single_entries(tmp_path):
     """What each entry of a place, an inertia, a range, gravity or a servo explains by itself."""
-    right = ARM
-    for old, new in (
+    changes = [
         ('<body name="lower" pos="0 0 -0.2">', '<body name="lower" pos="0.01 0 -0.21">'),
         ('diaginertia="0.001 0.001 0.0002"', 'diaginertia="0.001 0.0012 0.0004"'),
         ('range="-2 2"', 'range="-1.9 0.4"'),
@@ -682,9 +684,8 @@ def test_a_finer_list_goes_down_to_single_entries(tmp_path):
             '<position name="shoulder" joint="shoulder" kp="24" kv="1.5"/>',
         ),
         ('timestep="0.002"', 'timestep="0.002" gravity="0.5 0 -9"'),
-    ):
-        assert right.count(old) == 1
-        right = right.replace(old, new)
+    ]
+    right = with_changes(ARM, changes)
     found = explained(tmp_path, ARM, right, scenario=HOME, finer=True, budget=40, seconds=0.5)
     assert set(shares(found)) == {
         *("place (x) of lower", "place (z) of lower"),
@@ -719,20 +720,3 @@ def test_entries_of_every_case_bring_the_right_to_the_left(tmp_path):
         ]
         arrays = [n for n in dir(ways[0]) if isinstance(getattr(ways[0], n), np.ndarray)]
         assert [n for n in arrays if not same(*(getattr(way, n) for way in ways))] == [], name
-
-
-def test_no_command_leaves_ctrl_as_it_is_on_both_sides(tmp_path):
-    """As in a run of two sides: what the left was told last holds, and each begins with its own."""
-    once = replace(
-        HOME, controller=lambda _m, _s: lambda time, _d: [0.8, -0.5] if time < 0.1 else None
-    )
-    found = explained(tmp_path, ARM, ARM.replace('kp="20"', 'kp="20.0"'), scenario=once)
-    assert found.is_rounding
-    silent = replace(HOME, controller=lambda _m, _s: lambda _time, _data: None)
-    right = ARM.replace('0.6 0 0.2 1 0 0 0  0" ctrl="0 0"', '0.6 0 0.2 1 0 0 0  0" ctrl="0.3 0"')
-    assert right != ARM
-    assert shares(explained(tmp_path, ARM, right, scenario=silent)) == {
-        "ctrl of the start": pytest.approx(1.0)
-    }
-    nothing = ARM[: ARM.index("<keyframe>")] + "</mujoco>"  # it starts in the left's
-    assert explained(tmp_path, right, nothing, scenario=silent).is_rounding

@@ -141,36 +141,47 @@ def test_what_is_explained_is_what_differs(folder: Path, capsys: Any) -> None:
     assert found["quantity"] == "joints"
 
 
-def test_a_muscle_that_pulls_by_its_bias_has_a_length_range(folder: Path, capsys: Any) -> None:
-    for name, lower in (("l.xml", "-.5"), ("r.xml", "-.2")):
-        file(folder, name, actuator=MUSCLE.format(lower))
-    code, found = asked(capsys, "f.py:wave", "l.xml", "r.xml", "--why", "--no-chaos")
+SENSOR = '<sensor><jointpos name="p" joint="j1" {}/></sensor>'
+# What either side has, the function, the cause, its values, and the exit code of `--models`.
+ONE_CAUSE: dict[str, tuple[dict[str, str], dict[str, str], str, str, list[list[Any]], int]] = {
+    "a muscle that pulls by its bias": (
+        {"actuator": MUSCLE.format("-.5")},
+        {"actuator": MUSCLE.format("-.2")},
+        "wave",
+        "length range of m",
+        [["lengthrange", [-0.5, 0.5], [-0.2, 0.5]]],
+        1,
+    ),
+    "a start at another time": (
+        {}, {"key": 'time=".5"'}, "wave", "time of the start", [["time", 0.0, 0.5]], 1
+    ),
+    "a sensor that a function may read": (
+        {"sensor": SENSOR.format("")},
+        {"sensor": SENSOR.format('cutoff=".01"')},
+        "sensed",
+        "cutoff of p",
+        [["cutoff", 0.0, 0.01]],
+        0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ONE_CAUSE)
+def test_one_cause_explains_all(folder: Path, capsys: Any, name: str) -> None:
+    left, right, function, known, values, models = ONE_CAUSE[name]
+    sides = file(folder, "l.xml", **left), file(folder, "r.xml", **right)
+    code, found = asked(capsys, f"f.py:{function}", *sides, "--why", "--no-chaos")
     (cause,) = found["shares"]
-    assert (code, cause["name"]) == (0, "length range of m")
+    assert (code, cause["name"], cause["values"]) == (0, known, values)
     assert cause["share"] == pytest.approx(1.0)
-    assert main(["compare", "--models", "l.xml", "r.xml"]) == 1
+    assert main(["compare", "--models", *sides]) == models
+    assert "keyframe k time" in capsys.readouterr().out or known != "time of the start"
 
 
-def test_a_start_at_another_time_is_a_cause(folder: Path, capsys: Any) -> None:
-    file(folder, "l.xml")
-    file(folder, "r.xml", key='time=".5"')
-    code, found = asked(capsys, "f.py:wave", "l.xml", "r.xml", "--why", "--no-chaos")
-    (cause,) = found["shares"]
-    assert (code, cause["name"], cause["values"]) == (0, "time of the start", [["time", 0.0, 0.5]])
-    assert cause["share"] == pytest.approx(1.0)
-    assert main(["compare", "--models", "l.xml", "r.xml"]) == 1
-    assert "keyframe k time" in capsys.readouterr().out
-
-
-def test_a_sensor_counts_where_a_function_may_read_it(folder: Path, capsys: Any) -> None:
-    sensor = '<sensor><jointpos name="p" joint="j1" {}/></sensor>'
-    file(folder, "l.xml", sensor=sensor.format(""))
-    file(folder, "r.xml", sensor=sensor.format('cutoff=".01"'))
-    file(folder, "v.xml", sensor=sensor.format("").replace("jointpos", "jointvel"))
-    code, found = asked(capsys, "f.py:sensed", "l.xml", "r.xml", "--why", "--no-chaos")
-    (cause,) = found["shares"]
-    assert (code, cause["name"]) == (0, "cutoff of p")
-    assert cause["share"] == pytest.approx(1.0)
+def test_another_sensor_counts_where_a_function_may_read_it(folder: Path, capsys: Any) -> None:
+    sensor = SENSOR.format("")
+    file(folder, "l.xml", sensor=sensor)
+    file(folder, "v.xml", sensor=sensor.replace("jointpos", "jointvel"))
     code, found = asked(capsys, "f.py:sensed", "l.xml", "v.xml", "--why", "--no-chaos")
     assert code == 1
     assert found["unexplained"] == 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -14,7 +15,7 @@ from statemachine import worlds
 from statemachine.backends import compiled, mujoco_backend
 from statemachine.errors import BadInputError, DivergedError
 
-from .conftest import opened
+from .conftest import opened, refused
 from .small_models import loaded
 
 
@@ -95,6 +96,15 @@ def test_without_the_floor_the_arm_goes_on_to_its_stop() -> None:
         assert np.degrees(data.qpos[1]) == pytest.approx(100, abs=0.5)
 
 
+def _refuses_ctrl(model: sm.Model, data: sm.Data, slot: int) -> None:
+    refused(
+        *(
+            (BadInputError, rf"ctrl\[{slot}\]", partial(verb, model, data))
+            for verb in (sm.forward, sm.get_state, sm.step)
+        )
+    )
+
+
 @pytest.mark.parametrize("huge", [np.inf, -np.inf, 1e200])
 def test_without_a_range_an_infinite_ctrl_is_refused(
     backend: str, huge: float, tmp_path: Path
@@ -107,9 +117,7 @@ def test_without_a_range_an_infinite_ctrl_is_refused(
     )
     with sm.make_data(model) as data:
         data.ctrl[0] = huge
-        for verb in (sm.forward, sm.get_state, sm.step):
-            with pytest.raises(BadInputError, match=r"ctrl\[0\]"):
-                verb(model, data)
+        _refuses_ctrl(model, data, 0)
 
 
 @pytest.mark.usefixtures("bullet")
@@ -118,9 +126,7 @@ def test_pybullet_as_it_comes_refuses_an_infinite_ctrl() -> None:
     assert "infinite ctrl is refused" in model.capabilities.behaviours["position servo"].note
     with sm.make_data(model) as data:
         data.ctrl[1] = np.inf
-        for verb in (sm.forward, sm.get_state, sm.step):
-            with pytest.raises(BadInputError, match="ctrl"):
-                verb(model, data)
+        _refuses_ctrl(model, data, 1)
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.01])
