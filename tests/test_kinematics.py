@@ -78,11 +78,13 @@ def test_joints_can_come_in_another_order() -> None:
     assert np.array_equal(straight.pos, turned.pos)
 
 
-def test_definition_of_a_frame() -> None:
+def test_definition_of_a_frame(mujoco_arm: sm.Model) -> None:
     definition = sm.Kinematics("so101").definition("gripperframe")
-    model = sm.load("so101")
     assert definition.body == "gripper"
-    assert np.abs(definition.pos - model.site_pos[model.site_id("gripperframe")]).max() < 1e-15
+    assert (
+        np.abs(definition.pos - mujoco_arm.site_pos[mujoco_arm.site_id("gripperframe")]).max()
+        < 1e-15
+    )
 
 
 def test_a_urdf_is_read_too(tmp_path: Path) -> None:

@@ -199,8 +199,7 @@ def test_an_error_in_the_code_ends_the_lesson() -> None:
     assert play.printed == "1\n"
 
 
-def test_a_lesson_sees_the_lines_of_its_code_and_each_step(backend: str) -> None:
-    model = sm.load("so101", backend=backend)
+def test_a_lesson_sees_the_lines_of_its_code_and_each_step(arm: sm.Model) -> None:
     code = (
         "import statemachine as sm\nmodel = sm.load('so101')\ndata = sm.make_data(model)\n"
         "data.ctrl[1] = 0.1\nsm.step(model, data, 3)\nprint(data.time)\n"
@@ -208,7 +207,7 @@ def test_a_lesson_sees_the_lines_of_its_code_and_each_step(backend: str) -> None
 
     lines: list[str] = []
     times: list[float] = []
-    with CodeRun(code, model) as watched, CodeRun(code, model) as alone:
+    with CodeRun(code, arm) as watched, CodeRun(code, arm) as alone:
         watched(
             before=lambda _model, data: times.append(data.time),
             line=lambda source, _names: lines.append(source),
@@ -216,12 +215,12 @@ def test_a_lesson_sees_the_lines_of_its_code_and_each_step(backend: str) -> None
         alone()
         assert lines == code.splitlines()
         assert times == [0.0, 0.005, 0.01]
-        assert watched.names["model"] is model
+        assert watched.names["model"] is arm
         ends = [play.worlds[0][1].qpos.tobytes() for play in (watched, alone)]
         assert ends[0] == ends[1]  # three steps, or one call for three
         data = watched.worlds[0][1]
     with pytest.raises(StateMachineError, match="closed"):
-        sm.step(model, data)
+        sm.step(arm, data)
 
 
 @pytest.mark.parametrize("name", list(LESSONS))
@@ -250,13 +249,12 @@ def test_the_run_of_a_lesson_is_the_one_that_is_seen(
     ],
 )
 def test_a_lesson_runs_what_is_compared(
-    lesson: str, of: Callable[[Any], np.ndarray], name: str, backend: str
+    lesson: str, of: Callable[[Any], np.ndarray], name: str, scene: sm.Model
 ) -> None:
-    model = sm.load("so101/scene", backend=backend)
     seconds = 0.5 if lesson == "gravity" else 2.0
     options = {"longer": seconds} if lesson == "gravity" else {}
-    found = of(lesson_result(lesson, model, seconds=seconds, **options))
-    trace = record_scenario(SCENARIOS[name], model, seconds=seconds)
+    found = of(lesson_result(lesson, scene, seconds=seconds, **options))
+    trace = record_scenario(SCENARIOS[name], scene, seconds=seconds)
     assert found.tobytes() == trace.qpos[-1].tobytes()
 
 

@@ -120,13 +120,12 @@ def test_a_model_survives_a_pickle(backend: str) -> None:
     assert ends[0] == ends[1]
 
 
-def test_a_model_is_constant(backend: str) -> None:
-    model = sm.load("so101", backend=backend)
+def test_a_model_is_constant(arm: sm.Model) -> None:
     for name in ("jnt_range", "actuator_ctrlrange", "actuator_kp", "site_pos", "jnt_qposadr"):
         with pytest.raises(ValueError, match="read-only"):
-            getattr(model, name)[0] = 1
+            getattr(arm, name)[0] = 1
     with pytest.raises(errors.ReadOnlyError):
-        model.timestep = 1.0
+        arm.timestep = 1.0
 
 
 def test_gains_and_ranges_are_the_servos(tmp_path: Path) -> None:

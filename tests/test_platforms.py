@@ -137,22 +137,6 @@ def test_what_is_installed_needs_no_compiler(platform: str, python: str) -> None
         assert found[name] == version or not version
 
 
-@pytest.fixture
-def without_pybullet(tmp_path: Path) -> dict[str, str]:
-    """An environment in which PyBullet is not there, whatever this machine has."""
-    hidden = tmp_path / "hidden"
-    hidden.mkdir()
-    (hidden / "sitecustomize.py").write_text(
-        "import sys\n"
-        "class Hide:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'pybullet':\n"
-        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
-        "sys.meta_path.insert(0, Hide())\n"
-    )
-    return {"PYTHONPATH": os.pathsep.join((str(hidden), str(ROOT)))}
-
-
 def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str]) -> None:
     done = cli("lesson", "gravity", "--backend", "pybullet", **without_pybullet, code=3)
     (line,) = done.stderr.splitlines()

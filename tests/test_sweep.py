@@ -256,13 +256,12 @@ def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
 
 
 @pytest.mark.parametrize("backend", ["mujoco", "pybullet"])
-def test_a_cell_is_the_run_of_a_trace(backend: str) -> None:
+def test_a_cell_is_the_run_of_a_trace(scene: sm.Model, backend: str) -> None:
     need_engine(backend)
     sweep = Sweep("hold", ("timestep=0.004", "damping=0.5x"), (backend,), seconds=0.4)
     (row,) = in_process(sweep)
-    model = sm.load("so101/scene", backend=backend)
-    options = {"timestep": 0.004, "damping": 0.5 * model.dof_damping}
-    trace = record_scenario(scenario("hold"), model, seconds=0.4, options=options)
+    options = {"timestep": 0.004, "damping": 0.5 * scene.dof_damping}
+    trace = record_scenario(scenario("hold"), scene, seconds=0.4, options=options)
     assert row["status"] == "done", row
     assert (row["steps"], row["time"]) == (100, trace.time[-1])
     assert row["qpos"] == trace.qpos[-1].tolist()
@@ -270,7 +269,7 @@ def test_a_cell_is_the_run_of_a_trace(backend: str) -> None:
     assert row["max_qvel"] == np.abs(trace.qvel[1:]).max()
     rows = np.searchsorted(trace.time, np.array(row["sample_time"]) - 1e-9)
     assert row["sample_qpos"] == trace.qpos[rows].tolist()
-    site = model.site_id("gripperframe")
+    site = scene.site_id("gripperframe")
     assert np.allclose(row["sample_tip"], trace["site_xpos"][rows, site], atol=1e-9)
     assert np.isclose(row["energy"], trace["energy"][-1].sum(), atol=1e-9)
     assert row["first_touch"] == trace.time[trace["contact_row"][0]]

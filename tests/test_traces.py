@@ -166,15 +166,14 @@ def test_an_engine_that_does_not_tell_leaves_nan() -> None:
 # Controllers.
 
 
-def test_a_controller_sees_time_and_data_and_gives_ctrl() -> None:
-    model = sm.load("so101")
+def test_a_controller_sees_time_and_data_and_gives_ctrl(mujoco_arm: sm.Model) -> None:
     seen: list[float] = []
 
     def controller(time: float, data: sm.Data) -> list[float] | None:
         seen.append(time)
         return [0.1] * 6 if data.qpos[0] < 0.05 else None
 
-    trace = record(model, controller, 0.1)
+    trace = record(mujoco_arm, controller, 0.1)
     assert len(seen) == len(trace) == 21
     assert trace.ctrl[0].tolist() == [0.1] * 6
     assert trace.header.experiment == "controller"
@@ -190,28 +189,25 @@ def test_a_controller_sees_time_and_data_and_gives_ctrl() -> None:
         ([1j] * 6, "real numbers"),
     ],
 )
-def test_what_is_no_ctrl_is_said_with_the_time(gives: Any, says: str) -> None:
-    model = sm.load("so101")
+def test_what_is_no_ctrl_is_said_with_the_time(mujoco_arm: sm.Model, gives: Any, says: str) -> None:
     with pytest.raises(BadInputError, match=says) as caught:
-        record(model, lambda time, _data: gives if time > 0.02 else None, 0.1)
+        record(mujoco_arm, lambda time, _data: gives if time > 0.02 else None, 0.1)
     assert "0.025 s" in str(caught.value)
 
 
-def test_a_nan_in_an_array_of_the_right_shape_is_found(backend: str) -> None:
-    model = sm.load("so101", backend=backend)
+def test_a_nan_in_an_array_of_the_right_shape_is_found(arm: sm.Model) -> None:
     bad = np.full(6, np.nan)
     with pytest.raises(BadInputError, match="ctrl"):  # in the last row, after the last step
-        record(model, lambda time, _data: bad if time > 0.096 else None, 0.1)
+        record(arm, lambda time, _data: bad if time > 0.096 else None, 0.1)
 
 
-def test_a_controller_that_kicks_is_repeated_exactly(backend: str) -> None:
-    model = sm.load("so101/scene", backend=backend)
+def test_a_controller_that_kicks_is_repeated_exactly(scene: sm.Model) -> None:
 
     def kick(time: float, data: sm.Data) -> None:
         if abs(time - 0.1) < 1e-6:
             data.qvel[1] = 3.0
 
-    trace = record(model, kick, 0.3)
+    trace = record(scene, kick, 0.3)
     assert trace.header.rewritten == 1
     row = int(np.argmax(np.abs(trace.qvel[:, 1])))
     assert trace.qvel[row, 1] == 3.0
@@ -235,34 +231,32 @@ def test_an_engine_that_does_not_repeat_is_found(monkeypatch: pytest.MonkeyPatch
     )
 
 
-def test_a_run_that_diverges_keeps_its_rows(tmp_path: Path) -> None:
-    model = sm.load("so101")
+def test_a_run_that_diverges_keeps_its_rows(mujoco_arm: sm.Model, tmp_path: Path) -> None:
 
     def wild(time: float, data: sm.Data) -> None:
         if time > 0.05:
             data.qvel[:] = 9e9
 
-    trace = record(model, wild, 0.5)
+    trace = record(mujoco_arm, wild, 0.5)
     assert trace.header.ended
     assert 10 < len(trace) < 101
     assert same(trace, read(write(trace, tmp_path / "wild.npz")))
 
 
-def test_it_starts_where_it_is_told() -> None:
-    model = sm.load("so101/scene_box")
-    assert record(model, None, 0.01, keyframe="held").header.keyframe == "held"
-    with opened(model, "held", nstep=20) as (_, data):
-        state = sm.get_state(model, data)
-        sm.step(model, data)
+def test_it_starts_where_it_is_told(mujoco_box: sm.Model) -> None:
+    assert record(mujoco_box, None, 0.01, keyframe="held").header.keyframe == "held"
+    with opened(mujoco_box, "held", nstep=20) as (_, data):
+        state = sm.get_state(mujoco_box, data)
+        sm.step(mujoco_box, data)
         after = data.qpos.copy()
-    assert record(model, None, 0.01, state=state).qpos[1].tobytes() == after.tobytes()
+    assert record(mujoco_box, None, 0.01, state=state).qpos[1].tobytes() == after.tobytes()
     refused(
         (
             BadInputError,
             "not from both",
-            lambda: record(model, None, 0.01, state=state, keyframe="held"),
+            lambda: record(mujoco_box, None, 0.01, state=state, keyframe="held"),
         ),
-        (UnknownNameError, "", lambda: record(model, None, 0.01, keyframe="hold")),
+        (UnknownNameError, "", lambda: record(mujoco_box, None, 0.01, keyframe="hold")),
     )
 
 

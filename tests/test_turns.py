@@ -133,19 +133,20 @@ def test_a_third_partys_backend_gets_it_too() -> None:
                 assert [type(error) for error in raised] == [BusyDataError]
 
 
-def test_a_hook_may_use_what_its_own_data_offers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hook_may_use_what_its_own_data_offers(
+    mujoco_arm: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A backend's hook, a callback, a signal handler: the same thread is no second one."""
-    model = sm.load("so101")
     seen: list[float] = []
-    with sm.make_data(model) as data:
+    with sm.make_data(mujoco_arm) as data:
         advance = data._advance
 
         def looking(*args: object) -> None:
             advance(*args)
-            seen.append(float(data.site_xpos[0, 0]) + sm.get_state(model, data).time)
+            seen.append(float(data.site_xpos[0, 0]) + sm.get_state(mujoco_arm, data).time)
 
         object.__setattr__(data, "_advance", looking)
-        sm.step(model, data)
+        sm.step(mujoco_arm, data)
     assert len(seen) == 1
 
 
@@ -298,10 +299,9 @@ raise SystemExit(status)
     runs_in_silence(code, ROOT)
 
 
-def test_a_data_closed_by_a_signal_handler_in_a_step_says_so() -> None:
+def test_a_data_closed_by_a_signal_handler_in_a_step_says_so(mujoco_arm: sm.Model) -> None:
     """What a callback does to its own Data holds when the step around it has ended."""
-    model = sm.load("so101")
-    data = sm.make_data(model)
+    data = sm.make_data(mujoco_arm)
     advance = data._advance
 
     def closing(*args: object) -> None:
@@ -309,6 +309,6 @@ def test_a_data_closed_by_a_signal_handler_in_a_step_says_so() -> None:
         data.close()
 
     object.__setattr__(data, "_advance", closing)
-    sm.step(model, data)
+    sm.step(mujoco_arm, data)
     with pytest.raises(ClosedDataError):
-        sm.step(model, data)
+        sm.step(mujoco_arm, data)

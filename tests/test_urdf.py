@@ -182,13 +182,12 @@ def test_masses_and_inertias_survive(tmp_path: Path, pinocchio: None) -> None:
         assert np.abs(found - data.qfrc_bias).max() < 1e-11
 
 
-def test_numbers_are_written_to_the_last_digit() -> None:
+def test_numbers_are_written_to_the_last_digit(mujoco_arm: sm.Model) -> None:
     root = ET.parse(models_dir() / "so101" / "so101.urdf").getroot()
-    model = sm.load("so101")
     masses = [mass.get("value", "") for mass in root.iterfind("link/inertial/mass")]
-    assert set(map(float, masses)) == set(model.body_mass)
+    assert set(map(float, masses)) == set(mujoco_arm.body_mass)
     names = {link.attrib["name"] for link in root.findall("link")}
-    assert names >= {"gripperframe", "baseframe", *model.body_names[1:]}
+    assert names >= {"gripperframe", "baseframe", *mujoco_arm.body_names[1:]}
     for mesh in root.iter("mesh"):
         assert (models_dir() / "so101" / mesh.attrib["filename"]).is_file()
     (limit,) = root.iterfind("joint[@name='elbow_flex']/limit")
