@@ -310,6 +310,18 @@ def viser() -> None:
 
 
 @pytest.fixture
+def matplotlib() -> Any:
+    """Matplotlib, only where it is."""
+    return pytest.importorskip("matplotlib")
+
+
+@pytest.fixture
+def pillow() -> Any:
+    """Pillow's module of images, only where it is."""
+    return pytest.importorskip("PIL.Image")
+
+
+@pytest.fixture
 def bullet() -> None:
     """Only where PyBullet is."""
     need_engine("pybullet")

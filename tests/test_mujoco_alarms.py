@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -154,11 +155,8 @@ def test_three_threads_that_diverge_at_once_each_hear_of_their_own(mujoco_box: s
                     if (facts.quantity, facts.index) != (name, k % 6):
                         wrong.append(f"{error} for {name}[{k % 6}]")
 
-    threads = [threading.Thread(target=diverge, args=(n,)) for n in ("qpos", "ctrl", "qvel")]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(3) as pool:
+        assert list(pool.map(diverge, ("qpos", "ctrl", "qvel"))) == [None] * 3
     assert not wrong, (len(wrong), wrong[:3])
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
 from statemachine.interface import Array
 
-from .conftest import path, refused
+from .conftest import opened, path, refused
 from .small_models import CART, model_of
 
 SERVO = '<position name="servo" joint="rail" kp="100" kv="20"/>'
@@ -141,9 +142,8 @@ def test_a_delay_of_the_file_is_kept(tmp_path: Path, backend: str, kept: int, la
     """7 ms are 4 steps of 2 ms; where the file keeps two commands, the older of them acts."""
     model = model_of(tmp_path, DELAYED.format(kept=kept, interp="zoh"), backend=backend)
     np.testing.assert_allclose(model.actuator_delay, [late * 0.002, 0])
-    with sm.make_data(model) as data:
-        data.ctrl[:] = 1
-        moved = []
+    moved = []
+    with opened(model, ctrl=1) as (_, data):
         for _ in range(6):
             sm.step(model, data)
             moved.append(data.qvel.copy() > 0)
@@ -258,12 +258,10 @@ def test_states_with_other_latencies_are_foreign(arm: sm.Model) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_pybullet_as_it_comes_has_none_of_them() -> None:
     model = sm.load("so101", backend="pybullet", defaults="engine")
-    for name in ("mass", "friction", "kp", "kv", "latency", "damping", "limits"):
-        with pytest.raises(UnsupportedError, match="load the model without that to set it"):
-            model.replace(**{name: 1.0})
-    for name, said in (("frictionloss", "ignores"), ("integrator", "no such setting")):
-        with pytest.raises(UnsupportedError, match=said):
-            model.replace(**{name: 1.0})
+    names = "mass", "friction", "kp", "kv", "latency", "damping", "limits"
+    says = dict.fromkeys(names, "load the model without that to set it")
+    says |= {"frictionloss": "ignores", "integrator": "no such setting"}
+    refused(*((UnsupportedError, say, partial(model.replace, **{n: 1})) for n, say in says.items()))
     assert "not damping, mass, friction, kp, kv, latency, limits: with" in str(model.capabilities)
 
 

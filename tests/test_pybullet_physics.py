@@ -315,8 +315,7 @@ def test_a_contact_that_no_joint_can_yield_to_does_not_explode(tmp_path: Path, s
     models = both(tmp_path, OVERLAP.format(floor=FLOOR, shape=shape), rest=HULLS)
     ends = []
     for model in models:
-        with sm.make_data(model) as data:
-            data.qpos[1] = -1.0
+        with opened(model, qpos=(0, -1)) as (_, data):
             for _ in range(500):
                 sm.step(model, data)
                 assert np.abs(data.qvel).max() < 20

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shlex
+from typing import Any
 
 import numpy as np
 import pytest
@@ -114,13 +115,12 @@ def test_a_terminal_says_how_to_look_at_it_to_who_sits_there(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PICTURES)
-def test_it_is_small_and_the_same_each_time(name: str) -> None:
+def test_it_is_small_and_the_same_each_time(name: str, pillow: Any) -> None:
     rendering_environment()
-    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
     content = robot_pictures.webp(PICTURES[name])
     assert len(content) < 150_000
     assert content == robot_pictures.webp(PICTURES[name])
-    with image.open(io.BytesIO(content)) as opened:
+    with pillow.open(io.BytesIO(content)) as opened:
         assert opened.size == (480, 360)
         assert opened.n_frames == len(PICTURES[name].poses()[0])
         assert np.asarray(opened.convert("RGB")).std() > 20

@@ -73,10 +73,7 @@ def _meanwhile(data: sm.Data, use: Callable[[], object]) -> list[BaseException |
 
 @pytest.mark.parametrize("name", USES)
 def test_a_second_thread_is_refused_while_one_steps(model: sm.Model, name: str) -> None:
-    with sm.make_data(model) as data, sm.make_data(model) as alone:
-        for each in (data, alone):
-            sm.reset(model, each, keyframe=0)
-            sm.step(model, each, 20)
+    with opened(model, 0, nstep=20) as (_, data), opened(model, 0, nstep=20) as (_, alone):
         raised = _meanwhile(data, lambda: USES[name](model, data))
         for each in (data, alone):
             sm.step(model, each, 3)
@@ -177,9 +174,10 @@ def test_two_data_in_two_threads_equal_serial(model: sm.Model) -> None:
 
 @pytest.mark.parametrize("verb", ["step", "reset", "set_state", "forward", "get_state"])
 def test_an_interrupted_verb_completes_or_undoes_or_refuses(verb: str) -> None:
-    with opened(sm.load("so101/scene_box")) as (model, data), sm.make_data(model) as twin:
-        sm.reset(model, data, 0)
-        sm.step(model, data, 20)
+    with (
+        opened(sm.load("so101/scene_box"), 0, nstep=20) as (model, data),
+        sm.make_data(model) as twin,
+    ):
         base = sm.get_state(model, data)
         sm.step(model, data, 20)
         calls: dict[str, Use] = {
@@ -224,13 +222,12 @@ def test_inputs_that_were_made_read_only_are_found_before_anything_moves(backend
         state = sm.get_state(model, data)
         for name in ("qpos", "qvel", "ctrl"):
             getattr(data, name).setflags(write=False)
-            for call in (
-                lambda: sm.reset(model, data),
-                lambda: sm.set_state(model, data, state),
-                lambda: setattr(data, "ctrl", np.zeros(model.nu)),
-            ):
-                with pytest.raises(ReadOnlyError, match=rf"{name}.*setflags"):
-                    call()
+            says = rf"{name}.*setflags"
+            refused(
+                (ReadOnlyError, says, lambda: sm.reset(model, data)),
+                (ReadOnlyError, says, lambda: sm.set_state(model, data, state)),
+                (ReadOnlyError, says, lambda: setattr(data, "ctrl", np.zeros(model.nu))),
+            )
             getattr(data, name).setflags(write=True)
             assert sm.get_state(model, data) == state
         sm.step(model, data)

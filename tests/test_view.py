@@ -64,10 +64,9 @@ def session(backend: str) -> Iterator[LiveSession]:
 def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -> None:
     """Bit by bit, with the box in the jaws, seen after every step and never."""
     with (
-        opened(sm.load(SCENE, backend=backend)) as (model, plain),
+        opened(sm.load(SCENE, backend=backend), "held") as (model, plain),
         LiveSession([model], "held") as session,
     ):
-        sm.reset(model, plain, "held")
         frame = session.frame()
         for k in range(150):
             if k == 50:
@@ -112,12 +111,12 @@ def test_commands_do_what_they_say(session: LiveSession) -> None:
     session.apply(Pause())
     assert not session.running
     session.apply(ResetTo(1))
-    assert session.frame().time == 59.522
-    assert session.frame().steps == 0
+    frame = session.frame()
+    assert (frame.time, frame.steps) == (59.522, 0)
     session.apply(ResetTo())
-    assert session.frame().time == 0
-    assert session.frame().resets == start.resets + 2
-    np.testing.assert_array_equal(session.frame().ctrl, 0)
+    frame = session.frame()
+    assert (frame.time, frame.resets) == (0, start.resets + 2)
+    np.testing.assert_array_equal(frame.ctrl, 0)
 
 
 @pytest.mark.parametrize(
@@ -319,6 +318,14 @@ class Slow(LiveSession):
         self.clock.now += self.cost * count
 
 
+def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Snapshot, Tempo, str]:
+    """What is shown after some turns, of which the first obeys these commands."""
+    hand.asked += asked
+    for _ in range(turns):
+        loop.turn()
+    return hand.shown[-1]
+
+
 @contextmanager
 def live(cost: float = 0.0, speed: float = 1.0) -> Iterator[tuple[Slow, Live, Hand, Clock]]:
     clock, hand = Clock(), Hand()
@@ -363,39 +370,26 @@ def test_time_that_stood_is_not_owed() -> None:
         loop.run(seconds=5.0)
         assert hand.shown[-1][0].time == 0
         assert hand.shown[-1][1].reached is None
-        hand.asked.append(Play())
-        loop.turn()
-        loop.turn()
-        assert hand.shown[-1][0].time <= 0.051
-        hand.asked.append(Step(1))
-        loop.turn()
-        standing = hand.shown[-1][0].time
+        assert turned(loop, hand, Play(), turns=2)[0].time <= 0.051
+        standing = turned(loop, hand, Step(1))[0].time
         loop.run(seconds=2.0)
         assert hand.shown[-1][0].time == standing
-        hand.asked.append(Play())
-        loop.turn()
-        loop.turn()
-        assert hand.shown[-1][0].time <= standing + 0.051
+        assert turned(loop, hand, Play(), turns=2)[0].time <= standing + 0.051
 
 
 def test_a_bad_command_is_a_note_until_the_next_one() -> None:
     with live() as (_, loop, hand, _clock):
-        hand.asked += [SetSpeed(2.0), SetSpeed(-1.0)]
-        loop.turn()
-        _, pace, note = hand.shown[-1]
+        _, pace, note = turned(loop, hand, SetSpeed(2.0), SetSpeed(-1.0))
         assert "speed" in note
         assert pace.asked == 2.0
-        hand.asked.append(SetCtrl(0, 0.1))
-        loop.turn()
-        assert hand.shown[-1][2] == ""
-        assert hand.shown[-1][0].ctrl[0] == 0.1
+        frame, _, note = turned(loop, hand, SetCtrl(0, 0.1))
+        assert (frame.ctrl[0], note) == (0.1, "")
 
 
 def test_commands_are_obeyed_in_their_order() -> None:
     with live() as (_, loop, hand, _clock):
-        hand.asked += [SetCtrl(0, 0.5), ResetTo(), SetCtrl(0, 0.2), SetCtrl(0, 0.3)]
-        loop.turn()
-        assert hand.shown[-1][0].ctrl[0] == 0.3
+        commands = SetCtrl(0, 0.5), ResetTo(), SetCtrl(0, 0.2), SetCtrl(0, 0.3)
+        assert turned(loop, hand, *commands)[0].ctrl[0] == 0.3
 
 
 # The words

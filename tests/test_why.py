@@ -459,8 +459,7 @@ def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     """In a pose in which the arm is in its own way, by MuJoCo."""
 
     def own_ways(model: Model, qpos: np.ndarray, run: Any) -> int:
-        with sm.make_data(model) as data:
-            data.qpos = qpos
+        with opened(model, qpos=qpos) as (_, data):
             run(model, data)
             return int((model.geom_bodyid[data.contacts.geom] > 0).all(axis=1).sum())
 
