@@ -82,10 +82,8 @@ def test_joints_can_come_in_another_order() -> None:
 def test_definition_of_a_frame(mujoco_arm: sm.Model) -> None:
     definition = sm.Kinematics("so101").definition("gripperframe")
     assert definition.body == "gripper"
-    assert (
-        np.abs(definition.pos - mujoco_arm.site_pos[mujoco_arm.site_id("gripperframe")]).max()
-        < 1e-15
-    )
+    place = mujoco_arm.site_pos[mujoco_arm.site_id("gripperframe")]
+    assert np.abs(definition.pos - place).max() < 1e-15
 
 
 def test_a_urdf_is_read_too(tmp_path: Path) -> None:
