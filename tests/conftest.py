@@ -116,6 +116,16 @@ def after(model: Model, nstep: int, keyframe: int | str | None = None) -> np.nda
         return data.qpos.copy()
 
 
+def path(model: Model, nstep: int, keyframe: int | str | None = None, **inputs: Any) -> np.ndarray:
+    """qpos (nstep + 1, nq) before and after every step, with such inputs at first."""
+    with opened(model, keyframe, **inputs) as (_, data):
+        rows = [data.qpos.copy()]
+        for _ in range(nstep):
+            step(model, data)
+            rows.append(data.qpos.copy())
+    return np.array(rows)
+
+
 def runs_in_silence(code: str, folder: Path, printed: str = "") -> None:
     """Code ends well in a Python of its own, and prints nothing but this."""
     done = in_its_own_python(code, folder)
@@ -195,17 +205,17 @@ def written_all(folder: Path, texts: dict[str, str]) -> Path:
 
 @contextmanager
 def opened(
-    model: Model, keyframe: int | str | None = None, *, ctrl: Any = None, nstep: int = 0
+    model: Model, keyframe: int | str | None = None, *, nstep: int = 0, **inputs: Any
 ) -> Iterator[tuple[Model, Data]]:
     """A Model and a Data of it, in a keyframe or in the default state, or some steps later.
 
-    `ctrl` is the command of those steps, and stays.
+    The inputs, `qpos`, `qvel` or `ctrl`, are written before those steps.
     """
     with make_data(model) as data:
         if keyframe is not None:
             reset(model, data, keyframe)
-        if ctrl is not None:
-            data.ctrl[:] = ctrl
+        for name, value in inputs.items():
+            getattr(data, name)[:] = value
         if nstep:
             step(model, data, nstep)
         yield model, data
@@ -265,9 +275,39 @@ def backend(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
+def arm(backend: str) -> Model:
+    """The bare arm, on every backend."""
+    return load("so101", backend=backend)
+
+
+@pytest.fixture
+def scene(backend: str) -> Model:
+    """The arm above a floor, on every backend."""
+    return load("so101/scene", backend=backend)
+
+
+@pytest.fixture
 def box(backend: str) -> Model:
     """The arm with a box, on every backend."""
     return load("so101/scene_box", backend=backend)
+
+
+@pytest.fixture
+def mujoco_arm() -> Model:
+    """The bare arm, on MuJoCo."""
+    return load("so101")
+
+
+@pytest.fixture
+def mujoco_scene() -> Model:
+    """The arm above a floor, on MuJoCo."""
+    return load("so101/scene")
+
+
+@pytest.fixture
+def mujoco_box() -> Model:
+    """The arm with a box, on MuJoCo."""
+    return load("so101/scene_box")
 
 
 @pytest.fixture
@@ -275,6 +315,18 @@ def viser() -> None:
     """Only where viser is; where a browser is required it must be."""
     if "browser" not in REQUIRED:
         pytest.importorskip("viser")
+
+
+@pytest.fixture
+def matplotlib() -> Any:
+    """Matplotlib, only where it is."""
+    return pytest.importorskip("matplotlib")
+
+
+@pytest.fixture
+def pillow() -> Any:
+    """Pillow's module of images, only where it is."""
+    return pytest.importorskip("PIL.Image")
 
 
 @pytest.fixture
@@ -355,3 +407,19 @@ def cli(tmp_path: Path) -> Cli:
         return done
 
     return run
+
+
+@pytest.fixture
+def without_pybullet(tmp_path: Path) -> dict[str, str]:
+    """An environment in which PyBullet is not there, whatever this machine has."""
+    hidden = tmp_path / "hidden"
+    hidden.mkdir()
+    (hidden / "sitecustomize.py").write_text(
+        "import sys\n"
+        "class Hide:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'pybullet':\n"
+        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
+        "sys.meta_path.insert(0, Hide())\n"
+    )
+    return {"PYTHONPATH": os.pathsep.join((str(hidden), str(ROOT)))}

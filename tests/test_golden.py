@@ -12,7 +12,7 @@ import pytest
 import statemachine as sm
 from statemachine.runs.commands import TARGET
 
-from .conftest import opened
+from .conftest import path
 
 Golden = Callable[[str], np.ndarray]
 
@@ -25,27 +25,16 @@ def _angles(table: np.ndarray) -> np.ndarray:
     return _columns(table, *(f"q{i}_rad" for i in range(6)))
 
 
-def _run(ctrl: tuple[float, ...], steps: int, *, actuation: bool = True) -> np.ndarray:
-    with opened(sm.load("so101/scene").replace(actuation=actuation)) as (model, data):
-        data.ctrl = ctrl
-        rows = [data.qpos.copy()]
-        for _ in range(steps):
-            sm.step(model, data)
-            rows.append(data.qpos.copy())
-    return np.array(rows)
-
-
-def test_fingertip_at_200_poses(golden: Golden) -> None:
+def test_fingertip_at_200_poses(mujoco_arm: sm.Model, golden: Golden) -> None:
     table = golden("golden_fk")
     assert len(table) == 200
-    model = sm.load("so101")
-    tip = model.site_id("gripperframe")
+    tip = mujoco_arm.site_id("gripperframe")
     positions = _columns(table, "x_m", "y_m", "z_m")
     matrices = _columns(table, *(f"R{i}{j}" for i in range(3) for j in range(3)))
-    with sm.make_data(model) as data:
+    with sm.make_data(mujoco_arm) as data:
         for qpos, position, matrix in zip(_angles(table), positions, matrices, strict=True):
             data.qpos = qpos
-            sm.forward(model, data)
+            sm.forward(mujoco_arm, data)
             assert np.abs(data.site_xpos[tip] - position).max() < 1e-12
             assert np.abs(data.site_xmat[tip] - matrix).max() < 1e-12
 
@@ -56,22 +45,22 @@ def test_fingertip_by_the_witness(golden: Golden, pinocchio: None) -> None:
     assert np.abs(poses.pos - _columns(table, "x_m", "y_m", "z_m")).max() < 1e-12
 
 
-def test_servos_on(golden: Golden) -> None:
-    assert np.abs(_run((0.0,) * 6, 800) - _angles(golden("golden_gravity_on"))).max() < 1e-6
+def test_servos_on(mujoco_scene: sm.Model, golden: Golden) -> None:
+    assert np.abs(path(mujoco_scene, 800) - _angles(golden("golden_gravity_on"))).max() < 1e-6
 
 
-def test_servos_off(golden: Golden) -> None:
+def test_servos_off(mujoco_scene: sm.Model, golden: Golden) -> None:
     expected = _angles(golden("golden_gravity_off"))
-    run = _run((0.0,) * 6, 800, actuation=False)
+    run = path(mujoco_scene.replace(actuation=False), 800)
     assert np.abs(np.degrees(run - expected)).max() < 0.0018
     lift = [f"{np.degrees(run[k, 1]):.2f}" for k in (200, 400, 600, 800)]
     assert lift == ["23.88", "23.89", "23.90", "23.92"]
 
 
-def test_hold_until_and_after_its_first_contact(golden: Golden) -> None:
+def test_hold_until_and_after_its_first_contact(mujoco_scene: sm.Model, golden: Golden) -> None:
     table = golden("golden_hold")
     expected = _angles(table)
-    run = _run(TARGET, 400)
+    run = path(mujoco_scene, 400, ctrl=TARGET)
     first = int(np.flatnonzero(table["ncon"])[0])
     assert first == 56
     assert np.abs(run[:first] - expected[:first]).max() < 1e-15
@@ -95,16 +84,15 @@ def test_figures_are_the_public_models(menagerie: Path) -> None:
         assert getattr(ours.opt, name) == getattr(public.opt, name), name
 
 
-def test_keyframe_pickup_is_the_public_one(menagerie: Path) -> None:
-    ours = sm.load("so101/scene_box")
+def test_keyframe_pickup_is_the_public_one(mujoco_box: sm.Model, menagerie: Path) -> None:
     public = sm.load("so101/scene_box", menagerie=menagerie)
-    frame, reference = ours.keyframes[1], public.keyframes[0]
+    frame, reference = mujoco_box.keyframes[1], public.keyframes[0]
     assert frame.name == reference.name == "pickup"
     assert frame.time == reference.time
     for part in ("qpos", "qvel", "ctrl"):
         assert np.abs(getattr(frame, part) - getattr(reference, part)).max() < 1e-7, part
     for part in ("body_mass", "body_inertia"):
-        gap = getattr(ours.raw, part)[-1] - getattr(public.raw, part)[-1]
+        gap = getattr(mujoco_box.raw, part)[-1] - getattr(public.raw, part)[-1]
         assert np.abs(gap).max() < 1e-6, part
 
 

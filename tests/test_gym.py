@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from contextlib import closing
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -371,9 +372,10 @@ def test_what_is_closed_says_so_and_starts_nothing() -> None:
         each.reset(seed=0)
         each.close()
         each.close()  # twice is as good as once
-        for use in (each.render, lambda each=each, actions=actions: each.step(actions)):
-            with pytest.raises(ClosedDataError, match="closed: make"):
-                use()
+        refused(
+            (ClosedDataError, "closed: make", each.render),
+            (ClosedDataError, "closed: make", partial(each.step, actions)),
+        )
 
 
 def test_seeds_may_be_an_array_of_numbers() -> None:

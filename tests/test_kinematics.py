@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,7 +18,7 @@ from statemachine.errors import BadInputError, ModelError, ModelFileError, Unkno
 from statemachine.rotations import matrix_from_quat
 from statemachine.runs.provenance import model_digest
 
-from .conftest import one_line_error, refused, written
+from .conftest import one_line_error, opened, refused, written
 from .small_models import ATTACHED, BODY, EVERY_JOINT, STAND
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
@@ -30,8 +32,7 @@ def _against_mujoco(model: sm.Model, qpos: np.ndarray, site: str) -> float:
     """The worst difference of pose and of Jacobian."""
     kinematics = sm.Kinematics(model.path)
     where = model.site_id(site)
-    with sm.make_data(model) as data:
-        data.qpos = qpos
+    with opened(model, qpos=qpos) as (_, data):
         sm.forward(model, data)
         pose = kinematics.pose(qpos, site)
         jacobian = np.zeros((6, model.nv))
@@ -78,11 +79,11 @@ def test_joints_can_come_in_another_order() -> None:
     assert np.array_equal(straight.pos, turned.pos)
 
 
-def test_definition_of_a_frame() -> None:
+def test_definition_of_a_frame(mujoco_arm: sm.Model) -> None:
     definition = sm.Kinematics("so101").definition("gripperframe")
-    model = sm.load("so101")
     assert definition.body == "gripper"
-    assert np.abs(definition.pos - model.site_pos[model.site_id("gripperframe")]).max() < 1e-15
+    place = mujoco_arm.site_pos[mujoco_arm.site_id("gripperframe")]
+    assert np.abs(definition.pos - place).max() < 1e-15
 
 
 def test_a_urdf_is_read_too(tmp_path: Path) -> None:
@@ -124,23 +125,19 @@ def test_what_it_does_not_read_is_said_in_one_line(tmp_path: Path, text: str, wo
 
 def test_bad_input_is_refused() -> None:
     kinematics = sm.Kinematics("so101")
-    for qpos in (np.zeros(5), np.zeros((2, 6)), [np.nan] * 6, "pose", [1j] * 6):
-        with pytest.raises(BadInputError):
-            kinematics.pose(qpos, "gripperframe")  # pyright: ignore[reportArgumentType]
-    for qpos in (np.zeros(6), np.zeros((2, 5)), [[np.inf] * 6], [["a"] * 6], [[1], [1, 2]]):
-        with pytest.raises(BadInputError):
-            kinematics.poses(qpos, "gripperframe")  # pyright: ignore[reportArgumentType]
+    one: list[Any] = [np.zeros(5), np.zeros((2, 6)), [np.nan] * 6, "pose", [1j] * 6]
+    many: list[Any] = [np.zeros(6), np.zeros((2, 5)), [[np.inf] * 6], [["a"] * 6], [[1], [1, 2]]]
+    no_kind: Any = "joint"
     refused(
+        *((BadInputError, "", partial(kinematics.pose, qpos, "gripperframe")) for qpos in one),
+        *((BadInputError, "", partial(kinematics.poses, qpos, "gripperframe")) for qpos in many),
         (
             UnknownNameError,
             "Did you mean 'gripperframe'",
             lambda: kinematics.pose(np.zeros(6), "griperframe"),
         ),
         (UnknownNameError, "", lambda: kinematics.pose(np.zeros(6), "shoulder_pan", "body")),
-    )
-    with pytest.raises(UnknownNameError):
-        kinematics.pose(np.zeros(6), "gripper", "joint")  # pyright: ignore[reportArgumentType]
-    refused(
+        (UnknownNameError, "", lambda: kinematics.pose(np.zeros(6), "gripper", no_kind)),
         (ModelFileError, "", lambda: sm.Kinematics("nowhere.xml")),
         (ModelError, "other joints", lambda: sm.Kinematics("so101", joint_names=["a", "b"])),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -40,24 +41,27 @@ def _step_raw_to_nan() -> list[str]:
 @pytest.mark.parametrize("handler", ["a function", "none"])
 @pytest.mark.parametrize("nstep", [1, 5])
 def test_a_divergence_is_noticed_whoever_set_the_handler(
-    handler: str, nstep: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    mujoco_scene: sm.Model,
+    handler: str,
+    nstep: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)  # where MuJoCo writes its log if nobody listens
-    model = sm.load("so101/scene")
     heard: list[str] = []
-    with opened(model, nstep=10) as (_, data):
+    with opened(mujoco_scene, nstep=10) as (_, data):
         mujoco.set_mju_user_warning(heard.append if handler == "a function" else None)
         data.ctrl[2], before = np.nan, data.time
         with pytest.raises(BadInputError, match="elbow_flex") as caught:
-            sm.step(model, data, nstep)
+            sm.step(mujoco_scene, data, nstep)
         facts: Any = caught.value
         assert (facts.quantity, facts.index) == ("ctrl", 2)
         assert facts.time == pytest.approx(before)
         assert len(heard) == (handler == "a function")
-        sm.reset(model, data)
+        sm.reset(mujoco_scene, data)
         data.qvel[1] = np.nan
         with pytest.raises(DivergedError, match=r"qvel\[1\]"):
-            sm.step(model, data, nstep)
+            sm.step(mujoco_scene, data, nstep)
         if heard:
             assert len(heard) > 1  # it is in the chain now
 
@@ -119,45 +123,40 @@ def test_a_warning_of_a_raw_simulation_does_not_come_out_of_our_step() -> None:
         sm.forward(model, data)
 
 
-def test_what_is_kept_of_warnings_is_bounded() -> None:
-    model = sm.load("so101/scene")
+def test_what_is_kept_of_warnings_is_bounded(mujoco_scene: sm.Model) -> None:
     done = threading.Event()
     idle = threading.Thread(target=done.wait, args=(30,))
     idle.start()
     try:
-        with sm.make_data(model) as data:
+        with sm.make_data(mujoco_scene) as data:
             for _ in range(600):
                 _step_raw_to_nan()
-            sm.step(model, data)
+            sm.step(mujoco_scene, data)
             assert len(_mujoco_alarms._TEXTS) <= 256
     finally:
         done.set()
         idle.join()
 
 
-def test_three_threads_that_diverge_at_once_each_hear_of_their_own() -> None:
-    model = sm.load("so101/scene_box")
+def test_three_threads_that_diverge_at_once_each_hear_of_their_own(mujoco_box: sm.Model) -> None:
     wrong: list[str] = []
     start = threading.Barrier(3)
 
     def diverge(name: str) -> None:
         start.wait()
         for k in range(150):
-            with opened(model, 0, nstep=1) as (_, data):
+            with opened(mujoco_box, 0, nstep=1) as (_, data):
                 getattr(data, name)[k % 6] = np.nan
                 try:
-                    sm.step(model, data, 2)
+                    sm.step(mujoco_box, data, 2)
                     wrong.append(f"{name} passed")
                 except (BadInputError, DivergedError) as error:
                     facts: Any = error
                     if (facts.quantity, facts.index) != (name, k % 6):
                         wrong.append(f"{error} for {name}[{k % 6}]")
 
-    threads = [threading.Thread(target=diverge, args=(n,)) for n in ("qpos", "ctrl", "qvel")]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(3) as pool:
+        assert list(pool.map(diverge, ("qpos", "ctrl", "qvel"))) == [None] * 3
     assert not wrong, (len(wrong), wrong[:3])
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
 from statemachine.interface import Array
 
-from .conftest import opened, refused
+from .conftest import opened, path, refused
 from .small_models import CART, model_of
 
 SERVO = '<position name="servo" joint="rail" kp="100" kv="20"/>'
@@ -30,20 +31,19 @@ def cart(tmp_path: Path, actuators: str, backend: str = "mujoco") -> Any:
     return model_of(tmp_path, CART.format(actuators=actuators), backend=backend)
 
 
-def test_a_replaced_model_is_as_if_compiled_with_that_mass() -> None:
+def test_a_replaced_model_is_as_if_compiled_with_that_mass(mujoco_box: sm.Model) -> None:
     """The compiler, told the same masses and inertias, gives the same constants."""
-    model = sm.load("so101/scene_box")
-    scale = np.linspace(0.5, 1.5, model.nbody)
-    replaced = model.replace(mass=scale * model.body_mass).raw
-    spec = mujoco.MjSpec.from_file(str(model.path))
+    scale = np.linspace(0.5, 1.5, mujoco_box.nbody)
+    replaced = mujoco_box.replace(mass=scale * mujoco_box.body_mass).raw
+    spec = mujoco.MjSpec.from_file(str(mujoco_box.path))
     for body in spec.bodies:
-        k = model.raw.body(body.name).id
-        if model.body_mass[k]:
+        k = mujoco_box.raw.body(body.name).id
+        if mujoco_box.body_mass[k]:
             # What the compiler found of geoms or an inertial element, as an inertial element.
             body.explicitinertial = True
-            body.ipos, body.iquat = model.raw.body_ipos[k], model.raw.body_iquat[k]
-            body.mass = scale[k] * model.raw.body_mass[k]
-            body.inertia = scale[k] * model.raw.body_inertia[k]
+            body.ipos, body.iquat = mujoco_box.raw.body_ipos[k], mujoco_box.raw.body_iquat[k]
+            body.mass = scale[k] * mujoco_box.raw.body_mass[k]
+            body.inertia = scale[k] * mujoco_box.raw.body_inertia[k]
             body.fullinertia = [np.nan] * 6
     compiled = spec.compile()
     names = ("body_mass", "body_inertia", "body_subtreemass", "body_invweight0", "dof_invweight0")
@@ -84,17 +84,16 @@ def test_without_a_servo_there_is_no_gain(tmp_path: Path, backend: str) -> None:
         cart(tmp_path, MOTOR, backend).replace(kv=1)
 
 
-def test_options_add_up_and_their_order_does_not_count(backend: str) -> None:
-    model = sm.load("so101/scene_box", backend=backend)
-    options = {"mass": 1.5 * model.body_mass, "kv": 3.0, "friction": 0.5, "kp": 200.0}
-    once = model.replace(**options)
-    step_by_step = model
+def test_options_add_up_and_their_order_does_not_count(box: sm.Model) -> None:
+    options = {"mass": 1.5 * box.body_mass, "kv": 3.0, "friction": 0.5, "kp": 200.0}
+    once = box.replace(**options)
+    step_by_step = box
     for name in reversed(options):
         step_by_step = step_by_step.replace(**{name: options[name]})
     for name in ("body_mass", "actuator_kp", "actuator_kv", "geom_friction"):
         np.testing.assert_array_equal(getattr(once, name), getattr(step_by_step, name))
     # The friction of turning stays.
-    np.testing.assert_array_equal(once.geom_friction[:, 1:], model.geom_friction[:, 1:])
+    np.testing.assert_array_equal(once.geom_friction[:, 1:], box.geom_friction[:, 1:])
 
 
 def test_load_takes_them_too(backend: str) -> None:
@@ -143,9 +142,8 @@ def test_a_delay_of_the_file_is_kept(tmp_path: Path, backend: str, kept: int, la
     """7 ms are 4 steps of 2 ms; where the file keeps two commands, the older of them acts."""
     model = model_of(tmp_path, DELAYED.format(kept=kept, interp="zoh"), backend=backend)
     np.testing.assert_allclose(model.actuator_delay, [late * 0.002, 0])
-    with sm.make_data(model) as data:
-        data.ctrl[:] = 1
-        moved = []
+    moved = []
+    with opened(model, ctrl=1) as (_, data):
         for _ in range(6):
             sm.step(model, data)
             moved.append(data.qvel.copy() > 0)
@@ -165,21 +163,20 @@ def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, back
     raw = mujoco.MjModel.from_xml_string(LATE)
     data = mujoco.MjData(raw)
     mujoco.mj_resetDataKeyframe(raw, data, 0)
-    path = np.zeros((30, 1))
-    for row in path:
+    expected = np.zeros((30, 1))
+    for row in expected:
         mujoco.mj_step(raw, data)
         row[:] = data.qpos
-    assert np.degrees(0.5 - path.min()) > 15  # it falls back for five steps
+    assert np.degrees(0.5 - expected.min()) > 15  # it falls back for five steps
     model = model_of(tmp_path, LATE, "late.xml", backend=backend)
 
     def ours(model: sm.Model) -> Array:
-        with opened(model, "home") as (_, own):
-            return run_rows(model, own, 30)
+        return path(model, 30, "home")[1:]
 
-    assert np.abs(ours(model) - path).max() < (1e-9 if backend == "pybullet" else 1e-15)
+    assert np.abs(ours(model) - expected).max() < (1e-9 if backend == "pybullet" else 1e-15)
     # What is made of it starts in the same way, and what the option asks for is held.
-    assert np.abs(ours(model.replace(damping=0.1)) - path).max() < 1e-9
-    assert np.abs(ours(model.with_compiled(model.compiled)) - path).max() < 1e-9
+    for again in (model.replace(damping=0.1), model.with_compiled(model.compiled)):
+        assert np.abs(ours(again) - expected).max() < 1e-9
     late = model.replace(latency=0.05)
     for held in (
         late,
@@ -189,24 +186,12 @@ def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, back
         sm.load(model.path, backend, latency=0.05),
     ):
         assert np.abs(ours(held) - 0.5).max() < 0.03
-    cases: list[tuple[dict[str, Any], Array]] = [({}, path), ({"latency": [0.05]}, ours(late))]
+    cases: list[tuple[dict[str, Any], Array]] = [({}, expected), ({"latency": [0.05]}, ours(late))]
     for options, of in cases:
         with worlds.make_worlds(model, 1, **options) as many:
             worlds.reset(many, keyframe=0)
-            rows = []
-            for _ in range(30):
-                worlds.step(many)
-                rows.append(many.qpos[0].copy())
-        assert np.abs(np.array(rows) - of).max() < 1e-9
-
-
-def run_rows(model: sm.Model, data: sm.Data, steps: int) -> Array:
-    """Positions (steps, nq) after each step."""
-    rows = np.zeros((steps, model.nq))
-    for row in rows:
-        sm.step(model, data)
-        row[:] = data.qpos
-    return rows
+            rows = worlds.record(many, 30, ("qpos",))["qpos"][0]
+        assert np.abs(rows - of).max() < 1e-9
 
 
 @pytest.mark.usefixtures("bullet")
@@ -215,13 +200,12 @@ def test_an_interpolated_delay_is_refused_on_pybullet(tmp_path: Path) -> None:
         model_of(tmp_path, DELAYED.format(kept=9, interp="linear"), backend="pybullet")
 
 
-def test_latency_follows_the_timestep(backend: str) -> None:
-    model = sm.load("so101", backend=backend)
+def test_latency_follows_the_timestep(arm: sm.Model) -> None:
     orders = (
-        model.replace(latency=0.03).replace(timestep=0.001),
-        model.replace(timestep=0.001).replace(latency=0.03),
-        model.replace(latency=0.03, timestep=0.001),
-        model.replace(timestep=0.01, latency=0.5).replace(timestep=0.001, latency=0.03),
+        arm.replace(latency=0.03).replace(timestep=0.001),
+        arm.replace(timestep=0.001).replace(latency=0.03),
+        arm.replace(latency=0.03, timestep=0.001),
+        arm.replace(timestep=0.01, latency=0.5).replace(timestep=0.001, latency=0.03),
     )
     for each in orders:
         np.testing.assert_allclose(each.actuator_delay, 0.03, rtol=1e-12)
@@ -248,27 +232,25 @@ def test_a_latency_of_whole_steps_is_that_many_at_any_time(tmp_path: Path) -> No
     assert late == {"ours": {7}, "literal": {7, 8}}
 
 
-def test_room_for_commands_changes_nothing_else() -> None:
+def test_room_for_commands_changes_nothing_else(mujoco_box: sm.Model) -> None:
     """The compiled model goes through MuJoCo's own binary format."""
-    model = sm.load("so101/scene_box")
-    late = model.replace(latency=0.02)
+    late = mujoco_box.replace(latency=0.02)
     changed = set()
-    for name in dir(model.raw):
-        value = getattr(model.raw, name) if not name.startswith("_") else None
+    for name in dir(mujoco_box.raw):
+        value = getattr(mujoco_box.raw, name) if not name.startswith("_") else None
         if isinstance(value, (np.ndarray, int)):
             other = getattr(late.raw, name)
             if not np.array_equal(value, other, equal_nan=not isinstance(value, int)):
                 changed.add(name)
     changed -= {"signature"}  # a digest of the sizes
     assert changed == {"nhistory", "actuator_history", "actuator_historyadr", "actuator_delay"}
-    assert late.raw.names == model.raw.names
+    assert late.raw.names == mujoco_box.raw.names
 
 
-def test_states_with_other_latencies_are_foreign(backend: str) -> None:
-    model = sm.load("so101", backend=backend)
-    late = model.replace(latency=0.02)
-    with sm.make_data(model) as data, sm.make_data(late) as other:
-        state = sm.get_state(model, data)
+def test_states_with_other_latencies_are_foreign(arm: sm.Model) -> None:
+    late = arm.replace(latency=0.02)
+    with sm.make_data(arm) as data, sm.make_data(late) as other:
+        state = sm.get_state(arm, data)
         with pytest.raises(sm.errors.ForeignStateError):
             sm.set_state(late, other, state)
 
@@ -276,12 +258,10 @@ def test_states_with_other_latencies_are_foreign(backend: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_pybullet_as_it_comes_has_none_of_them() -> None:
     model = sm.load("so101", backend="pybullet", defaults="engine")
-    for name in ("mass", "friction", "kp", "kv", "latency", "damping", "limits"):
-        with pytest.raises(UnsupportedError, match="load the model without that to set it"):
-            model.replace(**{name: 1.0})
-    for name, said in (("frictionloss", "ignores"), ("integrator", "no such setting")):
-        with pytest.raises(UnsupportedError, match=said):
-            model.replace(**{name: 1.0})
+    names = "mass", "friction", "kp", "kv", "latency", "damping", "limits"
+    says = dict.fromkeys(names, "load the model without that to set it")
+    says |= {"frictionloss": "ignores", "integrator": "no such setting"}
+    refused(*((UnsupportedError, say, partial(model.replace, **{n: 1})) for n, say in says.items()))
     assert "not damping, mass, friction, kp, kv, latency, limits: with" in str(model.capabilities)
 
 

@@ -275,13 +275,12 @@ def film(sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer, tmp_
     return make
 
 
-def test_webp(film: Any) -> None:
-    image_of = pytest.importorskip("PIL.Image")
+def test_webp(film: Any, pillow: Any) -> None:
     told: list[float] = []
     made = film("a.webp", progress=told.append)
     assert told == sorted(told)
     assert told[-1] == 1.0
-    with image_of.open(made.path) as image:
+    with pillow.open(made.path) as image:
         assert image.n_frames == made.pictures == 20
         assert image.size == SIZE
         pictures, lengths = [], []
@@ -312,8 +311,8 @@ def test_mp4(film: Any) -> None:
     assert made.path.read_bytes() == film("b.mp4").path.read_bytes()
 
 
+@pytest.mark.usefixtures("pillow")
 def test_the_strip_has_cursor_curve_and_figures(sides: tuple[sm.Model, Trace, Trace]) -> None:
-    pytest.importorskip("PIL")
     _, one, two = sides
     charts = charts_of(compare(one, two), one, two, series(one, two), None)
     overlay = Overlay((400, 300), Timing(0.5, 20), "x", ["a", "b"], charts[0])
@@ -341,8 +340,9 @@ def _without_opengl(tmp_path: Path) -> dict[str, str]:
 
 
 @pytest.mark.usefixtures("bullet")
-def test_without_opengl_pybullet_draws_and_it_is_said(cli: Cli, tmp_path: Path) -> None:
-    image_of = pytest.importorskip("PIL.Image")
+def test_without_opengl_pybullet_draws_and_it_is_said(
+    cli: Cli, tmp_path: Path, pillow: Any
+) -> None:
     done = cli(
         *("compare", "hold", "--seconds", "0.2", "--film", "a.webp", "--size", "320x240"),
         **_without_opengl(tmp_path),
@@ -350,7 +350,7 @@ def test_without_opengl_pybullet_draws_and_it_is_said(cli: Cli, tmp_path: Path) 
     first, second = done.stderr.splitlines()
     assert_in(first, "no OpenGL here", "PyBullet's software")
     assert second.endswith("drawn by PyBullet's software renderer")
-    with image_of.open(tmp_path / "a.webp") as image:
+    with pillow.open(tmp_path / "a.webp") as image:
         assert image.n_frames == 6
     done = cli(
         *("compare", "hold", "--film", "b.webp", "--renderer", "mujoco"),
@@ -431,10 +431,10 @@ def _two_files(tmp_path: Path, sides: tuple[sm.Model, Trace, Trace]) -> tuple[st
     return "one.npz", "two.npz"
 
 
+@pytest.mark.usefixtures("matplotlib")
 def test_compare_writes_what_it_is_asked_for(
     cli: Cli, tmp_path: Path, sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer
 ) -> None:
-    pytest.importorskip("matplotlib")
     files = _two_files(tmp_path, sides)
     done = cli(
         *("compare", *files, "--json", "--plot", "a.svg", "--film", "a.webp", "--size", "320x240"),
@@ -505,8 +505,8 @@ def _texts(svg: bytes) -> str:
     return " | ".join("".join(text.itertext()) for text in root.iter(f"{space}text"))
 
 
+@pytest.mark.usefixtures("matplotlib")
 def test_an_svg_says_in_text_what_it_shows(compared: tuple[Trace, Trace, Any]) -> None:
-    pytest.importorskip("matplotlib")
     one, two, found = compared
     text = _texts(drawn(of_comparison(one, two, found), "svg"))
     assert_in(text, one.header.label, two.header.label, "hold", *one.header.joints, "gripperframe")
@@ -515,9 +515,11 @@ def test_an_svg_says_in_text_what_it_shows(compared: tuple[Trace, Trace, Any]) -
 
 
 def test_the_same_figure_has_the_same_bytes(
-    compared: tuple[Trace, Trace, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    compared: tuple[Trace, Trace, Any],
+    matplotlib: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    matplotlib = pytest.importorskip("matplotlib")
     figure = of_comparison(*compared)
     for form in ("svg", "png", "pdf"):
         once = drawn(figure, form)
@@ -532,12 +534,13 @@ def test_the_same_figure_has_the_same_bytes(
         assert target.read_bytes() == once
 
 
-def test_a_png_is_a_picture_with_both_sides_in_it(compared: tuple[Trace, Trace, Any]) -> None:
-    pytest.importorskip("matplotlib")
-    image_of = pytest.importorskip("PIL.Image")
+@pytest.mark.usefixtures("matplotlib")
+def test_a_png_is_a_picture_with_both_sides_in_it(
+    compared: tuple[Trace, Trace, Any], pillow: Any
+) -> None:
     import io
 
-    image = image_of.open(io.BytesIO(drawn(of_comparison(*compared), "png"))).convert("RGB")
+    image = pillow.open(io.BytesIO(drawn(of_comparison(*compared), "png"))).convert("RGB")
     assert image.width == pytest.approx(80 / 25.4 * 300, abs=1)
     pixels = np.asarray(image).astype(int)
     for colour in ((240, 168, 48), (75, 31, 120)):
@@ -558,8 +561,9 @@ def test_who_touches_when(compared: tuple[Trace, Trace, Any]) -> None:
 
 
 @pytest.mark.parametrize("what", ["compared", "recorded", "alone"])
-def test_nothing_is_cut_off_at_the_edges(compared: tuple[Trace, Trace, Any], what: str) -> None:
-    matplotlib = pytest.importorskip("matplotlib")
+def test_nothing_is_cut_off_at_the_edges(
+    compared: tuple[Trace, Trace, Any], matplotlib: Any, what: str
+) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Text
 
@@ -579,8 +583,8 @@ def test_nothing_is_cut_off_at_the_edges(compared: tuple[Trace, Trace, Any], wha
                 assert inside == (True, True), text.get_text()
 
 
+@pytest.mark.usefixtures("matplotlib")
 def test_one_trace_alone(compared: tuple[Trace, Trace, Any]) -> None:
-    pytest.importorskip("matplotlib")
     _, two, _ = compared
     text = _texts(drawn(of_trace(two), "svg"))
     assert_in(text, two.header.label, "the command", *two.header.joints, "energy")

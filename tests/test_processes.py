@@ -47,11 +47,10 @@ def test_other_processes_continue_with_the_same_bits(backend: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_replay_of_20000_steps_is_bit_identical(backend: str) -> None:
-    model = sm.load("so101/scene_box", backend=backend)
+def test_a_replay_of_20000_steps_is_bit_identical(box: sm.Model) -> None:
     runs = set()
-    with sm.make_data(model) as used, sm.make_data(model) as new:
+    with sm.make_data(box) as used, sm.make_data(box) as new:
         for data in (used, new, used):
-            sm.reset(model, data, keyframe=0)
-            runs.add(_swing(model, data, 20_000))
+            sm.reset(box, data, keyframe=0)
+            runs.add(_swing(box, data, 20_000))
     assert len(runs) == 1

@@ -11,7 +11,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import EngineWarning, UnsupportedError
 
-from .conftest import assert_in, opened, started
+from .conftest import assert_in, opened, path, started
 from .small_models import loaded
 
 IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
@@ -39,17 +39,8 @@ def chain(joint: str, count: int = 3, height: float = 1.0) -> str:
 
 def apart(models: list[sm.Model], steps: int, qpos: float, ctrl: float = 0.0) -> float:
     """The largest difference of a joint's position on the way."""
-    paths = []
-    for model in models:
-        with sm.make_data(model) as data:
-            data.qpos[:] = qpos
-            data.ctrl[:] = ctrl
-            path = []
-            for _ in range(steps):
-                sm.step(model, data)
-                path.append(data.qpos.copy())
-        paths.append(np.array(path))
-    return float(np.abs(paths[0] - paths[1]).max())
+    one, two = (path(model, steps, qpos=qpos, ctrl=ctrl) for model in models)
+    return float(np.abs(one - two).max())
 
 
 def driven(kind: str, joints: int = 3, gains: str = "") -> str:
@@ -110,9 +101,8 @@ def test_the_integrator_of_the_file(tmp_path: Path, flag: str) -> None:
 def test_friction_and_limits_in_forward(tmp_path: Path) -> None:
     found = []
     for model in both(tmp_path, chain('frictionloss=".02" range="-20 30" limited="true"')):
-        with sm.make_data(model) as data:
-            data.qpos[:] = (0.6, -0.2, 0.55)  # two of them beyond 30°
-            data.qvel[:] = (0.3, -0.4, 0.001)
+        # Two of them beyond 30°.
+        with opened(model, qpos=(0.6, -0.2, 0.55), qvel=(0.3, -0.4, 0.001)) as (_, data):
             sm.forward(model, data)
             found.append([data.qacc, data.qfrc_limit, data.qfrc_friction, data.qfrc_bias])
     assert found[0][1].any()
@@ -325,8 +315,7 @@ def test_a_contact_that_no_joint_can_yield_to_does_not_explode(tmp_path: Path, s
     models = both(tmp_path, OVERLAP.format(floor=FLOOR, shape=shape), rest=HULLS)
     ends = []
     for model in models:
-        with sm.make_data(model) as data:
-            data.qpos[1] = -1.0
+        with opened(model, qpos=(0, -1)) as (_, data):
             for _ in range(500):
                 sm.step(model, data)
                 assert np.abs(data.qvel).max() < 20

@@ -14,6 +14,7 @@ import pytest
 
 from statemachine.grading.judges import JUDGES
 from statemachine.grading.mutants.faults import FAULTS
+from statemachine.interface import Model
 from statemachine.lessons import PATH
 from statemachine.lessons.questions import ASKED
 from statemachine.probes.conventions import QUESTIONS
@@ -239,18 +240,17 @@ def test_files_that_are_linked_exist() -> None:
                 assert (file.parent / target).exists(), f"{name}: {target}"
 
 
-def test_numbers_of_the_models_readme() -> None:
+def test_numbers_of_the_models_readme(mujoco_arm: Model) -> None:
     """The figures that the README of the model states are those of the model."""
     import numpy as np
 
     import statemachine as sm
 
     text = (ROOT / "models" / "so101" / "README.md").read_text()
-    model = sm.load("so101")
-    mass = model.raw.body_mass.sum()
+    mass = mujoco_arm.raw.body_mass.sum()
     assert f"{mass:.2f} kg" in text
     assert_in(text, "0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744")
-    assert model.dof_armature[0] == 0.028
+    assert mujoco_arm.dof_armature[0] == 0.028
     with opened(sm.load("so101/scene_box"), keyframe=0) as (box, data):
         sm.forward(box, data)
         geom = box.geom_id("box")

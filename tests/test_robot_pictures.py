@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shlex
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,19 +42,18 @@ def test_it_is_of_the_lesson_s_model_and_says_what_is_to_be_seen(name: str) -> N
         assert cli._options(words).run
 
 
-def test_they_show_what_they_say() -> None:
+def test_they_show_what_they_say(mujoco_scene: sm.Model) -> None:
     lift = 1  # shoulder_lift in qpos
     limp, held = PICTURES["gravity"].poses()
     assert limp[-1, lift] > 0.4
     assert abs(held[:, lift]).max() < 0.001
     before, after = PICTURES["forward"].poses()
-    model = sm.load("so101/scene")
-    tip = model.site_id("gripperframe")
-    with sm.make_data(model) as data:
+    tip = mujoco_scene.site_id("gripperframe")
+    with sm.make_data(mujoco_scene) as data:
         places = []
         for row in (before[0], after[0]):
             data.qpos[:] = row
-            sm.forward(model, data)
+            sm.forward(mujoco_scene, data)
             places.append(data.site_xpos[tip].copy())
     assert np.linalg.norm(places[1] - places[0]) == pytest.approx(9.95e-3, abs=5e-6)
     one, two = PICTURES["replay"].poses()
@@ -115,13 +115,12 @@ def test_a_terminal_says_how_to_look_at_it_to_who_sits_there(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PICTURES)
-def test_it_is_small_and_the_same_each_time(name: str) -> None:
+def test_it_is_small_and_the_same_each_time(name: str, pillow: Any) -> None:
     rendering_environment()
-    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
     content = robot_pictures.webp(PICTURES[name])
     assert len(content) < 150_000
     assert content == robot_pictures.webp(PICTURES[name])
-    with image.open(io.BytesIO(content)) as opened:
+    with pillow.open(io.BytesIO(content)) as opened:
         assert opened.size == (480, 360)
         assert opened.n_frames == len(PICTURES[name].poses()[0])
         assert np.asarray(opened.convert("RGB")).std() > 20

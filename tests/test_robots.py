@@ -47,6 +47,7 @@ from .conftest import (
     soon,
     written,
 )
+from .small_models import mjcf
 
 GOOD = """<mujoco><option timestep='0.002'/><worldbody>
 <body name='arm' pos='0 0 1'><joint name='j' axis='0 1 0' damping='0.1'/>
@@ -81,21 +82,22 @@ if "statemachine.robots.examine" in " ".join(sys.orig_argv):
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     home = tmp_path / "robots"
-    (home / "parts").mkdir(parents=True)
-    (home / ".git").mkdir()
-    (home / "good.xml").write_text(GOOD)
-    (home / "arm.urdf").write_text(URDF)
-    (home / "broken.xml").write_text("<mujoco><worldbody><body></worldbody>")
-    (home / "scene.xml").write_text("<mujoco><include file='parts/hand.xml'/></mujoco>")
-    (home / "parts" / "hand.xml").write_text(
-        "<mujoco><worldbody><body><geom size='.1' material='m'/></body></worldbody></mujoco>"
-    )
-    (home / "parts" / "colours.xml").write_text("<mujoco><asset/></mujoco>")
-    (home / "tendon.xml").write_text(TENDON)
-    (home / "package.xml").write_text("<package/>")
-    (home / "binary.mjb").write_bytes(b"\0")
-    (home / ".git" / "old.xml").write_text(GOOD)
-    (home / "notes.txt").write_text("none")
+    files = {
+        "good.xml": GOOD,
+        "arm.urdf": URDF,
+        "broken.xml": "<mujoco><worldbody><body></worldbody>",
+        "scene.xml": "<mujoco><include file='parts/hand.xml'/></mujoco>",
+        "parts/hand.xml": mjcf("<body><geom size='.1' material='m'/></body>"),
+        "parts/colours.xml": "<mujoco><asset/></mujoco>",
+        "tendon.xml": TENDON,
+        "package.xml": "<package/>",
+        "binary.mjb": "\0",
+        ".git/old.xml": GOOD,
+        "notes.txt": "none",
+    }
+    for name, text in files.items():
+        (home / name).parent.mkdir(parents=True, exist_ok=True)
+        (home / name).write_text(text)
     return home
 
 
@@ -348,20 +350,24 @@ def test_what_is_wrong() -> None:
         return " ".join(replace(row, faults=(), backends={"pybullet": backend}).wrong("mujoco"))
 
     far = RunGap(400, 1e-3, moved=1.0)
-    assert not wrong()
     assert "two restores" in " ".join(ROW.wrong("mujoco"))
-    assert "nothing accounts for" in wrong(without_contacts=far, warnings_without=())
-    assert not wrong(without_contacts=far, warnings_without=("RK4 acts as Euler",))
-    assert not wrong(without_contacts=replace(far, shrinks=2.0), warnings_without=())
-    assert "nothing accounts" in wrong(
-        without_contacts=replace(far, shrinks=1.0), warnings_without=()
-    )
-    assert "stopped" in wrong(without_contacts=replace(far, ended="pybullet stopped"))
-    assert "explodes" in wrong(with_contacts=replace(far, hinge=1e10))
-    assert not wrong(with_contacts=replace(far, hinge=3.0))  # contacts may part
-    assert "the witness" in wrong(replace(ROW, witness=WitnessRow("own reading", "", 1, 1e-3)))
-    nan = replace(ROW, witness=WitnessRow("own reading", "", 1, float("nan")))
-    assert "the witness" in wrong(nan)
+    shrinking, growing = (replace(far, shrinks=times) for times in (2.0, 1.0))
+    for said, text in (
+        (wrong(), ""),
+        (wrong(without_contacts=far, warnings_without=()), "nothing accounts for"),
+        (wrong(without_contacts=far, warnings_without=("RK4 acts as Euler",)), ""),
+        (wrong(without_contacts=shrinking, warnings_without=()), ""),
+        (wrong(without_contacts=growing, warnings_without=()), "nothing accounts"),
+        (wrong(without_contacts=replace(far, ended="pybullet stopped")), "stopped"),
+        (wrong(with_contacts=replace(far, hinge=1e10)), "explodes"),
+        (wrong(with_contacts=replace(far, hinge=3.0)), ""),  # contacts may part
+        *(
+            (wrong(replace(ROW, witness=WitnessRow("own reading", "", 1, apart))), "the witness")
+            for apart in (1e-3, float("nan"))
+        ),
+    ):
+        assert text in said
+        assert bool(said) == bool(text), said
 
 
 def test_a_page_of_80_columns(capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,7 +23,7 @@ from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
 from statemachine.interface import DERIVED, Model, State
 
-from .conftest import Patch, around, registered
+from .conftest import Patch, around, refused, registered
 
 
 def replaced(owner: type, name: str) -> Callable[[Callable[..., Any]], Patch]:
@@ -265,6 +265,6 @@ def test_fault_is_caught(fault: str, faulty: str, monkeypatch: pytest.MonkeyPatc
     apply, catchers = FAULTS[fault]
     apply(monkeypatch)
     with conformance.Lab(faulty) as lab:
-        for check in catchers:
-            with pytest.raises(AssertionError):
-                conformance.CHECKS[check](lab)
+        refused(
+            *((AssertionError, "", partial(conformance.CHECKS[check], lab)) for check in catchers)
+        )

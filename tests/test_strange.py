@@ -192,10 +192,11 @@ def test_what_is_no_name_of_a_backend_or_of_defaults(argument: str, word: Any) -
     [10**400, [[1, 2], [3]], [10**400, 0, 0], np.array(["x", "y"]), np.zeros((2, 2, 2)), {}, "1",
      None, [None, 1, 2], np.full((40, 3), 7), object()],
 )  # fmt: skip
-def test_options_of_the_wrong_kind_are_one_line(option: str, value: Any) -> None:
-    model = sm.load("so101")
+def test_options_of_the_wrong_kind_are_one_line(
+    mujoco_arm: sm.Model, option: str, value: Any
+) -> None:
     with one_line_error(StateMachineError):
-        model.replace(**{option: value})
+        mujoco_arm.replace(**{option: value})
 
 
 class Lines:

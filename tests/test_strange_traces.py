@@ -267,12 +267,11 @@ def test_why_of_what_cannot_move_is_one_line(tmp_path: Path, cli: Cli) -> None:
     one_line(cli("compare", "waves", *words), "nothing in it can move")
 
 
-def test_why_finds_common_moments_without_a_table_of_all_pairs() -> None:
+def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Model) -> None:
     """A table of 60 000 × 60 000 numbers would be 29 GB."""
     from statemachine.compare.why.gap import Ruler
 
-    model = sm.load("so101")
-    short = record(model, seconds=0.1, derive=False)
+    short = record(mujoco_arm, seconds=0.1, derive=False)
     rows = 60_000
     time = np.arange(rows) * 0.005
     long = Trace(
@@ -280,7 +279,7 @@ def test_why_finds_common_moments_without_a_table_of_all_pairs() -> None:
         {n: np.broadcast_to(short[n][0], (rows, *short[n].shape[1:])).copy()
          for n in ("qpos", "qvel", "ctrl")} | {"time": time},
     )  # fmt: skip
-    ruler = Ruler(model, long, long)
+    ruler = Ruler(mujoco_arm, long, long)
     assert np.array_equal(ruler.time, time)
     assert not ruler.between
 

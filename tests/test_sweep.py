@@ -13,6 +13,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,6 @@ from .conftest import (
     ROOT,
     Cli,
     in_its_own_python,
-    need_engine,
     one_line,
     one_line_error,
     refused,
@@ -255,14 +255,11 @@ def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
 # The cells.
 
 
-@pytest.mark.parametrize("backend", ["mujoco", "pybullet"])
-def test_a_cell_is_the_run_of_a_trace(backend: str) -> None:
-    need_engine(backend)
+def test_a_cell_is_the_run_of_a_trace(scene: sm.Model, backend: str) -> None:
     sweep = Sweep("hold", ("timestep=0.004", "damping=0.5x"), (backend,), seconds=0.4)
     (row,) = in_process(sweep)
-    model = sm.load("so101/scene", backend=backend)
-    options = {"timestep": 0.004, "damping": 0.5 * model.dof_damping}
-    trace = record_scenario(scenario("hold"), model, seconds=0.4, options=options)
+    options = {"timestep": 0.004, "damping": 0.5 * scene.dof_damping}
+    trace = record_scenario(scenario("hold"), scene, seconds=0.4, options=options)
     assert row["status"] == "done", row
     assert (row["steps"], row["time"]) == (100, trace.time[-1])
     assert row["qpos"] == trace.qpos[-1].tolist()
@@ -270,7 +267,7 @@ def test_a_cell_is_the_run_of_a_trace(backend: str) -> None:
     assert row["max_qvel"] == np.abs(trace.qvel[1:]).max()
     rows = np.searchsorted(trace.time, np.array(row["sample_time"]) - 1e-9)
     assert row["sample_qpos"] == trace.qpos[rows].tolist()
-    site = model.site_id("gripperframe")
+    site = scene.site_id("gripperframe")
     assert np.allclose(row["sample_tip"], trace["site_xpos"][rows, site], atol=1e-9)
     assert np.isclose(row["energy"], trace["energy"][-1].sum(), atol=1e-9)
     assert row["first_touch"] == trace.time[trace["contact_row"][0]]
@@ -339,13 +336,15 @@ def test_a_request_is_kept_and_another_one_refused(tmp_path: Path) -> None:
     assert (told["cells"], told["points"]) == (2, 2)
     longer = prepared(small("hold", "timestep=0.005,0.01", seconds=0.1))
     more = prepared(small("hold", "timestep=0.005,0.01", seeds=2))
-    for another, extend, says in (
-        (longer, True, r"seconds 0.05 there, 0.1 here"),
-        (prepared(small("hold", "damping=1")), True, "varies timestep"),
-        (more, False, r"seeds 1 there, 2 here.*--extend"),
-    ):
-        with pytest.raises(BadInputError, match=says):
-            settle_manifest(tmp_path, another.manifest(), extend)
+    other = prepared(small("hold", "damping=1"))
+    refused(*(
+        (BadInputError, says, partial(settle_manifest, tmp_path, another.manifest(), extend))
+        for another, extend, says in (
+            (longer, True, r"seconds 0.05 there, 0.1 here"),
+            (other, True, "varies timestep"),
+            (more, False, r"seeds 1 there, 2 here.*--extend"),
+        )
+    ))  # fmt: skip
     settle_manifest(tmp_path, more.manifest(), True)
     assert read_manifest(tmp_path)["design"]["seeds"] == 2
 
@@ -416,9 +415,11 @@ def test_a_flipped_bit_is_never_another_value(dataset: Path) -> None:
         bad = bytearray(whole)
         bad[place] ^= 1 << draw.randrange(8)
         part.write_bytes(bytes(bad))
-        for read in (read_cells, lambda folder: dict(counted(folder))):
-            with pytest.raises(BadInputError, match=re.escape(f"{part} cannot be read")):
-                read(dataset)
+        says = re.escape(f"{part} cannot be read")
+        refused(
+            (BadInputError, says, lambda: read_cells(dataset)),
+            (BadInputError, says, lambda: dict(counted(dataset))),
+        )
     part.write_bytes(whole)
     assert read_cells(dataset).num_rows == 2
 
@@ -522,9 +523,10 @@ def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> No
         json.dumps({**json.loads(whole), "factors": [{"name": 1}]}),
     ):
         (tmp_path / "sweep.json").write_text(text)
-        for read in (lambda: read_manifest(tmp_path), lambda: run_sweep(sweep, tmp_path)):
-            with pytest.raises(BadInputError, match=r"sweep\.json is damaged"):
-                read()
+        refused(
+            (BadInputError, r"sweep\.json is damaged", lambda: read_manifest(tmp_path)),
+            (BadInputError, r"sweep\.json is damaged", lambda: run_sweep(sweep, tmp_path)),
+        )
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit stands in for a full disk")

@@ -73,10 +73,7 @@ def _meanwhile(data: sm.Data, use: Callable[[], object]) -> list[BaseException |
 
 @pytest.mark.parametrize("name", USES)
 def test_a_second_thread_is_refused_while_one_steps(model: sm.Model, name: str) -> None:
-    with sm.make_data(model) as data, sm.make_data(model) as alone:
-        for each in (data, alone):
-            sm.reset(model, each, keyframe=0)
-            sm.step(model, each, 20)
+    with opened(model, 0, nstep=20) as (_, data), opened(model, 0, nstep=20) as (_, alone):
         raised = _meanwhile(data, lambda: USES[name](model, data))
         for each in (data, alone):
             sm.step(model, each, 3)
@@ -133,19 +130,20 @@ def test_a_third_partys_backend_gets_it_too() -> None:
                 assert [type(error) for error in raised] == [BusyDataError]
 
 
-def test_a_hook_may_use_what_its_own_data_offers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hook_may_use_what_its_own_data_offers(
+    mujoco_arm: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A backend's hook, a callback, a signal handler: the same thread is no second one."""
-    model = sm.load("so101")
     seen: list[float] = []
-    with sm.make_data(model) as data:
+    with sm.make_data(mujoco_arm) as data:
         advance = data._advance
 
         def looking(*args: object) -> None:
             advance(*args)
-            seen.append(float(data.site_xpos[0, 0]) + sm.get_state(model, data).time)
+            seen.append(float(data.site_xpos[0, 0]) + sm.get_state(mujoco_arm, data).time)
 
         object.__setattr__(data, "_advance", looking)
-        sm.step(model, data)
+        sm.step(mujoco_arm, data)
     assert len(seen) == 1
 
 
@@ -176,9 +174,10 @@ def test_two_data_in_two_threads_equal_serial(model: sm.Model) -> None:
 
 @pytest.mark.parametrize("verb", ["step", "reset", "set_state", "forward", "get_state"])
 def test_an_interrupted_verb_completes_or_undoes_or_refuses(verb: str) -> None:
-    with opened(sm.load("so101/scene_box")) as (model, data), sm.make_data(model) as twin:
-        sm.reset(model, data, 0)
-        sm.step(model, data, 20)
+    with (
+        opened(sm.load("so101/scene_box"), 0, nstep=20) as (model, data),
+        sm.make_data(model) as twin,
+    ):
         base = sm.get_state(model, data)
         sm.step(model, data, 20)
         calls: dict[str, Use] = {
@@ -223,13 +222,12 @@ def test_inputs_that_were_made_read_only_are_found_before_anything_moves(backend
         state = sm.get_state(model, data)
         for name in ("qpos", "qvel", "ctrl"):
             getattr(data, name).setflags(write=False)
-            for call in (
-                lambda: sm.reset(model, data),
-                lambda: sm.set_state(model, data, state),
-                lambda: setattr(data, "ctrl", np.zeros(model.nu)),
-            ):
-                with pytest.raises(ReadOnlyError, match=rf"{name}.*setflags"):
-                    call()
+            says = rf"{name}.*setflags"
+            refused(
+                (ReadOnlyError, says, lambda: sm.reset(model, data)),
+                (ReadOnlyError, says, lambda: sm.set_state(model, data, state)),
+                (ReadOnlyError, says, lambda: setattr(data, "ctrl", np.zeros(model.nu))),
+            )
             getattr(data, name).setflags(write=True)
             assert sm.get_state(model, data) == state
         sm.step(model, data)
@@ -298,10 +296,9 @@ raise SystemExit(status)
     runs_in_silence(code, ROOT)
 
 
-def test_a_data_closed_by_a_signal_handler_in_a_step_says_so() -> None:
+def test_a_data_closed_by_a_signal_handler_in_a_step_says_so(mujoco_arm: sm.Model) -> None:
     """What a callback does to its own Data holds when the step around it has ended."""
-    model = sm.load("so101")
-    data = sm.make_data(model)
+    data = sm.make_data(mujoco_arm)
     advance = data._advance
 
     def closing(*args: object) -> None:
@@ -309,6 +306,6 @@ def test_a_data_closed_by_a_signal_handler_in_a_step_says_so() -> None:
         data.close()
 
     object.__setattr__(data, "_advance", closing)
-    sm.step(model, data)
+    sm.step(mujoco_arm, data)
     with pytest.raises(ClosedDataError):
-        sm.step(model, data)
+        sm.step(mujoco_arm, data)

@@ -52,8 +52,16 @@ ZOO = f"""
 """
 
 
-def _zoo(folder: Path) -> Any:
-    return sm.load(written(folder / "zoo.xml", ZOO))
+@pytest.fixture
+def zoo(tmp_path: Path) -> Any:
+    """The model of all that a URDF can say."""
+    return sm.load(written(tmp_path / "zoo.xml", ZOO))
+
+
+@pytest.fixture
+def zoo_urdf(tmp_path: Path, zoo: Any) -> Path:
+    """The same as a URDF."""
+    return written(tmp_path / "zoo.urdf", urdf.write(zoo.raw, 1))
 
 
 def _poses(model: sm.Model, seed: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -147,28 +155,24 @@ def test_the_arm_by_pybullet() -> None:
     assert _by_pybullet(sm.load("so101"), models_dir() / "so101" / "so101.urdf") < 1e-12
 
 
-def test_every_kind_of_joint(tmp_path: Path, pinocchio: None) -> None:
-    model = _zoo(tmp_path)
-    file = written(tmp_path / "zoo.urdf", urdf.write(model.raw, 1))
-    assert _by_pinocchio(model, file) < 1e-12
+def test_every_kind_of_joint(zoo: Any, zoo_urdf: Path, pinocchio: None) -> None:
+    assert _by_pinocchio(zoo, zoo_urdf) < 1e-12
 
 
-def test_masses_and_inertias_survive(tmp_path: Path, pinocchio: None) -> None:
+def test_masses_and_inertias_survive(zoo: Any, zoo_urdf: Path, pinocchio: None) -> None:
     """The mass matrix and the bias that Pinocchio computes from the URDF are MuJoCo's."""
     import pinocchio as pin
 
-    model = _zoo(tmp_path)
-    file = written(tmp_path / "zoo.urdf", urdf.write(model.raw, 1))
-    built = pin.buildModelFromUrdf(str(file))
-    order = [list(built.names).index(name) - 1 for name in model.joint_names]
+    built = pin.buildModelFromUrdf(str(zoo_urdf))
+    order = [list(built.names).index(name) - 1 for name in zoo.joint_names]
     # Gravity as the root sees it.
-    built.gravity.linear = matrix_from_quat(model.raw.body_quat[1]).T @ np.array([0, 0, -9.81])
+    built.gravity.linear = matrix_from_quat(zoo.raw.body_quat[1]).T @ np.array([0, 0, -9.81])
     work, random = built.createData(), np.random.default_rng(4)
-    data = mujoco.MjData(model.raw)
+    data = mujoco.MjData(zoo.raw)
     for _ in range(5):
         qpos, qvel = random.uniform(-1, 1, 3), random.uniform(-1, 1, 3)
         data.qpos[:], data.qvel[:] = qpos, qvel
-        mujoco.mj_forward(model.raw, data)
+        mujoco.mj_forward(zoo.raw, data)
         theirs_q, theirs_v = np.empty(4), np.empty(3)
         for joint, place in enumerate(order):
             pinned = built.joints[place + 1]
@@ -182,23 +186,21 @@ def test_masses_and_inertias_survive(tmp_path: Path, pinocchio: None) -> None:
         assert np.abs(found - data.qfrc_bias).max() < 1e-11
 
 
-def test_numbers_are_written_to_the_last_digit() -> None:
+def test_numbers_are_written_to_the_last_digit(mujoco_arm: sm.Model) -> None:
     root = ET.parse(models_dir() / "so101" / "so101.urdf").getroot()
-    model = sm.load("so101")
     masses = [mass.get("value", "") for mass in root.iterfind("link/inertial/mass")]
-    assert set(map(float, masses)) == set(model.body_mass)
+    assert set(map(float, masses)) == set(mujoco_arm.body_mass)
     names = {link.attrib["name"] for link in root.findall("link")}
-    assert names >= {"gripperframe", "baseframe", *model.body_names[1:]}
+    assert names >= {"gripperframe", "baseframe", *mujoco_arm.body_names[1:]}
     for mesh in root.iter("mesh"):
         assert (models_dir() / "so101" / mesh.attrib["filename"]).is_file()
     (limit,) = root.iterfind("joint[@name='elbow_flex']/limit")
     assert float(limit.attrib["effort"]) == 2.94
 
 
-def test_solids_of_a_capsule(tmp_path: Path) -> None:
-    raw = _zoo(tmp_path).raw
-    plain = ET.fromstring(urdf.write(raw, 1))
-    bullet = ET.fromstring(urdf.write(raw, 1, urdf.Dialect(capsules=True)))
+def test_solids_of_a_capsule(zoo: Any, zoo_urdf: Path) -> None:
+    plain = ET.parse(zoo_urdf)
+    bullet = ET.fromstring(urdf.write(zoo.raw, 1, urdf.Dialect(capsules=True)))
     assert len(list(bullet.iter("capsule"))) == 1
     assert not list(plain.iter("capsule"))
     assert len(list(plain.iter("sphere"))) == len(list(bullet.iter("sphere"))) + 2

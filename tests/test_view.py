@@ -64,10 +64,9 @@ def session(backend: str) -> Iterator[LiveSession]:
 def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -> None:
     """Bit by bit, with the box in the jaws, seen after every step and never."""
     with (
-        opened(sm.load(SCENE, backend=backend)) as (model, plain),
+        opened(sm.load(SCENE, backend=backend), "held") as (model, plain),
         LiveSession([model], "held") as session,
     ):
-        sm.reset(model, plain, "held")
         frame = session.frame()
         for k in range(150):
             if k == 50:
@@ -112,12 +111,12 @@ def test_commands_do_what_they_say(session: LiveSession) -> None:
     session.apply(Pause())
     assert not session.running
     session.apply(ResetTo(1))
-    assert session.frame().time == 59.522
-    assert session.frame().steps == 0
+    frame = session.frame()
+    assert (frame.time, frame.steps) == (59.522, 0)
     session.apply(ResetTo())
-    assert session.frame().time == 0
-    assert session.frame().resets == start.resets + 2
-    np.testing.assert_array_equal(session.frame().ctrl, 0)
+    frame = session.frame()
+    assert (frame.time, frame.resets) == (0, start.resets + 2)
+    np.testing.assert_array_equal(frame.ctrl, 0)
 
 
 @pytest.mark.parametrize(
@@ -166,9 +165,8 @@ def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
         assert apart.max() < math.radians(1)
 
 
-def test_a_ghost_that_falls_is_far_away() -> None:
-    model = sm.load("so101/scene")
-    with LiveSession([model, model.replace(actuation=False)]) as session:
+def test_a_ghost_that_falls_is_far_away(mujoco_scene: sm.Model) -> None:
+    with LiveSession([mujoco_scene, mujoco_scene.replace(actuation=False)]) as session:
         session.advance(200)
         gap: Any = session.frame().gap
         assert gap.joint.where == "shoulder_lift"
@@ -215,17 +213,16 @@ def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
         assert session.frame().trouble == ""
 
 
-def test_a_session_refuses_what_does_not_fit(odd: sm.Model) -> None:
-    scene = sm.load("so101/scene")
+def test_a_session_refuses_what_does_not_fit(mujoco_scene: sm.Model, odd: sm.Model) -> None:
     refused(
-        (BadInputError, "another model", lambda: LiveSession([scene, odd])),
+        (BadInputError, "another model", lambda: LiveSession([mujoco_scene, odd])),
         (
             BadInputError,
             "timesteps differ",
-            lambda: LiveSession([scene, scene.replace(timestep=0.001)]),
+            lambda: LiveSession([mujoco_scene, mujoco_scene.replace(timestep=0.001)]),
         ),
         (UnknownNameError, "hled", lambda: LiveSession([sm.load(SCENE)], "hled")),
-        (UnknownNameError, "", lambda: LiveSession([scene], site="nose")),
+        (UnknownNameError, "", lambda: LiveSession([mujoco_scene], site="nose")),
     )
 
 
@@ -243,11 +240,14 @@ def test_sliders_speak_degrees_where_an_angle_is_asked_for(odd: sm.Model) -> Non
     assert (free.low, free.high, free.unit) == (-1, 1, "")
 
 
-def test_the_fingertip_is_the_usual_site_or_the_one_that_was_named(odd: sm.Model) -> None:
-    arm = sm.load("so101")
+def test_the_fingertip_is_the_usual_site_or_the_one_that_was_named(
+    mujoco_arm: sm.Model, odd: sm.Model
+) -> None:
     for model, site, tip in (
-        (arm, None, "gripperframe"), (arm, "baseframe", "baseframe"), (odd, None, "end")
-    ):  # fmt: skip
+        (mujoco_arm, None, "gripperframe"),
+        (mujoco_arm, "baseframe", "baseframe"),
+        (odd, None, "end"),
+    ):
         with LiveSession([model], site=site) as session:
             assert session.tip == tip
 
@@ -318,6 +318,14 @@ class Slow(LiveSession):
         self.clock.now += self.cost * count
 
 
+def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Snapshot, Tempo, str]:
+    """What is shown after some turns, of which the first obeys these commands."""
+    hand.asked += asked
+    for _ in range(turns):
+        loop.turn()
+    return hand.shown[-1]
+
+
 @contextmanager
 def live(cost: float = 0.0, speed: float = 1.0) -> Iterator[tuple[Slow, Live, Hand, Clock]]:
     clock, hand = Clock(), Hand()
@@ -362,39 +370,26 @@ def test_time_that_stood_is_not_owed() -> None:
         loop.run(seconds=5.0)
         assert hand.shown[-1][0].time == 0
         assert hand.shown[-1][1].reached is None
-        hand.asked.append(Play())
-        loop.turn()
-        loop.turn()
-        assert hand.shown[-1][0].time <= 0.051
-        hand.asked.append(Step(1))
-        loop.turn()
-        standing = hand.shown[-1][0].time
+        assert turned(loop, hand, Play(), turns=2)[0].time <= 0.051
+        standing = turned(loop, hand, Step(1))[0].time
         loop.run(seconds=2.0)
         assert hand.shown[-1][0].time == standing
-        hand.asked.append(Play())
-        loop.turn()
-        loop.turn()
-        assert hand.shown[-1][0].time <= standing + 0.051
+        assert turned(loop, hand, Play(), turns=2)[0].time <= standing + 0.051
 
 
 def test_a_bad_command_is_a_note_until_the_next_one() -> None:
     with live() as (_, loop, hand, _clock):
-        hand.asked += [SetSpeed(2.0), SetSpeed(-1.0)]
-        loop.turn()
-        _, pace, note = hand.shown[-1]
+        _, pace, note = turned(loop, hand, SetSpeed(2.0), SetSpeed(-1.0))
         assert "speed" in note
         assert pace.asked == 2.0
-        hand.asked.append(SetCtrl(0, 0.1))
-        loop.turn()
-        assert hand.shown[-1][2] == ""
-        assert hand.shown[-1][0].ctrl[0] == 0.1
+        frame, _, note = turned(loop, hand, SetCtrl(0, 0.1))
+        assert (frame.ctrl[0], note) == (0.1, "")
 
 
 def test_commands_are_obeyed_in_their_order() -> None:
     with live() as (_, loop, hand, _clock):
-        hand.asked += [SetCtrl(0, 0.5), ResetTo(), SetCtrl(0, 0.2), SetCtrl(0, 0.3)]
-        loop.turn()
-        assert hand.shown[-1][0].ctrl[0] == 0.3
+        commands = SetCtrl(0, 0.5), ResetTo(), SetCtrl(0, 0.2), SetCtrl(0, 0.3)
+        assert turned(loop, hand, *commands)[0].ctrl[0] == 0.3
 
 
 # The words
@@ -425,16 +420,15 @@ def test_the_readout_says_what_the_frame_says() -> None:
 # Recordings
 
 
-def test_a_recording_is_played_and_sought() -> None:
-    model = sm.load("so101/scene")
-    held = record(model, seconds=1.0)
-    fallen = record(model.replace(actuation=False), seconds=0.5)
+def test_a_recording_is_played_and_sought(mujoco_scene: sm.Model) -> None:
+    held = record(mujoco_scene, seconds=1.0)
+    fallen = record(mujoco_scene.replace(actuation=False), seconds=0.5)
     recording = TraceSession([held, fallen])
     assert recording.length == pytest.approx(0.5)  # of the shorter
     recording.apply(Play())
     recording.advance(30)
     frame: Any = recording.frame()
-    assert frame.time == pytest.approx(30 * model.timestep)
+    assert frame.time == pytest.approx(30 * mujoco_scene.timestep)
     np.testing.assert_array_equal(frame.poses[0].xpos, held["xpos"][30])
     np.testing.assert_array_equal(frame.poses[1].xpos, fallen["xpos"][30])
     assert frame.gap.joint.size == np.abs(held.qpos[30] - fallen.qpos[30]).max()
@@ -463,10 +457,9 @@ def test_recordings_that_do_not_fit_are_refused(odd: sm.Model) -> None:
     )
 
 
-def test_moments_that_are_not_the_same_are_not_compared() -> None:
-    model = sm.load("so101/scene")
-    one = record(model, seconds=0.1)
-    two = record(model.replace(timestep=1 / 240), seconds=0.1)
+def test_moments_that_are_not_the_same_are_not_compared(mujoco_scene: sm.Model) -> None:
+    one = record(mujoco_scene, seconds=0.1)
+    two = record(mujoco_scene.replace(timestep=1 / 240), seconds=0.1)
     recording = TraceSession([one, two])
     assert recording.frame().gap is not None  # both at 0
     recording.advance(1)
@@ -623,12 +616,15 @@ def test_every_mistake_is_one_line(here: Cli, arguments: list[str], words: str) 
 
 
 @pytest.mark.usefixtures("viser")
-def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(tmp_path: Path) -> None:
-    model = sm.load("so101/scene_box")
-    file = write(record(model, seconds=0.1, keyframe=0, experiment="box"), tmp_path / "box.npz")
+def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(
+    mujoco_box: sm.Model, tmp_path: Path
+) -> None:
+    file = write(
+        record(mujoco_box, seconds=0.1, keyframe=0, experiment="box"), tmp_path / "box.npz"
+    )
     port = str(_free_pair())
     with Viewer(tmp_path, str(file), str(file), "--port", port, "--seconds", "0.3") as viewer:
-        assert_in(viewer.end(), "box of so101/scene_box", f"mujoco {model.engine_version}")
+        assert_in(viewer.end(), "box of so101/scene_box", f"mujoco {mujoco_box.engine_version}")
 
 
 def test_without_viser_the_extra_is_named(tmp_path: Path) -> None:

@@ -268,18 +268,17 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
             serving.stop(server)
 
 
-def test_the_slider_of_a_recording_follows_it() -> None:
-    model = sm.load("so101/scene")
-    recording = TraceSession([record(model, seconds=0.5)])
+def test_the_slider_of_a_recording_follows_it(mujoco_scene: sm.Model) -> None:
+    recording = TraceSession([record(mujoco_scene, seconds=0.5)])
     server = _serve(Door("127.0.0.1"))
     try:
-        front = ViserFront(server, recording, drawing_of(model))
+        front = ViserFront(server, recording, drawing_of(mujoco_scene))
         assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))
         recording.apply(Play())
         for _ in range(40):
             recording.advance()
             front.show(recording.frame(), Tempo(1.0, None, False), "")
-        assert front._seek.value == pytest.approx(40 * model.timestep)
+        assert front._seek.value == pytest.approx(40 * mujoco_scene.timestep)
         recording.apply(ResetTo())
         front.show(recording.frame(), Tempo(1.0, None, False), "")
         assert front._seek.value == 0

@@ -6,7 +6,6 @@ import contextlib
 import importlib
 import io
 import json
-import os
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -112,22 +111,21 @@ def test_two_causes_are_both_found(arm: Model) -> None:
     assert one.share == pytest.approx((one.alone + (one.last or 0)) / 2, abs=1e-12)
 
 
-def test_leaving_out_the_motion_is_no_explanation() -> None:
+def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
     """Of another engine with a heavier arm: what stills the arm closes the gap, and is no cause."""
     with registered("hidden", "tests.hidden_world:load"):
-        one = sm.load("so101/scene")
         two = sm.load("so101/scene", backend="hidden")
         two.raw.body_mass[:] *= 1.3  # which no compiled model tells
-        result = explain(one, two, HOLD, uncertain=None)
+        result = explain(arm, two, HOLD, uncertain=None)
     assert result.unexplained > 0.9
     assert not {"gravity", "servo law"} & {part.name for part in result.found_in}
 
 
-def test_a_cause_is_found_on_another_engine_too() -> None:
+def test_a_cause_is_found_on_another_engine_too(arm: Model) -> None:
+    armature = 1.5 * arm.dof_armature
     with registered("hidden", "tests.hidden_world:load"):
-        one = sm.load("so101/scene")
-        two = sm.load("so101/scene", backend="hidden").replace(armature=1.5 * one.dof_armature)
-        result = explain(one, two, HOLD, uncertain=None)
+        two = sm.load("so101/scene", backend="hidden").replace(armature=armature)
+        result = explain(arm, two, HOLD, uncertain=None)
     assert shares(result) == {"armature": pytest.approx(1.0)}
     assert result.brought == 0.0
 
@@ -175,16 +173,15 @@ def test_another_quantity(arm: Model) -> None:
         explain(arm, two, HOLD, quantity="gripperfram")
 
 
-def test_what_is_held_is_what_it_is_about() -> None:
-    one = sm.load("so101/scene_box")
-    two = edited(one, geom_friction=0.1 * one.raw.geom_friction)
-    result = explain(one, two, BOX, uncertain=None)
+def test_what_is_held_is_what_it_is_about(mujoco_box: sm.Model) -> None:
+    two = edited(mujoco_box, geom_friction=0.1 * mujoco_box.raw.geom_friction)
+    result = explain(mujoco_box, two, BOX, uncertain=None)
     assert result.quantity == "box relative to gripperframe"
     assert sum(shares(result).values()) == pytest.approx(1.0)
-    traces = [record_scenario(BOX, model) for model in (one, two)]
+    traces = [record_scenario(BOX, model) for model in (mujoco_box, two)]
     seen = []
     for trace in traces:
-        apart = trace["xpos"][:, one.body_id("box")] - trace.site("gripperframe")[0]
+        apart = trace["xpos"][:, mujoco_box.body_id("box")] - trace.site("gripperframe")[0]
         seen.append(np.einsum("nji,nj->ni", trace.site("gripperframe")[1], apart))
     apart = np.linalg.norm(seen[0] - seen[1], axis=1)
     assert result.gap == pytest.approx(apart.max(), rel=1e-9)
@@ -462,8 +459,7 @@ def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     """In a pose in which the arm is in its own way, by MuJoCo."""
 
     def own_ways(model: Model, qpos: np.ndarray, run: Any) -> int:
-        with sm.make_data(model) as data:
-            data.qpos = qpos
+        with opened(model, qpos=qpos) as (_, data):
             run(model, data)
             return int((model.geom_bodyid[data.contacts.geom] > 0).all(axis=1).sum())
 
@@ -593,13 +589,14 @@ def test_the_engine_as_it_comes_is_far_away_and_explained(explanations: Any) -> 
 
 
 @pytest.mark.slow
-def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(explanations: Any) -> None:
+def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(
+    arm: sm.Model, explanations: Any
+) -> None:
     result = explanations["hold", "engine"]
     rows = {row.name: row for row in result.shares}
     # The timestep put back, by hand: it acts on the engine's motors, not on the model's law.
-    one = sm.load("so101/scene")
     two = sm.load("so101/scene", backend="pybullet").replace(timestep=1 / 240)
-    runs = [path_of(m, scenario("hold"))[::every] for m, every in ((one, 5), (two, 6))]
+    runs = [path_of(m, scenario("hold"))[::every] for m, every in ((arm, 5), (two, 6))]
     expected = (np.abs(runs[0] - runs[1]).max() - result.brought) / result.gap
     assert rows["timestep"].last == pytest.approx(expected, abs=1e-9)
     assert rows["timestep"].alone > 0.05
@@ -647,8 +644,9 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
 
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
-def test_files_and_settings_of_an_engine_are_explained_together(tmp_path: Path) -> None:
-    arm = sm.load("so101/scene")
+def test_files_and_settings_of_an_engine_are_explained_together(
+    arm: sm.Model, tmp_path: Path
+) -> None:
     two: Any = edited(arm, body_mass=1.3 * arm.raw.body_mass)
     heavy = tmp_path / "heavy.mjb"
     two.save_binary(heavy)
@@ -694,14 +692,6 @@ def test_quantity_without_why_is_a_mistake(here: Cli) -> None:
     one_line(here("compare", "hold", "--quantity", "joints"), "--why")
 
 
-def test_without_pybullet_one_line_says_so(cli: Cli, tmp_path: Path) -> None:
-    (tmp_path / "sitecustomize.py").write_text(
-        "import sys\n"
-        "class Hide:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'pybullet':\n"
-        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
-        "sys.meta_path.insert(0, Hide())\n"
-    )
-    done = cli("compare", "hold", "--why", PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}")
+def test_without_pybullet_one_line_says_so(cli: Cli, without_pybullet: dict[str, str]) -> None:
+    done = cli("compare", "hold", "--why", **without_pybullet)
     one_line(done, "pip install pybullet", code=3)

@@ -31,7 +31,7 @@ from statemachine.errors import (
 )
 from statemachine.interface.worlds import WRITABLE
 
-from .conftest import SHARED, opened, refused, runs_in_silence
+from .conftest import SHARED, opened, refused, runs_in_silence, shared, started
 from .small_models import RICH, loaded, model_of
 
 N = 4
@@ -129,25 +129,23 @@ def test_with_substeps_a_timestep_and_latency(box: sm.Model) -> None:
 
 def test_states_move_between_worlds_and_data(worlds: many.Worlds) -> None:
     model = worlds.model
-    data = sm.make_data(model)
-    sm.reset(model, data, 0)
-    sm.step(model, data, 60)  # in contact
-    many.set_state(worlds, 2, sm.get_state(model, data))
-    again = sm.make_data(model)
-    sm.set_state(model, again, pickle.loads(pickle.dumps(sm.get_state(model, data))))
-    assert not worlds.xpos[2].any()
-    assert many.get_state(worlds, 2) == sm.get_state(model, again)
-    many.step(worlds, 20)
-    sm.step(model, again, 20)
-    equal(worlds, [again] * N, [2])
-    assert not np.array_equal(worlds.qpos[1], worlds.qpos[2])
-    back = many.get_state(worlds, 2)
-    sm.set_state(model, data, back)
-    sm.set_state(model, again, back)
-    sm.step(model, data, 5)
-    many.set_state(worlds, 0, back)
-    many.step(worlds, 5, ids=[0])
-    equal(worlds, [data], [0])
+    # In contact.
+    with opened(model, 0, nstep=60) as (_, data), sm.make_data(model) as again:
+        many.set_state(worlds, 2, sm.get_state(model, data))
+        sm.set_state(model, again, pickle.loads(pickle.dumps(sm.get_state(model, data))))
+        assert not worlds.xpos[2].any()
+        assert many.get_state(worlds, 2) == sm.get_state(model, again)
+        many.step(worlds, 20)
+        sm.step(model, again, 20)
+        equal(worlds, [again] * N, [2])
+        assert not np.array_equal(worlds.qpos[1], worlds.qpos[2])
+        back = many.get_state(worlds, 2)
+        sm.set_state(model, data, back)
+        sm.set_state(model, again, back)
+        sm.step(model, data, 5)
+        many.set_state(worlds, 0, back)
+        many.step(worlds, 5, ids=[0])
+        equal(worlds, [data], [0])
 
 
 @pytest.mark.parametrize("every", [1, 4])
@@ -161,16 +159,14 @@ def test_a_record_is_what_a_loop_reads(box: sm.Model, every: int, commanded: boo
         rows = many.record(worlds, steps, fields, every=every, ctrl=ctrl if commanded else None)
         assert list(rows) == list(fields)
         for i in range(N):
-            data = sm.make_data(box)
-            sm.reset(box, data, 0)
-            for k in range(steps // every):
-                if commanded:
-                    data.ctrl = ctrl[i, k]
-                sm.step(box, data, every)
-                for name in fields:
-                    assert np.array_equal(rows[name][i, k], getattr(data, name)), (name, i, k)
-            equal(worlds, [data] * N, [i])
-            data.close()
+            with started(box) as data:
+                for k in range(steps // every):
+                    if commanded:
+                        data.ctrl = ctrl[i, k]
+                    sm.step(box, data, every)
+                    for name in fields:
+                        assert np.array_equal(rows[name][i, k], getattr(data, name)), (name, i, k)
+                equal(worlds, [data] * N, [i])
 
 
 def single_error(model: sm.Model, spoil: Any, nstep: int) -> Any:
@@ -225,16 +221,15 @@ def test_a_world_that_diverges_leaves_the_others_alone(
     assert type(error) is type(wanted)
     for fact in ("quantity", "index", "time"):
         assert getattr(error, fact, None) == getattr(wanted, fact, None)
-    data = sm.make_data(model)
-    sm.reset(model, data, 0)
-    sm.step(model, data, 20)
-    equal(worlds, [data] * N, [0, 2, 3])
+    with opened(model, 0, nstep=20) as (_, data):
+        equal(worlds, [data] * N, [0, 2, 3])
+        after = data.time
     with pytest.raises(DivergedError, match=r"world 1 .* reset it"):
         many.get_state(worlds, 1)
     before = worlds.time[1]
     many.step(worlds, ids=[0, 1])  # left out, and not told of again
     assert worlds.time[1] == before or np.isnan(before)
-    assert worlds.time[0] == pytest.approx(data.time + model.timestep)
+    assert worlds.time[0] == pytest.approx(after + model.timestep)
     many.forward(worlds)
     with pytest.raises(UnknownNameError):
         many.reset(worlds, ids=[1], keyframe="no such")
@@ -404,11 +399,10 @@ def test_closed_worlds_keep_their_inputs_and_refuse(box: sm.Model) -> None:
         lambda worlds: worlds.xpos,
         lambda worlds: setattr(worlds, "ctrl", np.zeros(box.nu)),
     ]
-    for use in uses:
-        with pytest.raises(ClosedDataError):
-            use(worlds)
-    with pytest.raises(ValueError, match="read-only"):
-        view[0] = 1
+    refused(
+        *((ClosedDataError, "", partial(use, worlds)) for use in uses),
+        (ValueError, "read-only", lambda: view.fill(1)),
+    )
 
 
 def test_one_thread_at_a_time(worlds: many.Worlds) -> None:
@@ -425,9 +419,9 @@ def test_one_thread_at_a_time(worlds: many.Worlds) -> None:
     thread.start()
     try:
         assert entered.wait(30)
-        for use in (many.forward, many.reset, lambda w: many.get_state(w, 0)):
-            with pytest.raises(BusyDataError, match="another thread is using this Worlds"):
-                use(worlds)
+        busy = BusyDataError, "another thread is using this Worlds"
+        uses = many.forward, many.reset, lambda w: many.get_state(w, 0)
+        refused(*((*busy, partial(use, worlds)) for use in uses))
     finally:
         leave.set()
         thread.join()
@@ -461,14 +455,13 @@ def test_what_a_file_may_have(tmp_path: Path, substeps: int) -> None:
     model = model_of(tmp_path, RICH, substeps=substeps)
     with worlds_of(model, 5, workers=3) as worlds:
         follow(model, worlds)
-        data = sm.make_data(model)
-        sm.reset(model, data, 0)
-        data.raw.mocap_pos[0] = [0.2, 0.1, 0.9]
-        many.set_state(worlds, 4, sm.get_state(model, data))
-        many.step(worlds, 30)
-        sm.step(model, data, 30)
-        equal(worlds, [data] * 5, [4])
-        assert sm.get_state(model, data) == many.get_state(worlds, 4)
+        with started(model) as data:
+            data.raw.mocap_pos[0] = [0.2, 0.1, 0.9]
+            many.set_state(worlds, 4, sm.get_state(model, data))
+            many.step(worlds, 30)
+            sm.step(model, data, 30)
+            equal(worlds, [data] * 5, [4])
+            assert sm.get_state(model, data) == many.get_state(worlds, 4)
 
 
 ROBOTS = {
@@ -483,9 +476,7 @@ ROBOTS = {
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robots_of_others(name: str) -> None:
-    path = SHARED / "robots" / "models" / ROBOTS[name]
-    if not path.exists():
-        pytest.skip(f"no {path.relative_to(SHARED.parent)} beside the checkout")
+    path = shared(SHARED / "robots" / "models" / ROBOTS[name])
     with worlds_of(sm.load(path), 3) as worlds:
         follow(worlds.model, worlds, 4)
 
@@ -565,9 +556,8 @@ worlds.close()
 def test_a_time_that_is_no_number_is_refused(model: sm.Model) -> None:
     with many.make_worlds(model, 2) as worlds:
         worlds.time[1] = np.nan
-        for use in (many.step, many.forward, lambda w: many.record(w, 2)):
-            with pytest.raises(BadInputError, match=r"time\[1\] = nan"):
-                use(worlds)
+        uses = many.step, many.forward, lambda w: many.record(w, 2)
+        refused(*((BadInputError, r"time\[1\] = nan", partial(use, worlds)) for use in uses))
         many.step(worlds, ids=[0])
         many.reset(worlds)
         many.step(worlds)

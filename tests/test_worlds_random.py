@@ -203,15 +203,14 @@ def interrupt(
         data.time = many.time[world]
 
 
-def test_a_latency_that_memory_cannot_hold_is_refused(backend: str) -> None:
+def test_a_latency_that_memory_cannot_hold_is_refused(arm: sm.Model) -> None:
     """Before an engine sees it: the option, what it would take and what there is."""
-    model = sm.load("so101", backend=backend)
     for step in (1e-9, 1e-300):
         with pytest.raises(BadInputError, match=r"latency of 10 s .* GB in a Data, which may"):
-            model.replace(latency=10, timestep=step)
+            arm.replace(latency=10, timestep=step)
     with pytest.raises(BadInputError, match="latency of 1 s is too long for engine steps of 1e-09"):
-        make_worlds(model, 2, latency=[0, 1], timestep=[1e-9] * 2).close()
-    assert model.replace(latency=0, timestep=1e-9).timestep == 1e-9
+        make_worlds(arm, 2, latency=[0, 1], timestep=[1e-9] * 2).close()
+    assert arm.replace(latency=0, timestep=1e-9).timestep == 1e-9
 
 
 def test_worlds_that_do_not_fit_are_refused(box: Any, monkeypatch: Any) -> None:
