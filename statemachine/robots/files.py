@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -111,18 +112,13 @@ def _has_bodies(file: Path) -> bool:
 
 def _parts(file: Path) -> Iterator[Path]:
     """The files that a model includes."""
-    try:
+    with suppress(ValueError, OSError):
         yield from list(model_files(file))[1:]
-    except (UnicodeError, ValueError, OSError):
-        return
 
 
 def _digest(file: Path) -> str:
-    try:
+    with suppress(ValueError, OSError):
         return model_digest(file)
-    except (UnicodeError, ValueError, OSError):
-        pass
-    try:
+    with suppress(OSError):
         return hashlib.sha256(file.read_bytes()).hexdigest()
-    except OSError:
-        return ""
+    return ""

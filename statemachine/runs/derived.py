@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -41,13 +41,7 @@ def derived(
     with make_data(model) as data:
         begin(model, data)
         for k in range(rows):
-            differs = False
-            for name in ("qpos", "qvel"):
-                if getattr(data, name).tobytes() != inputs[name][k].tobytes():
-                    getattr(data, name)[:] = inputs[name][k]
-                    differs = True
-            rewritten += differs
-            data.ctrl[:] = inputs["ctrl"][k]
+            rewritten += put_row(data, inputs, k)
             if data.time != inputs["time"][k]:
                 data.time = float(inputs["time"][k])
             if not after:
@@ -68,6 +62,17 @@ def derived(
         rows_of = [np.reshape(part, (-1, *width)) for part in contacts[name]]
         columns[name] = np.concatenate([np.empty((0, *width), kind), *rows_of], dtype=kind)
     return columns, rewritten
+
+
+def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
+    """Write row `k` of the inputs into a Data; whether it was in another state."""
+    rewritten = [
+        n for n in ("qpos", "qvel") if getattr(data, n).tobytes() != inputs[n][k].tobytes()
+    ]
+    for name in rewritten:
+        getattr(data, name)[:] = inputs[name][k]
+    data.ctrl[:] = inputs["ctrl"][k]
+    return bool(rewritten)
 
 
 def _one_more(model: Model, data: Data) -> None:
@@ -91,8 +96,7 @@ def _read(
         try:
             values.append(np.array(getattr(data, name)))  # it may be the engine's memory
         except UnsupportedError:
-            shape = np.shape(data.qvel)
-            values.append(np.full(shape, np.nan))
+            values.append(np.full(np.shape(data.qvel), np.nan))
     found = data.contacts
     if len(found):
         contacts["contact_row"].append(np.full(len(found), row))

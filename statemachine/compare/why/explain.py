@@ -388,10 +388,8 @@ def _parts(
     gap: float, brought: float | None, rest: tuple[Located, ...], nothing: bool
 ) -> tuple[float, float, float]:
     """What is explained, located and unexplained, as parts of the gap."""
-    if nothing:
-        return 0.0, 0.0, 0.0
-    if brought is None:
-        return 0.0, 0.0, 1.0
+    if nothing or brought is None:
+        return 0.0, 0.0, float(not nothing)
     explained = (gap - brought) / gap + sum(part.share for part in rest if part.is_setting)
     located = sum(part.share for part in rest if not part.is_setting)
     return explained, located, (rest[-1].gap if rest else brought) / gap

@@ -74,6 +74,7 @@ class OwnSettings:
 
     Attributes:
         names: Of the settings, as in `TITLES`.
+        emulated: The file behind the contract.
     """
 
     def __init__(self, dials: Dials, other: Model, actuated: bool) -> None:
@@ -85,14 +86,13 @@ class OwnSettings:
             actuated: Whether its motors follow ctrl.
         """
         self._dials, self._other, self._actuated = dials, other, actuated
-        model = dials.model
-        emulated = dials.emulated
+        model, self.emulated = dials.model, dials.emulated
         alike = {
             "gravity": np.array_equal(model.gravity, other.gravity),
             "timestep": (model.timestep, model.substeps) == (other.timestep, other.substeps),
-            "armature": not emulated.dof_armature.any(),
-            "frictionloss": not emulated.dof_frictionloss.any(),
-            "limits": not emulated.jnt_limited.any(),
+            "armature": not self.emulated.dof_armature.any(),
+            "frictionloss": not self.emulated.dof_frictionloss.any(),
+            "limits": not self.emulated.jnt_limited.any(),
         }
         self.names = tuple(name for name in TITLES if not alike.get(name))
 
@@ -100,7 +100,8 @@ class OwnSettings:
         """The settings as differences; `side` is that of the engine as it comes, 0 or 1."""
         rows = []
         for name in self.names:
-            own, model = self._own_word(name), self._model_word(name)
+            source = self._other if name in ("gravity", "timestep") else self.emulated
+            own, model = self._own_word(name), _word(name, source)
             values = ((TITLES[name], *((model, own) if side else (own, model))),)
             rows.append(ModelDifference(TITLES[name], "engine", "", values))
         return rows
@@ -127,18 +128,15 @@ class OwnSettings:
             "damping": emulated.dof_damping,
             "frictionloss": emulated.dof_frictionloss,
         }
-        settings: dict[str, Setting] = dict.fromkeys(names, "model")
-        settings |= dict.fromkeys(without, "off")
+        settings: dict[str, Setting] = {
+            **dict.fromkeys(names, "model"),
+            **dict.fromkeys(without, "off"),
+        }
         return self._dials.of(model, emulated).build(settings, values)
 
     def can_leave_out(self, feature: Feature) -> bool:
         """Whether the engine itself can do without a feature."""
         return feature.name in ("limits", "contact", "damping")
-
-    @property
-    def emulated(self) -> Model:
-        """The file behind the contract."""
-        return self._dials.emulated
 
     def _own_word(self, name: str) -> str:
         """What the engine has of a setting, in a few words."""
@@ -150,10 +148,6 @@ class OwnSettings:
         if name == "surfaces":
             return f"friction {_span(dials.frictions)}, hard"
         return dials.words[name]
-
-    def _model_word(self, name: str) -> str:
-        """What the model has of it."""
-        return _word(name, self._other if name in ("gravity", "timestep") else self.emulated)
 
 
 def leave_out(model: Model, features: frozenset[str]) -> Model:

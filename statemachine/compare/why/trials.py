@@ -148,9 +148,7 @@ class Trials:
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
         self.ruler = Ruler(one, traces[0], traces[1], matched)
         for side, trace in enumerate(traces):
-            run = _Run(side, _NONE)
-            reason = trace.header.ended or "it left every bound"
-            self._runs[run] = _Outcome(self._curves(side, self._models[side], trace), reason)
+            self._runs[_Run(side, _NONE)] = self._measured(side, self._models[side], trace)
             self.ended = self.ended or trace.header.ended
 
     def differences(self, finer: bool) -> tuple[ModelDifference, ...]:
@@ -316,8 +314,7 @@ class Trials:
             model = self._model(run)
             ran = True
             trace = self._rerun(run, model).record(derive=False)
-            reason = trace.header.ended or "it left every bound"
-            return _Outcome(self._curves(run.side, model, trace), reason)
+            return self._measured(run.side, model, trace)
         except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
             return _Outcome(None, str(error), ran)
 
@@ -334,7 +331,11 @@ class Trials:
             model = model.replace(**options) if options else model
         if run.integrator:
             model = model.replace(integrator=run.integrator)
-        names = frozenset(_setting(name) for name in run.brought if self._is_own(name))
+        names = frozenset(
+            setting
+            for setting, title in TITLES.items()
+            if title in run.brought and self._is_own(title)
+        )
         if own and (names or run.without):
             return own.build(model, built(own.emulated, edits), names, run.without)
         return leave_out(model, run.without)
@@ -418,8 +419,9 @@ class Trials:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
         return self.ruler.floor(first, [each[0] for each in curves if each])
 
-    def _curves(self, side: int, model: Model, trace: Trace) -> Curves | None:
-        return self.ruler.curves(trace, self._posed(model), side)
+    def _measured(self, side: int, model: Model, trace: Trace) -> _Outcome:
+        curves = self.ruler.curves(trace, self._posed(model), side)
+        return _Outcome(curves, trace.header.ended or "it left every bound")
 
     def _posed(self, model: Model) -> Model:
         """A Model of the same bodies by which poses are computed, on the engine that is fastest."""
@@ -443,8 +445,3 @@ def _own_settings(
         for side, own in enumerate(dials)
     )
     return one, two
-
-
-def _setting(name: str) -> str:
-    """The setting of an engine that a cause goes by."""
-    return next(key for key, title in TITLES.items() if title == name)
