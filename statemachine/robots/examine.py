@@ -119,10 +119,8 @@ class _Examination:
     def _load(self, backend: str) -> None:
         self.tell(self.row, f"loading, {backend}")
         facts: dict[str, Any] = {}
-        for models, case, options in (
-            (self.models, "", {}),
-            (self.without, "_without", {"contacts": False}),
-        ):
+        for models, case in ((self.models, ""), (self.without, "_without")):
+            options: dict[str, Any] = {"contacts": False} if case else {}
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
                 try:

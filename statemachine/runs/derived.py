@@ -66,13 +66,11 @@ def derived(
 
 def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
     """Write row `k` of the inputs into a Data; whether it was in another state."""
-    rewritten = [
-        n for n in ("qpos", "qvel") if getattr(data, n).tobytes() != inputs[n][k].tobytes()
-    ]
-    for name in rewritten:
+    others = [n for n in ("qpos", "qvel") if getattr(data, n).tobytes() != inputs[n][k].tobytes()]
+    for name in others:
         getattr(data, name)[:] = inputs[name][k]
     data.ctrl[:] = inputs["ctrl"][k]
-    return bool(rewritten)
+    return bool(others)
 
 
 def _one_more(model: Model, data: Data) -> None:
