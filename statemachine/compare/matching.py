@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..description.match import Matching, Pair, match, renamed
+from ..description.meshes import one_to_one
 from ..description.records import Robot
 from ..description.tree import GroupTree
 from ..engines import room
@@ -64,11 +65,6 @@ class Matched:
     solids: tuple[BodyPair, ...]
     only: tuple[Only, Only]
     notes: tuple[str, ...]
-
-    @property
-    def whole(self) -> bool:
-        """Whether every joint and every actuator has its counterpart."""
-        return not any(only.get(kind) for only in self.only for kind in ("joint", "actuator"))
 
     @property
     def reordered(self) -> bool:
@@ -153,7 +149,7 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
         one=one,
         two=two,
         joints=joints,
-        bodies=_completed(
+        bodies=_and_further(
             ((solid.one, solid.two) for solid in solids),
             _by_name(one.body_names, two.body_names, given),
         ),
@@ -222,6 +218,11 @@ def _by_name(ours: Sequence[str], theirs: Sequence[str], given: Mapping[str, str
     return tuple((k, there[name]) for k, name in enumerate(wanted) if name in there)
 
 
+def _and_further(pairs: Iterable[tuple[int, int]], further: Iterable[tuple[int, int]]) -> Pairs:
+    """Pairs, and of some further ones, in turn, those whose ends are both left."""
+    return tuple(sorted(one_to_one(further, pairs).items()))
+
+
 def _sites(
     one: Model,
     two: Model,
@@ -247,7 +248,7 @@ def _sites(
         return (pair.align @ place).distance(other) < _ONE_PLACE
 
     places_of = product(range(one.nsite), range(two.nsite))
-    return _completed(
+    return _and_further(
         _by_name(one.site_names, two.site_names, given), filter(in_one_place, places_of)
     )
 
@@ -260,16 +261,7 @@ def _actuators(one: Model, two: Model, joints: Pairs, given: Mapping[str, str]) 
         for b, other in enumerate(two.actuator_jntid.tolist())
         if (joint, other) in joints
     )
-    return _completed(_by_name(one.actuator_names, two.actuator_names, given), of_one_joint)
-
-
-def _completed(pairs: Iterable[tuple[int, int]], further: Iterable[tuple[int, int]]) -> Pairs:
-    """Pairs, and of some further ones, in turn, those whose ends are both left."""
-    taken = dict(pairs)
-    for a, b in further:
-        if a not in taken and b not in taken.values():
-            taken[a] = b
-    return tuple(sorted(taken.items()))
+    return _and_further(_by_name(one.actuator_names, two.actuator_names, given), of_one_joint)
 
 
 def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:

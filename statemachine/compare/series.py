@@ -109,8 +109,7 @@ def _curve(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
 
 def _turned(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
     """Rotation matrices (n, 3, 3)."""
-    none = np.empty(0)
-    return Series(name, kind, time, none, none, angle_between(one, two))
+    return Series(name, kind, time, np.empty(0), np.empty(0), angle_between(one, two))
 
 
 def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
@@ -144,8 +143,8 @@ def default_tip(*headers: Header) -> str:
 
 def normal_forces(trace: Trace) -> dict[str, Array]:
     """Sum of the normal contact forces (n,) [N] between each pair of bodies."""
-    sums = _sums(trace, trace["contact_force"][:, :1])
-    return {pair: normal[:, 0] for pair, normal in sums.items()}
+    normals = trace["contact_force"][:, :1]
+    return {pair: total[:, 0] for pair, total in _sums(trace, normals).items()}
 
 
 def total_forces(trace: Trace) -> dict[str, Array]:

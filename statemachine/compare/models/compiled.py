@@ -149,8 +149,7 @@ def _is_told(difference: ModelDifference) -> bool:
 
 def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) -> None:
     """The figures of a difference, as the compiled models name them."""
-    setting = difference.kind in _SETTINGS
-    usual = "settings" if setting else "further"
+    usual = "settings" if difference.kind in _SETTINGS else "further"
     subject = _SUBJECTS.get(difference.kind, {}).get(difference.subject, usual)
     for name, *values in difference.values or (("", "as it is", "another"),):
         if name.endswith("limited") and len(difference.values) > 1:

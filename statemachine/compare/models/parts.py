@@ -46,8 +46,7 @@ def of_masses(
     hinge = pair.two.joint is not None and pair.two.joint.kind == "hinge"
     effect = "{share:.1%} of it" if matters else _STILL
     more: Telling = {"matters": matters, "effect": effect, "keys": [("body", where, "mass")]}
-    masses = mine.mass, theirs.mass
-    book.enter("mass", where, "", masses, "kg", slack=2, **more)
+    book.enter("mass", where, "", (mine.mass, theirs.mass), "kg", slack=2, **more)
     if not heavy and not mine.tensor.any() and not theirs.tensor.any():
         return
     apart = float(np.linalg.norm(mine.com - theirs.com))
@@ -108,10 +107,12 @@ def of_shapes(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree, reach: f
         assert known is not None
         label = f"{pair.one.name}: {known.name or (other or known).name or known.kind}"
         if shape is None or other is None:
-            kinds = [side.kind if side else "nothing" for side in (shape, other)]
-            keys = [("geom", known.label, "extra shape")]
-            share = 0.5 if ours and theirs else 1.0
-            book.differ("shapes", label, "shape", kinds, share=share, keys=keys)
+            book.differ(
+                *("shapes", label, "shape"),
+                [side.kind if side else "nothing" for side in (shape, other)],
+                share=0.5 if ours and theirs else 1.0,
+                keys=[("geom", known.label, "extra shape")],
+            )
             continue
         _solids(book, label, shape, other, reach)
         usual = one.robot.touch or two.robot.touch

@@ -58,14 +58,13 @@ def of_joints(book: Ledger, pair: Pair, above: Pair, tree: GroupTree, reach: flo
         effect="turns the other way" if abs(tilt - math.pi) < 1e-3 else "",
         keys=[("joint", where, "axis")],
     )
-    if hinge:
-        beside = float(np.linalg.norm(np.cross(axis, pair.align.of(a.anchor) - anchor)))
-        keys = [("joint", where, "anchor")]
-        if beside > 2 * book.tolerance * reach:
-            share = beside / reach
-            book.differ(
-                "places", where, "axis beside", (0.0, beside), "m", beside, share=share, keys=keys
-            )
+    beside = float(np.linalg.norm(np.cross(axis, pair.align.of(a.anchor) - anchor)))
+    if hinge and beside > 2 * book.tolerance * reach:
+        book.differ(
+            *("places", where, "axis beside", (0.0, beside), "m", beside),
+            share=beside / reach,
+            keys=[("joint", where, "anchor")],
+        )
 
 
 def _tips(tree: GroupTree, pair: Pair) -> list[Array]:

@@ -80,11 +80,8 @@ def locate(
             break
         more = without | {feature.name} if feature else without
         choices = [integrator] if feature or integrator else trials.integrators
-        rests: dict[str, float] = {}
-        for choice in choices:
-            gaps = trials.gaps(brought, more, choice)
-            if gaps:
-                rests[choice] = getattr(gaps[quantity], measure)
+        gaps = {choice: trials.gaps(brought, more, choice) for choice in choices}
+        rests = {choice: getattr(own[quantity], measure) for choice, own in gaps.items() if own}
         best = min(rests, key=rests.__getitem__, default="")
         rest = rests.get(best, left)
         if not rest < _LEAST * left:

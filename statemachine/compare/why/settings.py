@@ -69,6 +69,9 @@ FEATURES = (
 )
 
 
+ENGINE_CAN_BE_WITHOUT = ("limits", "contact", "damping")  # of the features, as it comes
+
+
 class OwnSettings:
     """The settings of a Model with `defaults="engine"`, each as it comes or as the model has it.
 
@@ -134,10 +137,6 @@ class OwnSettings:
         }
         return self._dials.of(model, emulated).build(settings, values)
 
-    def can_leave_out(self, feature: Feature) -> bool:
-        """Whether the engine itself can do without a feature."""
-        return feature.name in ("limits", "contact", "damping")
-
     def _own_word(self, name: str) -> str:
         """What the engine has of a setting, in a few words."""
         dials = self._dials
@@ -152,11 +151,11 @@ class OwnSettings:
 
 def leave_out(model: Model, features: frozenset[str]) -> Model:
     """A Model without some features, by `Model.replace`."""
-    options = {}
-    for feature in FEATURES:
-        if feature.name in features:
-            finer = feature.option == "substeps"
-            options[feature.option] = _FINER * model.substeps if finer else feature.value
+    options = {
+        feature.option: _FINER * model.substeps if feature.option == "substeps" else feature.value
+        for feature in FEATURES
+        if feature.name in features
+    }
     return model.replace(**options) if options else model
 
 

@@ -32,7 +32,7 @@ from ..perturbed import RUNS, Rerun, Uncertainty, perturbed_run
 from .causes import Cause, built, differences_of
 from .gap import Curves, Ruler
 from .of_the_run import COMMANDS, ORDER, START, of_the_run, order_of_ctrl, order_of_joints
-from .settings import NEEDS, TITLES, Feature, OwnSettings, leave_out
+from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, Feature, OwnSettings, leave_out
 from .touches import FirstTouch, first_touch
 
 Measure = Literal["worst", "end", "rms"]
@@ -252,7 +252,9 @@ class Trials:
     def can_be_without(self, feature: Feature) -> bool:
         """Whether a feature can be left out on both sides, and is not what the experiment sets."""
         own = [
-            own.can_leave_out(feature) if own else feature.option in model.capabilities.options
+            feature.name in ENGINE_CAN_BE_WITHOUT
+            if own
+            else feature.option in model.capabilities.options
             for own, model in zip(self._own, self._models, strict=True)
         ]
         return all(own) and feature.option not in self._scenario.options
