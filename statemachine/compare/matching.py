@@ -176,9 +176,8 @@ def match_alike(one: Model, two: Model) -> Matched:
                 f"matched by name: the two sides have other names of a {kind}"
             )
         pairs[kind] = tuple((k, k) for k in range(len(names[0])))
-    only: tuple[Only, Only] = {}, {}
     return Matched(
-        one, two, pairs["joint"], pairs["body"], pairs["site"], pairs["actuator"], (), only, ()
+        one, two, pairs["joint"], pairs["body"], pairs["site"], pairs["actuator"], (), ({}, {}), ()
     )
 
 

@@ -180,13 +180,10 @@ def tell(one: Trace, two: Trace, column: str) -> bool:
 
     Of contacts a run without any tells all that there is.
     """
-    for trace in (one, two):
-        if column not in trace:
-            return False
-        array = trace[column]
-        if array.size and np.isnan(array).all():
-            return False
-    return True
+    return all(
+        column in trace and not (trace[column].size and np.isnan(trace[column]).all())
+        for trace in (one, two)
+    )
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
     else:
         assert scenario is not None
         scenario = scenario.on(models[0])
-        reruns, said = _reruns(scenario, models, options, matched, request)
+        reruns, said = _reruns(scenario, models, options, matched, request, seconds)
         pair = tuple(
             rerun.record(
                 experiment=scenario.name,
@@ -172,10 +172,10 @@ def _reruns(
     options: list[dict[str, Any]],
     matched: Matched | None,
     request: Request,
+    seconds: float,
 ) -> tuple[tuple[Rerun, Rerun], tuple[str, ...]]:
     """How each side is run; what an experiment tells the left, the right is told too."""
     left, right = models
-    seconds = scenario.seconds if request.seconds is None else request.seconds
     for model in models:
         check_length(model, seconds)
     said = []
@@ -299,8 +299,8 @@ def recorded_sides(
 
     options = header.options if request.sides else {}
     name, says = header.experiment, header.says
-    made = Scenario(name, says, "", seconds, controller, lambda _: says, options=options)
-    return made, (sides[0], sides[1]), traces
+    again = Scenario(name, says, "", seconds, controller, lambda _: says, options=options)
+    return again, (sides[0], sides[1]), traces
 
 
 def _side_of(request: Request, place: int, trace: Trace) -> Side:

@@ -87,14 +87,19 @@ def _one_more(model: Model, data: Data) -> None:
         forward(model, data)
 
 
+def array_or_nan(data: Data, name: str) -> Array:
+    """A derived array of a Data, copied; one that the backend does not tell is (nv,) NaN."""
+    try:
+        return np.array(getattr(data, name))  # it may be the engine's memory
+    except UnsupportedError:
+        return np.full(np.shape(data.qvel), np.nan)
+
+
 def _read(
     data: Data, row: int, kept: dict[str, list[Array]], contacts: dict[str, list[Any]]
 ) -> None:
     for name, values in kept.items():
-        try:
-            values.append(np.array(getattr(data, name)))  # it may be the engine's memory
-        except UnsupportedError:
-            values.append(np.full(np.shape(data.qvel), np.nan))
+        values.append(array_or_nan(data, name))
     found = data.contacts
     if len(found):
         contacts["contact_row"].append(np.full(len(found), row))

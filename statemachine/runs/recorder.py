@@ -109,7 +109,10 @@ def record(
         command=command,
         provenance=provenance(model, seed),
         defaults=defaults,
-        options={name: _plain(value) for name, value in (options or {}).items()},
+        options={
+            name: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+            for name, value in (options or {}).items()
+        },
         keyframe=None if keyframe is None else model.keyframes[model.key_id(keyframe)].name,
         timestep=model.timestep,
         substeps=model.substeps,
@@ -292,7 +295,3 @@ def _run(
             raise BadInputError(f"the controller left {name} with an entry that is no number")
     progress(1.0)
     return found, ended
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value

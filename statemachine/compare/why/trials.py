@@ -281,9 +281,8 @@ class Trials:
         if jobs > 1:
             work = [partial(self._tried, run) for run in new]
             for run, outcome in zip(new, in_forks(work, jobs, self._ran, self._took), strict=True):
-                if isinstance(outcome, Exception):  # it is raised when its run is asked for
-                    continue
-                self._ahead[run] = outcome or _Outcome(None, _LOST)
+                if not isinstance(outcome, Exception):  # it is raised when its run is asked for
+                    self._ahead[run] = outcome or _Outcome(None, _LOST)
 
     def _forks_for(self, number: int) -> int:
         """How many forks are to share some runs."""
