@@ -122,8 +122,9 @@ class TakenParts:
             }
             for kind, of_kind in pairs.items()
         }
-        raw = room(DEFAULT).with_parts(model.path, giver.path, self.parts, names)
-        return model.with_compiled(raw)
+        return model.with_compiled(
+            room(DEFAULT).with_parts(model.path, giver.path, self.parts, names)
+        )
 
 
 def with_options(

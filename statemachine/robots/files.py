@@ -63,8 +63,9 @@ def find(paths: Sequence[str | os.PathLike[str]]) -> list[ModelFile]:
         raise BadInputError(f"no models (MJCF or URDF) in {', '.join(map(str, paths))}")
     owners: dict[Path, str] = {}
     for each in found.values():
-        for part in _parts(each.path):
-            owners.setdefault(part.resolve(), each.name)
+        with suppress(ValueError, OSError):
+            for part in list(model_files(each.path))[1:]:  # what it includes
+                owners.setdefault(part.resolve(), each.name)
     return [
         replace(
             each, path=each.path.absolute(), sha256=_digest(each.path), part_of=owners.get(path, "")
@@ -108,12 +109,6 @@ def _has_bodies(file: Path) -> bool:
         )
     except (ElementTree.ParseError, UnicodeError, ValueError, OSError):
         return True
-
-
-def _parts(file: Path) -> Iterator[Path]:
-    """The files that a model includes."""
-    with suppress(ValueError, OSError):
-        yield from list(model_files(file))[1:]
 
 
 def _digest(file: Path) -> str:

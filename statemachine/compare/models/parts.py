@@ -137,16 +137,23 @@ def _solids(
     if shape.kind != other.kind:
         return
     if shape.size and other.size:
-        sizes = shape.size, other.size
-        book.enter("shapes", label, "size", sizes, "m", slack=2, against=reach, keys=same)
+        book.enter(
+            *("shapes", label, "size", (shape.size, other.size), "m"),
+            slack=2,
+            against=reach,
+            keys=same,
+        )
     bounds = bounds_of(shape), bounds_of(other)
     if len(bounds[0]) == len(bounds[1]) == 6:
         figures = {"middle": [plain((ends[:3] + ends[3:]) / 2) for ends in bounds]}
         if shape.kind == "mesh":
             ends = zip(plain(bounds[0]), plain(bounds[1]), strict=True)
             figures |= {f"ends at {side}": list(x) for side, x in zip(_SIDES, ends, strict=True)}
-            volumes = shape.volume, other.volume
-            book.enter("shapes", label, "volume", volumes, "m³", slack=16, keys=same)
+            book.enter(
+                *("shapes", label, "volume", (shape.volume, other.volume), "m³"),
+                slack=16,
+                keys=same,
+            )
         for figure, values in figures.items():
             book.enter(
                 *("shapes", label, figure, values, "m"),

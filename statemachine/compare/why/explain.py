@@ -201,8 +201,8 @@ def explain(
     """
     began, called = time.perf_counter(), labels or _labels(one, two)
     scenario = scenario if recordings else scenario.on(one)
-    told = one.compiled is not None and two.compiled is not None
-    matched = match_models(one, two, names) if told else match_alike(one, two)
+    compiled = one.compiled is not None and two.compiled is not None
+    matched = match_models(one, two, names) if compiled else match_alike(one, two)
     runs, expected = 0, 10
 
     def ran() -> None:

@@ -335,7 +335,7 @@ class Trials:
         names = frozenset(
             setting
             for setting, title in TITLES.items()
-            if title in run.brought and self._is_own(title)
+            if title in run.brought and self._by_name[title].kind == "engine"
         )
         if own and (names or run.without):
             return own.build(model, built(own.emulated, edits), names, run.without)
@@ -347,12 +347,9 @@ class Trials:
             name
             for name in brought
             if self._by_name[name].edits(side)
-            or (self._own[side] and self._is_own(name))
+            or (self._own[side] and self._by_name[name].kind == "engine")
             or (side == 1 and (name in self._replaced or self._by_name[name].kind == "run"))
         )
-
-    def _is_own(self, name: str) -> bool:
-        return self._by_name[name].kind == "engine"
 
     def _rerun(self, run: _Run, model: Model) -> Rerun:
         start, brought = self._starts[run.side], run.brought
