@@ -11,7 +11,7 @@ import numpy as np
 from ..backends import load
 from ..errors import StateMachineError, TraceError
 from ..interface import Array, Data, Model
-from ..runs import Header, Trace, model_file
+from ..runs import Trace, model_file
 from ..runs.recorder import layout_of
 from ..runs.scenarios import Controller
 from .matching import Matched, Pairs, match_models, start_of
@@ -20,9 +20,8 @@ from .sides import Request
 
 def called(trace: Trace, file: str) -> Trace:
     """A run whose file goes by another name."""
-    header = trace.header
-    made_by = replace(header.provenance, model_file=file)
-    return Trace(replace(header, provenance=made_by), trace.columns)
+    made_by = replace(trace.header.provenance, model_file=file)
+    return Trace(replace(trace.header, provenance=made_by), trace.columns)
 
 
 def match_sides(one: Model, two: Model, request: Request) -> Matched | None:
@@ -139,8 +138,8 @@ def commands_alike(theirs: Trace, right: Trace) -> bool:
 
 def replace_layout(trace: Trace, model: Model, qpos: Array, qvel: Array, ctrl: Array) -> Trace:
     """A run as if it were one of another Model: states and commands, and nothing derived."""
-    header: Header = replace(trace.header, **layout_of(model))
-    return Trace(header, {"time": trace.time, "qpos": qpos, "qvel": qvel, "ctrl": ctrl})
+    columns = {"time": trace.time, "qpos": qpos, "qvel": qvel, "ctrl": ctrl}
+    return Trace(replace(trace.header, **layout_of(model)), columns)
 
 
 def with_bodies_of(trace: Trace, model: Model) -> Trace:

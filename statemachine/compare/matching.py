@@ -5,13 +5,15 @@ By name, then by structure: `description.match` says how, and `names` overrules 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from ..description.match import Matching, Pair, match, renamed
+from ..description.meshes import one_to_one
 from ..description.records import Robot
 from ..description.tree import GroupTree
 from ..engines import room
@@ -63,11 +65,6 @@ class Matched:
     solids: tuple[BodyPair, ...]
     only: tuple[Only, Only]
     notes: tuple[str, ...]
-
-    @property
-    def whole(self) -> bool:
-        """Whether every joint and every actuator has its counterpart."""
-        return not any(only.get(kind) for only in self.only for kind in ("joint", "actuator"))
 
     @property
     def reordered(self) -> bool:
@@ -152,7 +149,10 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
         one=one,
         two=two,
         joints=joints,
-        bodies=_bodies(one, two, solids, given),
+        bodies=_and_further(
+            ((solid.one, solid.two) for solid in solids),
+            _by_name(one.body_names, two.body_names, given),
+        ),
         sites=sites,
         actuators=actuators,
         solids=solids,
@@ -176,9 +176,8 @@ def match_alike(one: Model, two: Model) -> Matched:
                 f"matched by name: the two sides have other names of a {kind}"
             )
         pairs[kind] = tuple((k, k) for k in range(len(names[0])))
-    only: tuple[Only, Only] = {}, {}
     return Matched(
-        one, two, pairs["joint"], pairs["body"], pairs["site"], pairs["actuator"], (), only, ()
+        one, two, pairs["joint"], pairs["body"], pairs["site"], pairs["actuator"], (), ({}, {}), ()
     )
 
 
@@ -218,6 +217,11 @@ def _by_name(ours: Sequence[str], theirs: Sequence[str], given: Mapping[str, str
     return tuple((k, there[name]) for k, name in enumerate(wanted) if name in there)
 
 
+def _and_further(pairs: Iterable[tuple[int, int]], further: Iterable[tuple[int, int]]) -> Pairs:
+    """Pairs, and of some further ones, in turn, those whose ends are both left."""
+    return tuple(sorted(one_to_one(further, pairs).items()))
+
+
 def _sites(
     one: Model,
     two: Model,
@@ -235,51 +239,28 @@ def _sites(
         for tree in trees
     ]
 
-    def in_one_place(a: int, b: int) -> bool:
-        (number, place), (there, other) = places[0][a], places[1][b]
+    def in_one_place(sites: tuple[int, int]) -> bool:
+        (number, place), (there, other) = places[0][sites[0]], places[1][sites[1]]
         pair = found.of(number)
         if pair is None or there != pair.two.number:
             return False
         return (pair.align @ place).distance(other) < _ONE_PLACE
 
-    return _by_name_then(one.site_names, two.site_names, given, in_one_place)
+    places_of = product(range(one.nsite), range(two.nsite))
+    return _and_further(
+        _by_name(one.site_names, two.site_names, given), filter(in_one_place, places_of)
+    )
 
 
 def _actuators(one: Model, two: Model, joints: Pairs, given: Mapping[str, str]) -> Pairs:
     """By name, then by the joint: the n-th of a joint is the n-th of its counterpart."""
-
-    def of_one_joint(a: int, b: int) -> bool:
-        return (int(one.actuator_jntid[a]), int(two.actuator_jntid[b])) in joints
-
-    return _by_name_then(one.actuator_names, two.actuator_names, given, of_one_joint)
-
-
-def _by_name_then(
-    ours: Sequence[str],
-    theirs: Sequence[str],
-    given: Mapping[str, str],
-    fits: Callable[[int, int], bool],
-) -> Pairs:
-    """By name; of what is left, each with the first that fits."""
-    pairs = dict(_by_name(ours, theirs, given))
-    left = [b for b in range(len(theirs)) if b not in pairs.values()]
-    for a in range(len(ours)):
-        fitting = [b for b in left if a not in pairs and fits(a, b)]
-        if fitting:
-            pairs[a] = fitting[0]
-            left.remove(fitting[0])
-    return tuple(sorted(pairs.items()))
-
-
-def _bodies(one: Model, two: Model, solids: Sequence[BodyPair], given: Mapping[str, str]) -> Pairs:
-    """The rigid parts, and the bodies fixed to them by their names."""
-    pairs = {solid.one: solid.two for solid in solids}
-    taken = set(pairs.values())
-    for a, b in _by_name(one.body_names, two.body_names, given):
-        if a not in pairs and b not in taken:
-            pairs[a] = b
-            taken.add(b)
-    return tuple(sorted(pairs.items()))
+    of_one_joint = (
+        (a, b)
+        for a, joint in enumerate(one.actuator_jntid.tolist())
+        for b, other in enumerate(two.actuator_jntid.tolist())
+        if (joint, other) in joints
+    )
+    return _and_further(_by_name(one.actuator_names, two.actuator_names, given), of_one_joint)
 
 
 def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:

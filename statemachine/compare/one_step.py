@@ -8,6 +8,7 @@ held side by side. A difference is then of that step, of that stage and of that 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,7 @@ from ..interface import (
     set_state,
     step,
 )
+from ..runs.derived import put_row
 from ..runs.drive import Progress, silent
 from .matching import Matched, match_models
 from .perturbed import Rerun
@@ -144,19 +146,14 @@ def _states(
     model = rerun.model
     reset(model, data, rerun.keyframe)
     for k in range(len(inputs["time"]) - 1):
-        for name in ("qpos", "qvel"):
-            if getattr(data, name).tobytes() != inputs[name][k].tobytes():
-                getattr(data, name)[:] = inputs[name][k]
-        data.ctrl[:] = inputs["ctrl"][k]
+        put_row(data, inputs, k)
         if k % every:
             step(model, data)
             continue
         before = {}
         for name in _BEFORE if k else ():
-            try:
+            with suppress(UnsupportedError):
                 before[name] = np.array(getattr(data, name))
-            except UnsupportedError:
-                continue
         yield k, get_state(model, data), before
 
 

@@ -109,8 +109,7 @@ def _curve(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
 
 def _turned(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
     """Rotation matrices (n, 3, 3)."""
-    none = np.empty(0)
-    return Series(name, kind, time, none, none, angle_between(one, two))
+    return Series(name, kind, time, np.empty(0), np.empty(0), angle_between(one, two))
 
 
 def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
@@ -144,8 +143,8 @@ def default_tip(*headers: Header) -> str:
 
 def normal_forces(trace: Trace) -> dict[str, Array]:
     """Sum of the normal contact forces (n,) [N] between each pair of bodies."""
-    sums = _sums(trace, trace["contact_force"][:, :1])
-    return {pair: normal[:, 0] for pair, normal in sums.items()}
+    normals = trace["contact_force"][:, :1]
+    return {pair: total[:, 0] for pair, total in _sums(trace, normals).items()}
 
 
 def total_forces(trace: Trace) -> dict[str, Array]:
@@ -181,13 +180,10 @@ def tell(one: Trace, two: Trace, column: str) -> bool:
 
     Of contacts a run without any tells all that there is.
     """
-    for trace in (one, two):
-        if column not in trace:
-            return False
-        array = trace[column]
-        if array.size and np.isnan(array).all():
-            return False
-    return True
+    return all(
+        column in trace and not (trace[column].size and np.isnan(trace[column]).all())
+        for trace in (one, two)
+    )
 
 
 @dataclass(frozen=True)

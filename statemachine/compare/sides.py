@@ -114,17 +114,17 @@ class TakenParts:
         """
         giver = load(self.of.file, menagerie=self.of.menagerie)
         matched = match_models(giver, model, self.names)
-        kinds = ("joint", "body", "site")
-        pairs = (matched.joints, matched.bodies, matched.sites)
+        pairs = {"joint": matched.joints, "body": matched.bodies, "site": matched.sites}
         names = {
             kind: {
                 getattr(giver, f"{kind}_names")[a]: getattr(model, f"{kind}_names")[b]
                 for a, b in of_kind
             }
-            for kind, of_kind in zip(kinds, pairs, strict=True)
+            for kind, of_kind in pairs.items()
         }
-        raw = room(DEFAULT).with_parts(model.path, giver.path, self.parts, names)
-        return model.with_compiled(raw)
+        return model.with_compiled(
+            room(DEFAULT).with_parts(model.path, giver.path, self.parts, names)
+        )
 
 
 def with_options(

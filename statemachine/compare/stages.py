@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engines import room
-from ..errors import UnsupportedError
 from ..interface import Array, Data, Ints, JointType, Model
 from ..measures import ContactNames
 from ..rotations import angle_between, matrix_from_quat
+from ..runs.derived import array_or_nan
 from .matching import Matched
 
 KINEMATICS, MASS, FOUND, FORCE = "kinematics", "mass matrix", "contacts found", "contact force"
@@ -144,7 +144,7 @@ class StageReader:
         mass = self._rooms[side].mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
         found += [mass[rows, columns] for rows, columns in self._mass_units]
         for arrays in ARRAYS.values():
-            values = np.concatenate([_told(data, name, model.nv)[dofs] for name in arrays])
+            values = np.concatenate([array_or_nan(data, name)[dofs] for name in arrays])
             turns = np.tile(self._turns, len(arrays))
             found += [values[turns], values[~turns]]
         return found, self._touching(side, data)
@@ -223,11 +223,3 @@ def _dofs(model: Model, joints: Sequence[int]) -> tuple[Ints, list[str], NDArray
         free = [False] * 3 + [True] * 3
         turns += free if kind is JointType.FREE else [kind is not JointType.SLIDE] * kind.nv
     return np.array(dofs, dtype=np.int64), names, np.array(turns, dtype=bool)
-
-
-def _told(data: Data, name: str, size: int) -> Array:
-    """A derived array (nv,); NaN if the engine does not tell it."""
-    try:
-        return np.array(getattr(data, name))
-    except UnsupportedError:
-        return np.full(size, np.nan)

@@ -103,11 +103,10 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
     if trace is not None:
         pair, said = _of_trace(trace, models, options, matched, request, progress)
         commands: Loop = "recorded"
-        rights = [pair[1]]
     else:
         assert scenario is not None
         scenario = scenario.on(models[0])
-        reruns, said = _reruns(scenario, models, options, matched, request)
+        reruns, said = _reruns(scenario, models, options, matched, request, seconds)
         pair = tuple(
             rerun.record(
                 experiment=scenario.name,
@@ -117,17 +116,22 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
             )
             for place, rerun in enumerate(reruns)
         )
-        rights = [pair[1]]
         theirs = in_terms_of_right(pair[0], pair[1], matched)
         if any(run.header.rewritten for run in pair):
             commands = "more than ctrl"
-        elif same_commands(theirs, pair[1]):
-            commands = "the same"
         else:
-            commands = "its own"
-            told = part_of(progress, 0.7, 0.3)
-            rights.append(_played(theirs, models[1], options[1], right, told))
-    one = pair[0]
+            commands = "the same" if same_commands(theirs, pair[1]) else "its own"
+    one, *rights = pair
+    if commands == "its own":
+        rights.append(
+            play(
+                in_terms_of_right(one, pair[1], matched),
+                models[1],
+                defaults=right.defaults,
+                options=options[1],
+                progress=part_of(progress, 0.7, 0.3),
+            )
+        )
     a, b = (run.header.provenance.model_file for run in pair)
     if left.path != right.path and a == b:  # as much of the paths as tells them apart
         names = files_apart(left.path.parts, right.path.parts)
@@ -168,10 +172,10 @@ def _reruns(
     options: list[dict[str, Any]],
     matched: Matched | None,
     request: Request,
+    seconds: float,
 ) -> tuple[tuple[Rerun, Rerun], tuple[str, ...]]:
     """How each side is run; what an experiment tells the left, the right is told too."""
     left, right = models
-    seconds = scenario.seconds if request.seconds is None else request.seconds
     for model in models:
         check_length(model, seconds)
     said = []
@@ -214,18 +218,18 @@ def _of_trace(
     """A recorded run's start and commands, on both sides."""
     _refuse_of_run(request)
     theirs = for_left(trace, models[0], request)
-    left, right = request.sides
-    one = _played(theirs, models[0], options[0], left, part_of(progress, 0.0, 0.5))
-    told = theirs if matched is None else in_terms_of_right(theirs, None, matched)
-    two = _played(told, models[1], options[1], right, part_of(progress, 0.5, 0.5))
+    one, two = (
+        play(
+            recorded,
+            models[k],
+            defaults=request.sides[k].defaults,
+            options=options[k],
+            progress=part_of(progress, 0.5 * k, 0.5),
+        )
+        for k, recorded in enumerate((theirs, in_terms_of_right(theirs, None, matched)))
+    )
     said = f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
     return (one, two), (said,)
-
-
-def _played(
-    theirs: Trace, model: Model, options: dict[str, Any], side: Side, progress: Progress
-) -> Trace:
-    return play(theirs, model, defaults=side.defaults, options=options, progress=progress)
 
 
 def sides_of(
@@ -286,8 +290,7 @@ def recorded_sides(
     _refuse_of_run(request)
     sides = request.sides or tuple(_side_of(request, k, trace) for k, trace in enumerate(traces))
     if len(sides) == 1:
-        other = _other_backend(request, sides[0].engine)
-        sides = (*sides, replace(sides[0], engine=other, defaults=request.defaults))
+        sides = (*sides, _other_side(request, sides[0]))
     header = traces[0].header
     seconds = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
 
@@ -296,25 +299,27 @@ def recorded_sides(
 
     options = header.options if request.sides else {}
     name, says = header.experiment, header.says
-    made = Scenario(name, says, "", seconds, controller, lambda _: says, options=options)
-    return made, (sides[0], sides[1]), traces
+    again = Scenario(name, says, "", seconds, controller, lambda _: says, options=options)
+    return again, (sides[0], sides[1]), traces
 
 
 def _side_of(request: Request, place: int, trace: Trace) -> Side:
     """What a trace was recorded of."""
     header = trace.header
-    file, _ = model_file(header, request.menagerie, request.what[place])
     options = {**header.options, **request.options}
     defaults = "engine" if header.defaults == "engine" else "model"
-    return Side(str(request.model or file), header.backend, defaults, options)
+    if request.model:
+        return Side(request.model, header.backend, defaults, options, request.menagerie)
+    file, _ = model_file(header, request.menagerie, request.what[place])
+    return Side(str(file), header.backend, defaults, options)
 
 
-def _other_backend(request: Request, own: str) -> str:
-    """The backend of a request that is not that of a trace."""
+def _other_side(request: Request, own: Side) -> Side:
+    """What a trace was recorded of, on the backend of a request that is not the trace's."""
     for name in request.backends:
-        if name != own:
-            return name
-    raise BadInputError(f"the trace is of {own}: name another with --backends")
+        if name != own.engine:
+            return replace(own, engine=name, defaults=request.defaults)
+    raise BadInputError(f"the trace is of {own.engine}: name another with --backends")
 
 
 def _refuse_of_run(request: Request, **given: bool) -> None:
@@ -376,26 +381,14 @@ def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace
     if len(opened) == 2:
         return (opened[0], opened[1]), ()
     (trace,) = opened
-    other = _other_backend(request, trace.header.backend)
-    name: str | Path | None = request.model
-    if name is None:
-        name, _ = model_file(trace.header, request.menagerie, request.what[0])
-    model = load(
-        name,
-        backend=other,
-        defaults=request.defaults,
-        menagerie=request.menagerie if request.model else None,
-    )
-    options = {**trace.header.options, **request.options}
-    if options:
-        model = model.replace(**options)
+    side, what = _other_side(request, _side_of(request, 0, trace)), request.what[0]
     played = play(
         trace,
-        model,
-        command=command(["statemachine", "trace", "play", request.what[0], "--backend", other]),
-        defaults=request.defaults,
-        options=options,
+        side.load(),
+        command=command(["statemachine", "trace", "play", what, "--backend", side.engine]),
+        defaults=side.defaults,
+        options=dict(side.options),
         progress=progress,
     )
-    said = f"the ctrl of {request.what[0]} was played on {other}, from the state it starts in"
+    said = f"the ctrl of {what} was played on {side.engine}, from the state it starts in"
     return (trace, played), (said,)

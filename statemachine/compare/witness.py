@@ -66,9 +66,14 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
             return None
     except StateMachineError:
         return None
-    rows = len(one) + len(two)
-    by = f"{WITNESS} {kinematics.version}"
-    return Witness(by, site, first, second, rows, kinematics.grade)
+    return Witness(
+        by=f"{WITNESS} {kinematics.version}",
+        site=site,
+        one=first,
+        two=second,
+        rows=len(one) + len(two),
+        grade=kinematics.grade,
+    )
 
 
 def _readable(file: Path, header: Header, site: str) -> Kinematics:

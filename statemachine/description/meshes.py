@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -92,10 +92,17 @@ def bounds_of(shape: CollisionShape) -> Array:
 def likest(ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]) -> dict[int, int]:
     """Which shape of a part is which of another, both in one frame: by name, then by likeness."""
     costs = sorted((_misfit(a, b), k, i) for k, a in enumerate(ours) for i, b in enumerate(theirs))
-    pairs: dict[int, int] = {}
-    for _, k, i in costs:
-        if k not in pairs and i not in pairs.values():
-            pairs[k] = i
+    return one_to_one((k, i) for _, k, i in costs)
+
+
+def one_to_one(
+    candidates: Iterable[tuple[int, int]], known: Iterable[tuple[int, int]] = ()
+) -> dict[int, int]:
+    """Known pairs, and of the candidates, in turn, those whose ends are both left."""
+    pairs = dict(known)
+    for one, two in candidates:
+        if one not in pairs and two not in pairs.values():
+            pairs[one] = two
     return pairs
 
 

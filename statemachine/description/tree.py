@@ -141,7 +141,16 @@ class GroupTree:
         return found
 
     @cached_property
-    def _whole(self) -> list[Inertial]:
+    def reach(self) -> float:
+        """How far links and frames are from the root at zero [m]."""
+        world = self.poses()
+        points = [world[number].of(place.pos) for number, place in self.frames.values()]
+        points += [place.of(g.inertial.com) for g, place in zip(self.groups, world, strict=True)]
+        return max(float(np.linalg.norm(point)) for point in points) or 1.0
+
+    @cached_property
+    def carried(self) -> list[Inertial]:
+        """By number each group and all beyond it, as one body at zero, in the group's frame."""
         found = [group.inertial for group in self.groups]
         for group in reversed(self.groups):  # children before parents
             if group.parent >= 0:
@@ -149,16 +158,12 @@ class GroupTree:
                 found[group.parent] = together([found[group.parent], held])
         return found
 
-    def carried(self, number: int) -> Inertial:
-        """A group and all beyond it, as one body at zero, in the group's frame."""
-        return self._whole[number]
-
     def inertia(self, number: int) -> float:
         """M_ii of the group's joint at zero, armature included [kg m² or kg]."""
         joint = self.groups[number].joint
         if joint is None or joint.kind not in ("hinge", "slide"):
             return math.nan
-        body, rotor = self.carried(number), joint.armature or 0.0
+        body, rotor = self.carried[number], joint.armature or 0.0
         if joint.kind == "slide":
             return body.mass + rotor
         tensor = body.tensor + _shifted(body.mass, body.com - joint.anchor)
@@ -172,7 +177,7 @@ class GroupTree:
         joint = self.groups[number].joint
         if joint is None or joint.kind not in ("hinge", "slide"):
             return math.nan
-        body = self.carried(number)
+        body = self.carried[number]
         if joint.kind == "slide":
             return body.mass * gravity
         arm = np.cross(joint.axis, body.com - joint.anchor)

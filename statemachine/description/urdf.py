@@ -58,9 +58,9 @@ def _parse(path: Path) -> Element:
         parser = ElementTree.XMLParser(target=_Builder())
         parser.feed(path.read_bytes())
         root = parser.close()
+    except ModelError:
+        raise
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        if isinstance(error, ModelError):
-            raise
         raise ModelError(f"it is no XML: {error}") from None
     if root.tag != "robot":
         raise ModelError(f"it is no URDF: its root element is <{root.tag}>, not <robot>")
@@ -80,23 +80,13 @@ class _Reader:
         self._meshes: dict[str, tuple[Array | None, str]] = {}
 
     def robot(self) -> Robot:
-        elements = {}
-        for link in self.root.findall("link"):
-            name = _name(link)
-            if name in elements:
-                raise ModelError(f"two links are called {name!r}")
-            elements[name] = link
+        elements = _by_name(self.root, "link")
         if len(elements) > _MOST:
             raise ModelError(f"it has {len(elements):,} links, and {_MOST:,} are the most here")
         if not elements:
             raise ModelError("it has no <link>")
         hung: dict[str, tuple[str, Element]] = {}
-        names: set[str] = set()
-        for joint in self.root.findall("joint"):
-            name = _name(joint)
-            if name in names:
-                raise ModelError(f"two joints are called {name!r}")
-            names.add(name)
+        for joint in _by_name(self.root, "joint").values():
             parent, child = _end(joint, "parent", elements), _end(joint, "child", elements)
             if child in hung:
                 raise ModelError(f"link {child!r} hangs on two joints")
@@ -183,6 +173,16 @@ class _Reader:
             )
             return None
         return points * scale
+
+
+def _by_name(root: Element, tag: str) -> dict[str, Element]:
+    elements: dict[str, Element] = {}
+    for element in root.findall(tag):
+        name = _name(element)
+        if name in elements:
+            raise ModelError(f"two {tag}s are called {name!r}")
+        elements[name] = element
+    return elements
 
 
 def _name(element: Element) -> str:

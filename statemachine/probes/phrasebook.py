@@ -86,13 +86,12 @@ def run(
 
 def _phrase(own: Phrases, concepts: Sequence[str]) -> Phrase:
     """Run the cells up to the last concept, so that its check may do what it likes."""
-    names: dict[str, Any] = {}
     cell = own.cells[concepts[-1]]
     said = ""
     with tempfile.TemporaryDirectory() as folder, silence():
         file = Path(folder) / own.file[0]
         file.write_text(own.file[1], encoding="utf-8")
-        names["file"] = str(file)
+        names: dict[str, Any] = {"file": str(file)}
         try:
             for concept in concepts:
                 exec(own.cells[concept].code, names)

@@ -79,7 +79,8 @@ class Freshness:
         title = f"Derived values of {self.model} on {self.backend} {self.engine_version}"
         cells = [(row.name, row.of, told(row.gaps) or "–") for row in self.rows]
         lines = table(("array", "of", "how far off"), cells)
-        return "\n".join([f"{title} at {self.time:g} s", *lines, *wrapped(self.notes)])
+        notes = (line for note in self.notes for line in textwrap.wrap(note, WIDTH))
+        return "\n".join([f"{title} at {self.time:g} s", *lines, *notes])
 
     __repr__ = __str__
 
@@ -121,11 +122,6 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
             start = " " * indent
     lines.insert(1, "-" * max(map(len, lines)))
     return lines
-
-
-def wrapped(notes: Iterable[str]) -> list[str]:
-    """Notes as lines that fit."""
-    return [line for note in notes for line in textwrap.wrap(note, WIDTH)]
 
 
 def told(found: Sequence[Gap]) -> str:

@@ -103,8 +103,10 @@ class _Examination:
         try:
             yield
         except Exception as error:  # what nobody meant to raise is what is looked for
-            words = " ".join(f"{name}: {type(error).__name__}: {error}".split())
-            self.row = replace(self.row, faults=(*self.row.faults, words[:300]))
+            self._fault(f"{name}: {type(error).__name__}: {error}")
+
+    def _fault(self, words: str) -> None:
+        self.row = replace(self.row, faults=(*self.row.faults, _line(words)[:300]))
 
     def _put(self, backend: str, **found: Any) -> None:
         row = replace(self.row.backends.get(backend, BackendRow()), **found)
@@ -116,45 +118,29 @@ class _Examination:
 
     def _load(self, backend: str) -> None:
         self.tell(self.row, f"loading, {backend}")
-        refusals: dict[bool, str] = {}
-        features: tuple[str, ...] = ()
-        told: dict[bool, tuple[str, ...]] = {}
-        for contacts, kept in ((True, self.models), (False, self.without)):
-            options: dict[str, Any] = {} if contacts else {"contacts": False}
+        facts: dict[str, Any] = {}
+        for models, case in ((self.models, ""), (self.without, "_without")):
+            options: dict[str, Any] = {"contacts": False} if case else {}
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
                 try:
-                    kept[backend] = load(self.path, backend, **options)
-                    refusals[contacts] = ""
+                    models[backend] = load(self.path, backend, **options)
                 except MissingEngineError:
                     raise
                 except StateMachineError as error:
-                    refusals[contacts] = " ".join(str(error).split())
-                    features = features or _features(error)
+                    facts[f"refusal{case}"] = _line(error)
+                    facts.setdefault("features", _features(error))
                 except Exception as error:
-                    words = f"{type(error).__name__}: {error}"
-                    refusals[contacts] = " ".join(words.split())
-                    fault = f"loading, {backend}: {refusals[contacts]}"
-                    self.row = replace(self.row, faults=(*self.row.faults, fault[:300]))
-            told[contacts] = self._of_its_own(backend, caught)
-        self._put(
-            backend,
-            refusal=refusals[True],
-            refusal_without=refusals[False],
-            features=features,
-            warnings=told[True],
-            warnings_without=told[False],
-        )
+                    refusal = facts[f"refusal{case}"] = _line(f"{type(error).__name__}: {error}")
+                    self._fault(f"loading, {backend}: {refusal}")
+            facts[f"warnings{case}"] = self._of_its_own(backend, caught)
+        self._put(backend, **facts)
 
     def _of_its_own(
         self, backend: str, caught: Sequence[warnings.WarningMessage]
     ) -> tuple[str, ...]:
         """Warnings of a backend that the default one did not give, too, each once."""
-        texts = [
-            " ".join(str(each.message).split())
-            for each in caught
-            if issubclass(each.category, EngineWarning)
-        ]
+        texts = [_line(each.message) for each in caught if issubclass(each.category, EngineWarning)]
         first = self.row.backends.get(DEFAULT)
         if first is not None and backend != DEFAULT:
             known = [text.partition(": ")[2] for text in first.warnings]
@@ -206,7 +192,7 @@ class _Examination:
         try:
             record_scenario(scenario(name), model, seconds=_SHORT * model.timestep, seed=self.seed)
         except (BadInputError, UnsupportedError) as error:  # it says that it makes no sense here
-            return " ".join(str(error).split())
+            return _line(error)
         return RUNS
 
     def _cost(self, model: Model) -> float | None:
@@ -232,21 +218,20 @@ class _Examination:
 
 
 def _witness_row(model: Model, seed: int) -> WitnessRow:
-    """Compare every end of the robot at random poses.
-
-    Raises:
-        MissingEngineError: The witness is not installed here.
-    """
+    """Compare every end of the robot at random poses."""
     try:
         found = certify(model, poses=_POSES, seed=seed)
-    except MissingEngineError:
-        raise
     except StateMachineError as error:
-        return WitnessRow(refusal=" ".join(str(error).split()))
+        return WitnessRow(refusal=_line(error))
     gap = found.position_worst
     if gap is None:  # its frame is another one than the engine's
         gap = float("inf") if found.frames is None else found.frames.distance
     return WitnessRow(found.grade, found.reason, len(found.tips), gap)
+
+
+def _line(words: object) -> str:
+    """What is said, in one line."""
+    return " ".join(str(words).split())
 
 
 def _features(error: StateMachineError) -> tuple[str, ...]:

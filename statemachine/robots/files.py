@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -62,8 +63,9 @@ def find(paths: Sequence[str | os.PathLike[str]]) -> list[ModelFile]:
         raise BadInputError(f"no models (MJCF or URDF) in {', '.join(map(str, paths))}")
     owners: dict[Path, str] = {}
     for each in found.values():
-        for part in _parts(each.path):
-            owners.setdefault(part.resolve(), each.name)
+        with suppress(ValueError, OSError):
+            for part in list(model_files(each.path))[1:]:  # what it includes
+                owners.setdefault(part.resolve(), each.name)
     return [
         replace(
             each, path=each.path.absolute(), sha256=_digest(each.path), part_of=owners.get(path, "")
@@ -109,20 +111,9 @@ def _has_bodies(file: Path) -> bool:
         return True
 
 
-def _parts(file: Path) -> Iterator[Path]:
-    """The files that a model includes."""
-    try:
-        yield from list(model_files(file))[1:]
-    except (UnicodeError, ValueError, OSError):
-        return
-
-
 def _digest(file: Path) -> str:
-    try:
+    with suppress(ValueError, OSError):
         return model_digest(file)
-    except (UnicodeError, ValueError, OSError):
-        pass
-    try:
+    with suppress(OSError):
         return hashlib.sha256(file.read_bytes()).hexdigest()
-    except OSError:
-        return ""
+    return ""

@@ -112,8 +112,7 @@ class BackendRow:
         if gap is None:
             return False
         accounted = gap.first_order or gap.is_rounding or self.warnings_without
-        beyond = gap.largest > TOLERANCE and not accounted
-        return beyond or bool(gap.ended)
+        return bool(gap.ended) or (gap.largest > TOLERANCE and not accounted)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -41,13 +41,7 @@ def derived(
     with make_data(model) as data:
         begin(model, data)
         for k in range(rows):
-            differs = False
-            for name in ("qpos", "qvel"):
-                if getattr(data, name).tobytes() != inputs[name][k].tobytes():
-                    getattr(data, name)[:] = inputs[name][k]
-                    differs = True
-            rewritten += differs
-            data.ctrl[:] = inputs["ctrl"][k]
+            rewritten += put_row(data, inputs, k)
             if data.time != inputs["time"][k]:
                 data.time = float(inputs["time"][k])
             if not after:
@@ -70,6 +64,15 @@ def derived(
     return columns, rewritten
 
 
+def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
+    """Write row `k` of the inputs into a Data; whether it was in another state."""
+    others = [n for n in ("qpos", "qvel") if getattr(data, n).tobytes() != inputs[n][k].tobytes()]
+    for name in others:
+        getattr(data, name)[:] = inputs[name][k]
+    data.ctrl[:] = inputs["ctrl"][k]
+    return bool(others)
+
+
 def _one_more(model: Model, data: Data) -> None:
     """The step that the last row would begin, so that it too is of the run itself.
 
@@ -84,15 +87,19 @@ def _one_more(model: Model, data: Data) -> None:
         forward(model, data)
 
 
+def array_or_nan(data: Data, name: str) -> Array:
+    """A derived array of a Data, copied; one that the backend does not tell is (nv,) NaN."""
+    try:
+        return np.array(getattr(data, name))  # it may be the engine's memory
+    except UnsupportedError:
+        return np.full(np.shape(data.qvel), np.nan)
+
+
 def _read(
     data: Data, row: int, kept: dict[str, list[Array]], contacts: dict[str, list[Any]]
 ) -> None:
     for name, values in kept.items():
-        try:
-            values.append(np.array(getattr(data, name)))  # it may be the engine's memory
-        except UnsupportedError:
-            shape = np.shape(data.qvel)
-            values.append(np.full(shape, np.nan))
+        values.append(array_or_nan(data, name))
     found = data.contacts
     if len(found):
         contacts["contact_row"].append(np.full(len(found), row))

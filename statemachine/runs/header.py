@@ -228,10 +228,6 @@ def _each(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, tuple) and all(map(fits, value))
 
 
-def _words(value: Any) -> bool:
-    return isinstance(value, dict) and all(map(_text, (*value, *value.values())))
-
-
 def _option(name: str, value: Any) -> bool:
     """Whether `Model.replace` might take this; it looks closer."""
     known = isinstance(value, bool) or _text(value) or _finite(value) or _each(_finite)(value)
@@ -276,7 +272,9 @@ _KINDS: dict[str, Callable[[Any], bool]] = {
 }
 _OF_PROVENANCE: dict[str, Callable[[Any], bool]] = {
     "backend": _text,
-    "versions": _words,
+    "versions": lambda value: (
+        isinstance(value, dict) and all(map(_text, (*value, *value.values())))
+    ),
     "model_file": _text,
     "model_sha256": _text,
     "timestep": _number,

@@ -37,7 +37,9 @@ def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
         header = _read_header(archive, entries.pop("header"))
         described = {name: _describe(archive, entry) for name, entry in entries.items()}
         for name, (_, kind) in described.items():
-            _check_kind(name, kind)
+            if kind.kind not in ("iu" if name in WHOLE else "fiu"):
+                what = "whole numbers" if name in WHOLE else "numbers"
+                raise TraceError(f"column {name!r} holds {kind}, not {what}")
         check_shapes(header, {name: shape for name, (shape, _) in described.items()})
         check_size(sum(8 * int(np.prod(shape)) for shape, _ in described.values()), path)
         return header, {
@@ -80,12 +82,6 @@ def _read_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
     if shape[0] > _HEADER_MOST:
         raise TraceError(f"has a header of {shape[0]:,} bytes; at most {_HEADER_MOST:,}")
     return Header.from_json(_unfold(archive, entry).tobytes().decode())
-
-
-def _check_kind(name: str, kind: np.dtype[Any]) -> None:
-    if kind.kind not in ("iu" if name in WHOLE else "fiu"):
-        what = "whole numbers" if name in WHOLE else "numbers"
-        raise TraceError(f"column {name!r} holds {kind}, not {what}")
 
 
 def _unfold(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Any:

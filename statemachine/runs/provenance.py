@@ -42,15 +42,20 @@ def provenance(model: Model, seed: int | None = None, **others: str) -> Provenan
         "python": platform.python_version(),
         **others,
     }
-    # The folder and name, not the machine's path: a result is read elsewhere.
-    name = "/".join(model.path.parts[-2:]).encode(errors="replace").decode()
-    digest = model_digest(model.path)
-    emulated = tuple(
-        name
-        for name, behaviour in model.capabilities.behaviours.items()
-        if behaviour.support == "emulated"
+    return Provenance(
+        backend=model.backend,
+        versions=versions,
+        # The folder and name, not the machine's path: a result is read elsewhere.
+        model_file="/".join(model.path.parts[-2:]).encode(errors="replace").decode(),
+        model_sha256=model_digest(model.path),
+        timestep=model.timestep,
+        emulated=tuple(
+            name
+            for name, behaviour in model.capabilities.behaviours.items()
+            if behaviour.support == "emulated"
+        ),
+        seed=seed,
     )
-    return Provenance(model.backend, versions, name, digest, model.timestep, emulated, seed)
 
 
 def model_digest(path: Path) -> str:

@@ -40,6 +40,7 @@ def record(
     defaults: Literal["model", "engine"] = "model",
     options: dict[str, Any] | None = None,
     seed: int | None = None,
+    writes_state: bool = True,
     progress: Progress = silent,
 ) -> Trace:
     """Run a controller from a start, and keep everything.
@@ -60,6 +61,7 @@ def record(
         defaults: What `load` was given, for the header; options: what `replace` was.
         options: See defaults.
         seed: What the controller was drawn from, for the header.
+        writes_state: Whether the controller may write more than ctrl.
         progress: Told the fraction that is done.
 
     Returns:
@@ -92,8 +94,11 @@ def record(
     rewritten, energy_by = 0, ""
     if derive:
         told, rewritten = derived(model, begin, inputs, part_of(progress, share, 1.0 - share))
-        if rewritten and controller is None:
-            raise _not_repeated(rewritten)
+        if rewritten and (controller is None or not writes_state):
+            raise EngineError(
+                f"the run could not be repeated: {rewritten} rows began in another state; the "
+                "engine does not give the same bits twice"
+            )
         columns |= told
         columns["energy"], energy_by = energies(
             model, defaults, inputs["qpos"], inputs["qvel"], (options or {}).get("gravity")
@@ -104,7 +109,10 @@ def record(
         command=command,
         provenance=provenance(model, seed),
         defaults=defaults,
-        options={name: _plain(value) for name, value in (options or {}).items()},
+        options={
+            name: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+            for name, value in (options or {}).items()
+        },
         keyframe=None if keyframe is None else model.keyframes[model.key_id(keyframe)].name,
         timestep=model.timestep,
         substeps=model.substeps,
@@ -151,7 +159,7 @@ def record_scenario(
     replaced = model.replace(**chosen) if chosen else model
     seconds = scenario.seconds if seconds is None else seconds
     check_length(replaced, seconds)
-    trace = record(
+    return record(
         replaced,
         scenario.controller(replaced, seed),
         seconds,
@@ -162,11 +170,9 @@ def record_scenario(
         defaults=defaults,
         options=chosen,
         seed=seed if scenario.seeded else None,
+        writes_state=scenario.own,  # ours write nothing but ctrl
         progress=progress,
     )
-    if trace.header.rewritten and not scenario.own:  # ours write nothing but ctrl
-        raise _not_repeated(trace.header.rewritten)
-    return trace
 
 
 def play(
@@ -197,7 +203,7 @@ def play(
             )
     if (header.nq, header.nv) != (model.nq, model.nv):
         raise TraceError("the trace's joints are of other kinds than the model's")
-    played = record(
+    return record(
         model,
         commands_of(trace),
         float(trace.time[-1] - trace.time[0]),
@@ -209,11 +215,9 @@ def play(
         defaults=defaults,
         options=options,
         seed=header.provenance.seed,
+        writes_state=False,
         progress=progress,
     )
-    if played.header.rewritten:
-        raise _not_repeated(played.header.rewritten)
-    return played
 
 
 def commands_of(trace: Trace) -> Controller:
@@ -251,13 +255,6 @@ def layout_of(model: Model) -> dict[str, Any]:
         "actuator_jntid": tuple(model.actuator_jntid.tolist()),
         "ctrlrange": tuple(tuple(row) for row in model.actuator_ctrlrange.tolist()),
     }
-
-
-def _not_repeated(rows: int) -> EngineError:
-    return EngineError(
-        f"the run could not be repeated: {rows} rows began in another state; the engine does "
-        "not give the same bits twice"
-    )
 
 
 def _run(
@@ -298,7 +295,3 @@ def _run(
             raise BadInputError(f"the controller left {name} with an entry that is no number")
     progress(1.0)
     return found, ended
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value

@@ -60,18 +60,6 @@ def carried_by(model: Model, bodies: Iterable[int]) -> frozenset[int]:
     return frozenset(carried)
 
 
-def dofs_of(model: Model, bodies: frozenset[int]) -> list[int]:
-    """The degrees of freedom of the joints of these bodies."""
-    return [
-        int(start) + k
-        for start, kind, body in zip(
-            model.jnt_dofadr, model.jnt_type, model.jnt_bodyid, strict=True
-        )
-        if int(body) in bodies
-        for k in range(JointType(int(kind)).nv)
-    ]
-
-
 def moved_by_actuators(model: Model) -> frozenset[int]:
     """The robot's moving part: what the actuated joints carry."""
     joints = [joint for joint in model.actuator_jntid.tolist() if joint >= 0]

@@ -7,6 +7,7 @@ It is written for the SO-101; `Scenario.on` gives what it is on another robot.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -82,11 +83,9 @@ def fitting(model: Model) -> tuple[str, ...]:
     """Names of the scenarios that make sense on a Model."""
     names = []
     for each in SCENARIOS.values():
-        try:
+        with suppress(BadInputError):
             each.elsewhere(model)
-        except BadInputError:
-            continue
-        names.append(each.name)
+            names.append(each.name)
     return tuple(names)
 
 

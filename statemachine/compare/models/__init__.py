@@ -31,7 +31,7 @@ from ...errors import StateMachineError, UnsupportedError, unknown_name
 from ...installed import DEFAULT
 from ...models import SUFFIXES, resolve
 from .compiled import Compiled, compiled, enter_rest
-from .diff import Posed, diff, reach_of
+from .diff import Posed, diff
 from .engines import own_ways
 from .ledger import AgreedFigures, Difference, Ledger
 
@@ -200,7 +200,7 @@ def compare(
             skipped.append(f"what only a compiled model tells was not compared: {why}")
     book = Ledger(digits, sides.differences, sides.complete)
     posed, notes = diff(book, trees[0], trees[1], frames, seed)
-    skipped += enter_rest(book, sides, robots, reach_of(*trees))
+    skipped += enter_rest(book, sides, robots, max(tree.reach for tree in trees))
     for question, left, right in own_ways(*engines):
         book.differ("engine", "", question, (left, right), share=0.5)
     found = Found(
@@ -219,8 +219,8 @@ def compare(
         if robot.format != "URDF":  # which no engine has read
             engine, _, version = robot.reader.partition(" ")
             versions[engine] = version
-    files = _side(trees[0].robot), _side(robots[1])
-    return Compared(files[0], files[1], found, digits, versions, tuple(skipped))
+    left, right = _side(trees[0].robot), _side(robots[1])
+    return Compared(left, right, found, digits, versions, tuple(skipped))
 
 
 def _mass(robot: Robot) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -95,24 +95,19 @@ def compiled(
     matched = match_models(one, two, {a: b for a, b in names.items() if a in here})
     differences: dict[Key, list[ModelDifference]] = {}
     for difference in differences_of(one, two, matched):
-        for figure in _by_figure(difference):
+        setting = difference.kind in _SETTINGS
+        # Settings one by one.
+        rows = [(value,) for value in difference.values] if setting else [difference.values]
+        for figure in (replace(difference, values=values) for values in rows):
             where = names.get(figure.where, figure.where)
             if figure.kind == "body" and where in tree.at:
                 where = tree.groups[tree.at[where][0]].name
-            setting = figure.kind in _SETTINGS
             kind = "option" if setting else figure.kind
             usual = figure.values[0][0] if setting else figure.subject
             words = {_CALLED.get(name, usual) for name, _, _ in figure.values} or {usual}
             for word in sorted(words):
                 differences.setdefault((kind, where, word), []).append(figure)
     return Compiled(differences, matched, complete)
-
-
-def _by_figure(difference: ModelDifference) -> Iterable[ModelDifference]:
-    """Settings one by one; a part that is cut otherwise by mass, centre of mass and inertia."""
-    if difference.kind in _SETTINGS:
-        return [replace(difference, values=(value,)) for value in difference.values]
-    return [difference]
 
 
 def enter_rest(book: Ledger, sides: Compiled, robots: Sequence[Robot], reach: float) -> list[str]:
@@ -148,14 +143,13 @@ def _is_told(difference: ModelDifference) -> bool:
     names = {name.partition("[")[0] for name, _, _ in difference.values}
     if difference.subject in _UNTOLD or (names and names <= _UNTOLD_FIGURES):
         return False
-    told = _SUBJECTS.get(difference.kind, {})
-    return difference.kind in _SETTINGS or difference.subject in told
+    known = _SUBJECTS.get(difference.kind, {})
+    return difference.kind in _SETTINGS or difference.subject in known
 
 
 def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) -> None:
     """The figures of a difference, as the compiled models name them."""
-    setting = difference.kind in _SETTINGS
-    usual = "settings" if setting else "further"
+    usual = "settings" if difference.kind in _SETTINGS else "further"
     subject = _SUBJECTS.get(difference.kind, {}).get(difference.subject, usual)
     for name, *values in difference.values or (("", "as it is", "another"),):
         if name.endswith("limited") and len(difference.values) > 1:

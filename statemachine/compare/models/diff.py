@@ -61,7 +61,7 @@ def diff(
     """
     named = frame_names(one, two, frames)
     found = match(one, two)
-    reach = reach_of(one, two)
+    reach = max(one.reach, two.reach)
     notes = [*found.notes(), *_structure(book, one, two, found), *_suggestions(found)]
     for pair in found.pairs:
         above = found.of(pair.one.parent) if pair.one.parent >= 0 and not pair.moved else None
@@ -77,19 +77,6 @@ def diff(
     return _posed(found, one, two, seed), notes
 
 
-def reach_of(one: GroupTree, two: GroupTree) -> float:
-    """How far the larger of two robots reaches [m], which distances are set against."""
-    return max(_reach(one), _reach(two))
-
-
-def _reach(tree: GroupTree) -> float:
-    """How far its links and frames are from its root at zero [m]."""
-    world = tree.poses()
-    points = [world[number].of(place.pos) for number, place in tree.frames.values()]
-    points += [place.of(g.inertial.com) for g, place in zip(tree.groups, world, strict=True)]
-    return max(float(np.linalg.norm(point)) for point in points) or 1.0
-
-
 def _structure(book: Ledger, one: GroupTree, two: GroupTree, found: Matching) -> Iterator[str]:
     """Parts that only one has, other parents, and other names; what to note of them."""
     for side, (only, tree) in enumerate(((found.only_one, one), (found.only_two, two))):
@@ -98,7 +85,7 @@ def _structure(book: Ledger, one: GroupTree, two: GroupTree, found: Matching) ->
                 continue  # the world
             name = _label(group)
             kind = f"{group.joint.kind} joint" if group.joint else "fixed"
-            mass = f"carries {rounded(tree.carried(group.number).mass, 'kg')}"
+            mass = f"carries {rounded(tree.carried[group.number].mass, 'kg')}"
             sides = ("nothing", name) if side else (name, "nothing")
             keys = [("joint", name, "extra joint")]
             book.differ("structure", group.name, kind, sides, effect=mass, keys=keys)

@@ -11,17 +11,16 @@ _ASKED = ("actuation", "damping", "friction")
 
 def own_ways(one: str | None, two: str | None) -> tuple[tuple[str, str, str], ...]:
     """For each question that two engines answer otherwise: its title, and both answers."""
-    if one is None or two is None or one == two:
+    engines = [engine for engine in (one, two) if engine and room(engine).can("measurement")]
+    if len({*engines}) < 2:
         return ()
-    if not all(room(engine).can("measurement") for engine in (one, two)):
-        return ()
-    asked = conventions.probe((one, two), _ASKED)
-    found = []
-    for each in asked.questions:
-        left, right = (_in_words(each.findings[engine]) for engine in (one, two))
-        if left and right and left != right:
-            found.append((each.question.title, left, right))
-    return tuple(found)
+    answered = [
+        (asked.question.title, *(_in_words(asked.findings[engine]) for engine in engines))
+        for asked in conventions.probe(engines, _ASKED).questions
+    ]
+    return tuple(
+        (title, left, right) for title, left, right in answered if left and right and left != right
+    )
 
 
 def _in_words(answers: conventions.Answers | None) -> str:

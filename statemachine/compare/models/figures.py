@@ -13,7 +13,7 @@ from itertools import zip_longest
 import numpy as np
 
 from ...description.match import Pair
-from ...description.records import Actuator, Follows, RobotJoint, Setting
+from ...description.records import Actuator, RobotJoint, Setting
 from ...description.tree import GroupTree
 from ...measures.text import few, milliseconds, rounded
 from .ledger import Ledger, Telling
@@ -102,7 +102,12 @@ def of_joints(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree) -> None:
     scalar = a.kind in ("hinge", "slide")
     if scalar:
         _limits(book, a, b)
-        words = ["nothing" if j.follows is None else _follows(j.follows) for j in (a, b)]
+        words = [
+            f"{j.follows.joint}, {j.follows.factor:g} times, {j.follows.offset:+g}"
+            if j.follows
+            else "nothing"
+            for j in (a, b)
+        ]
         ties = [("equality", j.follows.label) for j in (a, b) if j.follows]
         keys = [(*tie, word) for tie in ties for word in ("extra equality", "what it keeps")]
         if words[0] != words[1]:
@@ -129,10 +134,6 @@ def of_joints(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree) -> None:
 def _joined(effects: Sequence[str]) -> str:
     """Those of both sides, one if they are the same."""
     return " / ".join(filter(None, dict.fromkeys(effects)))
-
-
-def _follows(rule: Follows) -> str:
-    return f"{rule.joint}, {rule.factor:g} times, {rule.offset:+g}"
 
 
 def _limits(book: Ledger, a: RobotJoint, b: RobotJoint) -> None:
@@ -219,10 +220,8 @@ def of_settings(book: Ledger, one: GroupTree, two: GroupTree) -> Iterator[str]:
 def _setting(
     book: Ledger, name: str, values: list[Setting], share: float, effect: str = ""
 ) -> None:
-    keys = [("option", "", name)]
-    book.enter(
-        "settings", "", name, values, _UNITS.get(name, ""), share=share, effect=effect, keys=keys
-    )
+    more: Telling = {"share": share, "effect": effect, "keys": [("option", "", name)]}
+    book.enter("settings", "", name, values, _UNITS.get(name, ""), **more)
 
 
 def _said(value: Setting) -> str:

@@ -8,7 +8,7 @@ compiled models, which `..why` explains a gap with.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypedDict, Unpack
 
@@ -41,6 +41,7 @@ SUBJECTS = {
     "further": "What else can change a motion",
     "engine": "What the engines do of themselves, measured on small models of their own",
 }
+_ORDER = tuple(SUBJECTS)
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,11 @@ class Telling(TypedDict, total=False):
     effect: str
     matters: bool
     keys: Sequence[Key]
+
+
+def plain(vector: Iterable[float]) -> tuple[float, ...]:
+    """A vector as a value of a difference."""
+    return tuple(map(float, vector))
 
 
 def digits_of(relative: float) -> int:
@@ -245,9 +251,8 @@ class Ledger:
 
     def agreements(self) -> Iterator[AgreedFigures]:
         """How well the rest agrees, by subject and unit."""
-        places = {subject: k for k, subject in enumerate(SUBJECTS)}
         for (subject, unit), entries in sorted(
-            self._equal.items(), key=lambda item: places[item[0][0]]
+            self._equal.items(), key=lambda item: _ORDER.index(item[0][0])
         ):
             relative = max(entry[0] for entry in entries)
             _, size, where = max(entries, key=lambda entry: entry[1])
@@ -258,13 +263,12 @@ class Ledger:
         weight: dict[str, float] = {}
         for row in self.differences:
             weight[row.subject] = max(weight.get(row.subject, -1.0), row.share + row.matters)
-        places = {subject: k for k, subject in enumerate(SUBJECTS)}
         return tuple(
             sorted(
                 self.differences,
                 key=lambda row: (
                     -round(weight[row.subject], 3),
-                    places[row.subject],
+                    _ORDER.index(row.subject),
                     not row.matters,
                     -round(row.share, 6),
                 ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import permutations
 
@@ -14,7 +14,7 @@ from ...description.meshes import bounds_of, likest
 from ...description.records import CollisionShape, Inertial
 from ...description.tree import Group, GroupTree
 from ...rotations import Placement, rotation
-from .ledger import Key, Ledger, Telling
+from .ledger import Key, Ledger, Telling, plain
 
 _SIDES = ("-x", "-y", "-z", "+x", "+y", "+z")
 _STILL = "stands still"
@@ -46,8 +46,7 @@ def of_masses(
     hinge = pair.two.joint is not None and pair.two.joint.kind == "hinge"
     effect = "{share:.1%} of it" if matters else _STILL
     more: Telling = {"matters": matters, "effect": effect, "keys": [("body", where, "mass")]}
-    masses = mine.mass, theirs.mass
-    book.enter("mass", where, "", masses, "kg", slack=2, **more)
+    book.enter("mass", where, "", (mine.mass, theirs.mass), "kg", slack=2, **more)
     if not heavy and not mine.tensor.any() and not theirs.tensor.any():
         return
     apart = float(np.linalg.norm(mine.com - theirs.com))
@@ -57,7 +56,7 @@ def of_masses(
     share = weight / max(load, weight) if load and hinge and weight else apart / reach
     effect = f"up to {weight:.2g} N·m" if hinge else "" if matters else _STILL
     book.measure(
-        *("centre of mass", where, "", apart, "m", reach, (_plain(mine.com), _plain(theirs.com))),
+        *("centre of mass", where, "", apart, "m", reach, (plain(mine.com), plain(theirs.com))),
         slack=4,
         share=share,
         effect=effect,
@@ -90,17 +89,13 @@ def _tensors(
     turned = np.allclose(*moments, rtol=16 * book.tolerance, atol=0)
     book.measure(
         *("inertia", pair.one.name, "axes" if turned else "moments", size, "kg m²", most),
-        (None, None) if turned else (_plain(moments[0]), _plain(moments[1])),
+        (None, None) if turned else (plain(moments[0]), plain(moments[1])),
         slack=8,
         share=share,
         effect=effect,
         matters=matters,
         keys=[("body", pair.one.name, "inertia")],
     )
-
-
-def _plain(vector: Iterable[float]) -> tuple[float, ...]:
-    return tuple(map(float, vector))
 
 
 def of_shapes(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree, reach: float) -> None:
@@ -112,10 +107,12 @@ def of_shapes(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree, reach: f
         assert known is not None
         label = f"{pair.one.name}: {known.name or (other or known).name or known.kind}"
         if shape is None or other is None:
-            kinds = [side.kind if side else "nothing" for side in (shape, other)]
-            keys = [("geom", known.label, "extra shape")]
-            share = 0.5 if ours and theirs else 1.0
-            book.differ("shapes", label, "shape", kinds, share=share, keys=keys)
+            book.differ(
+                *("shapes", label, "shape"),
+                [side.kind if side else "nothing" for side in (shape, other)],
+                share=0.5 if ours and theirs else 1.0,
+                keys=[("geom", known.label, "extra shape")],
+            )
             continue
         _solids(book, label, shape, other, reach)
         usual = one.robot.touch or two.robot.touch
@@ -140,16 +137,23 @@ def _solids(
     if shape.kind != other.kind:
         return
     if shape.size and other.size:
-        sizes = shape.size, other.size
-        book.enter("shapes", label, "size", sizes, "m", slack=2, against=reach, keys=same)
+        book.enter(
+            *("shapes", label, "size", (shape.size, other.size), "m"),
+            slack=2,
+            against=reach,
+            keys=same,
+        )
     bounds = bounds_of(shape), bounds_of(other)
     if len(bounds[0]) == len(bounds[1]) == 6:
-        figures = {"middle": [_plain((ends[:3] + ends[3:]) / 2) for ends in bounds]}
+        figures = {"middle": [plain((ends[:3] + ends[3:]) / 2) for ends in bounds]}
         if shape.kind == "mesh":
-            ends = zip(_plain(bounds[0]), _plain(bounds[1]), strict=True)
+            ends = zip(plain(bounds[0]), plain(bounds[1]), strict=True)
             figures |= {f"ends at {side}": list(x) for side, x in zip(_SIDES, ends, strict=True)}
-            volumes = shape.volume, other.volume
-            book.enter("shapes", label, "volume", volumes, "m³", slack=16, keys=same)
+            book.enter(
+                *("shapes", label, "volume", (shape.volume, other.volume), "m³"),
+                slack=16,
+                keys=same,
+            )
         for figure, values in figures.items():
             book.enter(
                 *("shapes", label, figure, values, "m"),

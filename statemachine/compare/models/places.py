@@ -12,7 +12,7 @@ from ...description.tree import GroupTree
 from ...interface import Array
 from ...measures.text import few, rounded
 from ...rotations import HERE
-from .ledger import Key, Ledger, Telling
+from .ledger import Key, Ledger, Telling, plain
 
 
 def of_joints(book: Ledger, pair: Pair, above: Pair, tree: GroupTree, reach: float) -> None:
@@ -44,34 +44,27 @@ def of_joints(book: Ledger, pair: Pair, above: Pair, tree: GroupTree, reach: flo
         unit = "rad" if hinge else "m"
         book.differ("places", where, "zero position", (0.0, zero), unit, abs(zero), **more)
         shift, turn = (shift, 0.0) if hinge else (aside, turn)
-    values = [tuple(map(float, p.pos)) for p in (above.align @ pair.one.place, pair.two.place)]
+    values = [plain(p.pos) for p in (above.align @ pair.one.place, pair.two.place)]
     size = float(np.linalg.norm(shift))
-    book.measure(
-        "places", where, "origin", size, "m", reach, (values[0], values[1]), slack=2, **more
-    )
+    book.measure("places", where, "origin", size, "m", reach, values, slack=2, **more)
     book.measure("places", where, "frame turned", turn, "rad", math.pi, slack=4, **more)
     # The axis itself, in the frame of the second one's link.
     mine = pair.align.mat @ a.axis
     tilt = math.atan2(float(np.linalg.norm(np.cross(mine, axis))), float(mine @ axis))
     book.measure(
-        *("places", where, "axis", tilt, "rad", math.pi, (_plain(mine), _plain(axis))),
+        *("places", where, "axis", tilt, "rad", math.pi, (plain(mine), plain(axis))),
         slack=4,
         share=tilt / math.pi,
         effect="turns the other way" if abs(tilt - math.pi) < 1e-3 else "",
         keys=[("joint", where, "axis")],
     )
-    if hinge:
-        beside = float(np.linalg.norm(np.cross(axis, pair.align.of(a.anchor) - anchor)))
-        keys = [("joint", where, "anchor")]
-        if beside > 2 * book.tolerance * reach:
-            share = beside / reach
-            book.differ(
-                "places", where, "axis beside", (0.0, beside), "m", beside, share=share, keys=keys
-            )
-
-
-def _plain(vector: Array) -> tuple[float, ...]:
-    return tuple(map(float, vector))
+    beside = float(np.linalg.norm(np.cross(axis, pair.align.of(a.anchor) - anchor)))
+    if hinge and beside > 2 * book.tolerance * reach:
+        book.differ(
+            *("places", where, "axis beside", (0.0, beside), "m", beside),
+            share=beside / reach,
+            keys=[("joint", where, "anchor")],
+        )
 
 
 def _tips(tree: GroupTree, pair: Pair) -> list[Array]:
@@ -116,7 +109,7 @@ def of_frames(
             continue
         ours = pair.align @ place
         far, turn = ours.distance(their), ours.angle(their)
-        values, keys = (_plain(ours.pos), _plain(their.pos)), [("site", site, "place")]
+        values, keys = (plain(ours.pos), plain(their.pos)), [("site", site, "place")]
         more: Telling = {"share": far / reach, "keys": keys}
         book.measure("tool frame", label, "origin", far, "m", reach, values, slack=2, **more)
         more = {"share": turn / math.pi, "keys": keys}

@@ -71,8 +71,12 @@ def differences_of(
     for side, only in enumerate(matched.only):
         for name in only.get("joint", ()):
             values = (("joint", "there", None) if side == 0 else ("joint", None, "there"),)
-            why = "a joint cannot be added or taken away"
-            rows.append(ModelDifference("extra joint", "joint", name, values, refused=why))
+            rows.append(
+                ModelDifference(
+                    *("extra joint", "joint", name, values),
+                    refused="a joint cannot be added or taken away",
+                )
+            )
     return tuple(rows)
 
 

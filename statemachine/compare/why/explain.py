@@ -201,11 +201,19 @@ def explain(
     """
     began, called = time.perf_counter(), labels or _labels(one, two)
     scenario = scenario if recordings else scenario.on(one)
-    told = one.compiled is not None and two.compiled is not None
-    matched = match_models(one, two, names) if told else match_alike(one, two)
-    counter = _Counter(progress, budget)
+    compiled = one.compiled is not None and two.compiled is not None
+    matched = match_models(one, two, names) if compiled else match_alike(one, two)
+    runs, expected = 0, 10
+
+    def ran() -> None:
+        nonlocal runs, expected
+        runs += 1
+        if runs >= expected:  # orders are drawn
+            expected = runs + budget // 4
+        progress(0.99 * runs / expected)
+
     length = scenario.seconds if seconds is None else seconds
-    trials = Trials((one, two), matched, scenario, recordings, length, seed, counter.one_more, jobs)
+    trials = Trials((one, two), matched, scenario, recordings, length, seed, ran, jobs)
     units = trials.ruler.units
     if quantity is not None and quantity not in units:
         raise unknown_name("quantity", quantity, units)
@@ -235,7 +243,7 @@ def explain(
         gaps = trials.gaps(brought)
         return getattr(gaps[quantity], measure) if gaps else None
 
-    counter.expected = 3 * len(able) + 20
+    expected = 3 * len(able) + 20
     divided = shapley(
         [] if nothing else able,
         value,
@@ -286,20 +294,6 @@ def explain(
         took=time.perf_counter() - began,
         provenance=(provenance(one), provenance(two)),
     )
-
-
-class _Counter:
-    """How many runs there were, of about how many."""
-
-    def __init__(self, progress: Progress, budget: int) -> None:
-        self._progress, self._budget = progress, budget
-        self.count, self.expected = 0, 10
-
-    def one_more(self) -> None:
-        self.count += 1
-        if self.count >= self.expected:  # orders are drawn
-            self.expected = self.count + self._budget // 4
-        self._progress(0.99 * self.count / self.expected)
 
 
 def _ended(trials: Trials, able: list[str]) -> EndedEarlyError:
@@ -388,10 +382,8 @@ def _parts(
     gap: float, brought: float | None, rest: tuple[Located, ...], nothing: bool
 ) -> tuple[float, float, float]:
     """What is explained, located and unexplained, as parts of the gap."""
-    if nothing:
-        return 0.0, 0.0, 0.0
-    if brought is None:
-        return 0.0, 0.0, 1.0
+    if nothing or brought is None:
+        return 0.0, 0.0, float(not nothing)
     explained = (gap - brought) / gap + sum(part.share for part in rest if part.is_setting)
     located = sum(part.share for part in rest if not part.is_setting)
     return explained, located, (rest[-1].gap if rest else brought) / gap

@@ -73,41 +73,26 @@ def locate(
     rows: list[Located] = []
     without, integrator = frozenset[str](), ""
     extent = trials.extent(quantity)
-
-    def tried(names: frozenset[str], chosen: str) -> float | None:
-        gaps = trials.gaps(brought, names, chosen)
-        return getattr(gaps[quantity], measure) if gaps else None
-
-    def select() -> None:
-        nonlocal integrator, left
-        if integrator or left <= max(_NOTHING * gap, bound):
-            return
-        gaps = {name: tried(without, name) for name in trials.integrators}
-        stood = {name: rest for name, rest in gaps.items() if rest is not None}
-        best = min(stood, key=stood.__getitem__, default="")
-        if best and stood[best] < _LEAST * left:
-            integrator = best
-            keep("integrator", "", _choice(trials.selects, best), stood[best])
-
-    def keep(name: str, words: str, values: tuple[str, str] | None, rest: float) -> None:
-        nonlocal left
-        moved = trials.moved(quantity, without, integrator)
-        still = bool(without) and trials.extent(quantity, without) < _STILL * extent
-        share = (left - rest) / gap
-        rows.append(
-            Located(name, words, values, share, rest, moved, still, bool(values) and not without)
-        )
-        left = rest
-
-    select()
     able = [feature for feature in FEATURES if trials.can_be_without(feature)]
-    for feature in able:
+    # None: an integrator is chosen. A run that was made already is not made again.
+    for feature in (None, *(choice for one_able in able for choice in (one_able, None))):
         if left <= max(_NOTHING * gap, bound):
             break
-        more = without | {feature.name}
-        rest = tried(more, integrator)
-        if rest is not None and rest < _LEAST * left:
-            without = more
-            keep(feature.name, feature.without, None, rest)
-            select()
+        more = without | {feature.name} if feature else without
+        choices = [integrator] if feature or integrator else trials.integrators
+        gaps = {choice: trials.gaps(brought, more, choice) for choice in choices}
+        rests = {choice: getattr(own[quantity], measure) for choice, own in gaps.items() if own}
+        best = min(rests, key=rests.__getitem__, default="")
+        rest = rests.get(best, left)
+        if not rest < _LEAST * left:
+            continue
+        without, integrator = more, best
+        name, words = (feature.name, feature.without) if feature else ("integrator", "")
+        values = None if feature else _choice(trials.selects, best)
+        moved = trials.moved(quantity, without, integrator)
+        still = bool(without) and trials.extent(quantity, without) < _STILL * extent
+        setting = values is not None and not without
+        share = (left - rest) / gap
+        rows.append(Located(name, words, values, share, rest, moved, still, setting))
+        left = rest
     return tuple(rows)

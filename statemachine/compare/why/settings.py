@@ -69,11 +69,15 @@ FEATURES = (
 )
 
 
+ENGINE_CAN_BE_WITHOUT = ("limits", "contact", "damping")  # of the features, as it comes
+
+
 class OwnSettings:
     """The settings of a Model with `defaults="engine"`, each as it comes or as the model has it.
 
     Attributes:
         names: Of the settings, as in `TITLES`.
+        emulated: The file behind the contract.
     """
 
     def __init__(self, dials: Dials, other: Model, actuated: bool) -> None:
@@ -85,14 +89,13 @@ class OwnSettings:
             actuated: Whether its motors follow ctrl.
         """
         self._dials, self._other, self._actuated = dials, other, actuated
-        model = dials.model
-        emulated = dials.emulated
+        model, self.emulated = dials.model, dials.emulated
         alike = {
             "gravity": np.array_equal(model.gravity, other.gravity),
             "timestep": (model.timestep, model.substeps) == (other.timestep, other.substeps),
-            "armature": not emulated.dof_armature.any(),
-            "frictionloss": not emulated.dof_frictionloss.any(),
-            "limits": not emulated.jnt_limited.any(),
+            "armature": not self.emulated.dof_armature.any(),
+            "frictionloss": not self.emulated.dof_frictionloss.any(),
+            "limits": not self.emulated.jnt_limited.any(),
         }
         self.names = tuple(name for name in TITLES if not alike.get(name))
 
@@ -100,7 +103,8 @@ class OwnSettings:
         """The settings as differences; `side` is that of the engine as it comes, 0 or 1."""
         rows = []
         for name in self.names:
-            own, model = self._own_word(name), self._model_word(name)
+            source = self._other if name in ("gravity", "timestep") else self.emulated
+            own, model = self._own_word(name), _word(name, source)
             values = ((TITLES[name], *((model, own) if side else (own, model))),)
             rows.append(ModelDifference(TITLES[name], "engine", "", values))
         return rows
@@ -127,18 +131,11 @@ class OwnSettings:
             "damping": emulated.dof_damping,
             "frictionloss": emulated.dof_frictionloss,
         }
-        settings: dict[str, Setting] = dict.fromkeys(names, "model")
-        settings |= dict.fromkeys(without, "off")
+        settings: dict[str, Setting] = {
+            **dict.fromkeys(names, "model"),
+            **dict.fromkeys(without, "off"),
+        }
         return self._dials.of(model, emulated).build(settings, values)
-
-    def can_leave_out(self, feature: Feature) -> bool:
-        """Whether the engine itself can do without a feature."""
-        return feature.name in ("limits", "contact", "damping")
-
-    @property
-    def emulated(self) -> Model:
-        """The file behind the contract."""
-        return self._dials.emulated
 
     def _own_word(self, name: str) -> str:
         """What the engine has of a setting, in a few words."""
@@ -151,18 +148,14 @@ class OwnSettings:
             return f"friction {_span(dials.frictions)}, hard"
         return dials.words[name]
 
-    def _model_word(self, name: str) -> str:
-        """What the model has of it."""
-        return _word(name, self._other if name in ("gravity", "timestep") else self.emulated)
-
 
 def leave_out(model: Model, features: frozenset[str]) -> Model:
     """A Model without some features, by `Model.replace`."""
-    options = {}
-    for feature in FEATURES:
-        if feature.name in features:
-            finer = feature.option == "substeps"
-            options[feature.option] = _FINER * model.substeps if finer else feature.value
+    options = {
+        feature.option: _FINER * model.substeps if feature.option == "substeps" else feature.value
+        for feature in FEATURES
+        if feature.name in features
+    }
     return model.replace(**options) if options else model
 
 

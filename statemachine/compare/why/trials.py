@@ -32,7 +32,7 @@ from ..perturbed import RUNS, Rerun, Uncertainty, perturbed_run
 from .causes import Cause, built, differences_of
 from .gap import Curves, Ruler
 from .of_the_run import COMMANDS, ORDER, START, of_the_run, order_of_ctrl, order_of_joints
-from .settings import NEEDS, TITLES, Feature, OwnSettings, leave_out
+from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, Feature, OwnSettings, leave_out
 from .touches import FirstTouch, first_touch
 
 Measure = Literal["worst", "end", "rms"]
@@ -148,9 +148,7 @@ class Trials:
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
         self.ruler = Ruler(one, traces[0], traces[1], matched)
         for side, trace in enumerate(traces):
-            run = _Run(side, _NONE)
-            reason = trace.header.ended or "it left every bound"
-            self._runs[run] = _Outcome(self._curves(side, self._models[side], trace), reason)
+            self._runs[_Run(side, _NONE)] = self._measured(side, self._models[side], trace)
             self.ended = self.ended or trace.header.ended
 
     def differences(self, finer: bool) -> tuple[ModelDifference, ...]:
@@ -254,7 +252,9 @@ class Trials:
     def can_be_without(self, feature: Feature) -> bool:
         """Whether a feature can be left out on both sides, and is not what the experiment sets."""
         own = [
-            own.can_leave_out(feature) if own else feature.option in model.capabilities.options
+            feature.name in ENGINE_CAN_BE_WITHOUT
+            if own
+            else feature.option in model.capabilities.options
             for own, model in zip(self._own, self._models, strict=True)
         ]
         return all(own) and feature.option not in self._scenario.options
@@ -281,9 +281,8 @@ class Trials:
         if jobs > 1:
             work = [partial(self._tried, run) for run in new]
             for run, outcome in zip(new, in_forks(work, jobs, self._ran, self._took), strict=True):
-                if isinstance(outcome, Exception):  # it is raised when its run is asked for
-                    continue
-                self._ahead[run] = outcome or _Outcome(None, _LOST)
+                if not isinstance(outcome, Exception):  # it is raised when its run is asked for
+                    self._ahead[run] = outcome or _Outcome(None, _LOST)
 
     def _forks_for(self, number: int) -> int:
         """How many forks are to share some runs."""
@@ -316,8 +315,7 @@ class Trials:
             model = self._model(run)
             ran = True
             trace = self._rerun(run, model).record(derive=False)
-            reason = trace.header.ended or "it left every bound"
-            return _Outcome(self._curves(run.side, model, trace), reason)
+            return self._measured(run.side, model, trace)
         except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
             return _Outcome(None, str(error), ran)
 
@@ -334,7 +332,11 @@ class Trials:
             model = model.replace(**options) if options else model
         if run.integrator:
             model = model.replace(integrator=run.integrator)
-        names = frozenset(_setting(name) for name in run.brought if self._is_own(name))
+        names = frozenset(
+            setting
+            for setting, title in TITLES.items()
+            if title in run.brought and self._by_name[title].kind == "engine"
+        )
         if own and (names or run.without):
             return own.build(model, built(own.emulated, edits), names, run.without)
         return leave_out(model, run.without)
@@ -345,12 +347,9 @@ class Trials:
             name
             for name in brought
             if self._by_name[name].edits(side)
-            or (self._own[side] and self._is_own(name))
+            or (self._own[side] and self._by_name[name].kind == "engine")
             or (side == 1 and (name in self._replaced or self._by_name[name].kind == "run"))
         )
-
-    def _is_own(self, name: str) -> bool:
-        return self._by_name[name].kind == "engine"
 
     def _rerun(self, run: _Run, model: Model) -> Rerun:
         start, brought = self._starts[run.side], run.brought
@@ -418,8 +417,9 @@ class Trials:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
         return self.ruler.floor(first, [each[0] for each in curves if each])
 
-    def _curves(self, side: int, model: Model, trace: Trace) -> Curves | None:
-        return self.ruler.curves(trace, self._posed(model), side)
+    def _measured(self, side: int, model: Model, trace: Trace) -> _Outcome:
+        curves = self.ruler.curves(trace, self._posed(model), side)
+        return _Outcome(curves, trace.header.ended or "it left every bound")
 
     def _posed(self, model: Model) -> Model:
         """A Model of the same bodies by which poses are computed, on the engine that is fastest."""
@@ -443,8 +443,3 @@ def _own_settings(
         for side, own in enumerate(dials)
     )
     return one, two
-
-
-def _setting(name: str) -> str:
-    """The setting of an engine that a cause goes by."""
-    return next(key for key, title in TITLES.items() if title == name)

@@ -105,12 +105,13 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
                 findings[driver] += question(driver, run)
         for done, driver in enumerate(drivers, start=len(work)):
             progress(done / (len(work) + len(drivers)))
-            findings[driver] += trials.smallest(driver, runs[driver], findings[driver])
-            findings[driver] += trials.forgets(driver, runs[driver])
-            findings[driver] += trials.threads(driver, runs[driver])
-            findings[driver] += elsewhere.findings(child.result(), driver, runs[driver])
-            if driver.layer == "engine":
-                findings[driver] += trials.falls(driver)
+            findings[driver] += [
+                *trials.smallest(driver, runs[driver], findings[driver]),
+                *trials.forgets(driver, runs[driver]),
+                *trials.threads(driver, runs[driver]),
+                *elsewhere.findings(child.result(), driver, runs[driver]),
+                *(trials.falls(driver) if driver.layer == "engine" else ()),
+            ]
         findings[interface] += elsewhere.pickled(child.result(), interface, runs[interface], states)
     audited = tuple(
         Audited(

@@ -124,5 +124,9 @@ def _worst(findings: Sequence[AuditFinding]) -> FutureGap:
 
 
 def _missing(name: str, findings: Sequence[AuditFinding]) -> Missing:
-    itself = _differing(finding for finding in findings if finding.into == ITSELF)
-    return Missing(name, _differing(findings), itself, _worst(findings))
+    return Missing(
+        field=name,
+        points=_differing(findings),
+        itself=_differing(finding for finding in findings if finding.into == ITSELF),
+        gap=_worst(findings),
+    )

@@ -16,7 +16,7 @@ from ...interface import Array, Model, State
 from ...processes import fresh_python
 from ...processes.pipes import last_line
 from .interface_driver import InterfaceDriver
-from .trials import AuditFinding, finding_of
+from .trials import AuditFinding, against_run, finding_of
 
 PROCESS, PICKLED = "process", "pickled State"
 _PATIENCE = 300.0  # seconds
@@ -63,8 +63,8 @@ def findings(
 ) -> Iterator[AuditFinding]:
     """The other process's runs against those of this one."""
     for run in runs:
-        off = driver.gap(run, answer[0][driver.layer, run.point.name])
-        yield finding_of(driver, PROCESS, run, "a fresh process", "this process", off)
+        there = answer[0][driver.layer, run.point.name]
+        yield against_run(driver, PROCESS, run, "a fresh process", "this process", there)
 
 
 def pickled(

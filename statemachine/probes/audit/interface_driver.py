@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 import numpy as np
 
 from ...engines.auditing import Disturbance, Driver, Restore, SaveMethod, SavePoint
-from ...errors import UnsupportedError
 from ...interface import (
-    DERIVED,
     INPUTS,
     Array,
     Data,
@@ -23,6 +21,7 @@ from ...interface import (
     set_state,
     step,
 )
+from ...measures.readings import readings
 
 
 class InterfaceDriver(Driver):
@@ -62,11 +61,11 @@ class InterfaceDriver(Driver):
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         def ask(machine: Data) -> None:
             forward(machine.model, machine)
-            _read_all(machine)
+            readings(machine)
 
         return (
             Disturbance("forward", lambda machine: forward(machine.model, machine)),
-            Disturbance("reading what is derived", _read_all),
+            Disturbance("reading what is derived", readings),
             Disturbance("forward, then reading", ask),
             Disturbance("get_state", lambda machine: get_state(machine.model, machine)),
         )
@@ -104,9 +103,3 @@ def as_a_state(machine: Data) -> Iterator[Restore]:
     """By get_state and set_state."""
     kept = get_state(machine.model, machine)
     yield lambda other: set_state(other.model, other, kept)
-
-
-def _read_all(machine: Data) -> None:
-    for name in (*DERIVED, "contacts"):
-        with suppress(UnsupportedError):
-            getattr(machine, name)

@@ -67,12 +67,17 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
     start = "default pose" if lacks else f"keyframe {key.name!r}" if key.name else "keyframe 0"
     moved = key.ctrl.copy()
     moved[: len(_MOVE)] += _MOVE[: model.nu]
-    how = f"{start}, command moved away from it"
-    add("keyframe", how, key.qpos, key.qvel, moved, 2 * _WAY, lacks)
+    add(
+        *("keyframe", f"{start}, command moved away from it"),
+        *(key.qpos, key.qvel, moved, 2 * _WAY, lacks),
+    )
 
     lacks = "" if model.nu else "the model has no servo to switch off"
-    how = "default pose, servos off, and time to fall"
-    add("limp", how, zero, still, none, _FALL, lacks, limp=True)
+    add(
+        *("limp", "default pose, servos off, and time to fall"),
+        *(zero, still, none, _FALL, lacks),
+        limp=True,
+    )
 
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     limited = np.flatnonzero(model.jnt_limited & scalar)
@@ -82,13 +87,17 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
     near[model.jnt_qposadr[limited]] = upper - reach
     towards[model.jnt_dofadr[limited]] = reach / (_ARRIVAL * model.timestep)
     lacks = "" if len(limited) else "no joint of the model has a limit"
-    how = "servos off, each joint run into its upper limit"
     add(
-        "limit", how, near, towards, none, (_ARRIVAL + 3) * model.timestep,
-        lacks, limp=True, at_limit=True,
-    )  # fmt: skip
+        *("limit", "servos off, each joint run into its upper limit"),
+        *(near, towards, none, (_ARRIVAL + 3) * model.timestep, lacks),
+        limp=True,
+        at_limit=True,
+    )
 
     lacks = "" if model.nu else "the model has no actuator"
-    how = f"{start}, a controller that reads the time before each step"
-    add("clock", how, key.qpos, key.qvel, key.ctrl, 2 * _WAY, lacks, swings=True)
+    add(
+        *("clock", f"{start}, a controller that reads the time before each step"),
+        *(key.qpos, key.qvel, key.ctrl, 2 * _WAY, lacks),
+        swings=True,
+    )
     return tuple(found), tuple(without)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -22,7 +22,6 @@ from ...engines.auditing import (
     Layer,
     Machine,
     ReferenceRun,
-    Restore,
     Save,
     SaveMethod,
     SavePoint,
@@ -87,6 +86,19 @@ def finding_of(
     return AuditFinding(experiment, driver.layer, run.point.name, case, into, promised, gap)
 
 
+def against_run(
+    driver: Driver,
+    experiment: str,
+    run: ReferenceRun,
+    case: str,
+    into: str,
+    *futures: Array,
+    promised: bool = True,
+) -> AuditFinding:
+    """What came of an experiment whose futures should be that of the run."""
+    return finding_of(driver, experiment, run, case, into, driver.gap(run, *futures), promised)
+
+
 # The same start and the same commands: from a new machine, a reset one, in other pieces.
 
 
@@ -94,7 +106,7 @@ def again(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """From another new machine."""
     with driver.at(run.point) as machine:
         future = driver.drive(machine, run.point, run.steps)
-    yield finding_of(driver, AGAIN, run, "in a new one", "the first run", driver.gap(run, future))
+    yield against_run(driver, AGAIN, run, "in a new one", "the first run", future)
 
 
 def after_reset(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
@@ -105,7 +117,7 @@ def after_reset(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
         driver.reset(machine)
         driver.arrive(machine, run.point)
         future = driver.drive(machine, run.point, run.steps)
-    yield finding_of(driver, RESET, run, "a used one, reset", "a new one", driver.gap(run, future))
+    yield against_run(driver, RESET, run, "a used one, reset", "a new one", future)
 
 
 def pieces(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
@@ -132,8 +144,9 @@ def look(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     for act in driver.disturbances(run.point):
         with driver.at(run.point) as machine:
             future = driver.drive(machine, run.point, run.steps, act)
-        off = driver.gap(run, future)
-        yield finding_of(driver, LOOK, run, act.name, "the run without", off, act.promised)
+        yield against_run(
+            driver, LOOK, run, act.name, "the run without", future, promised=act.promised
+        )
 
 
 def beside(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
@@ -143,8 +156,7 @@ def beside(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
         for _ in range(run.steps):
             trace.append(driver.drive(machine, run.point, 1)[-1])
             driver.advance(other)
-    off = driver.gap(run, np.array(trace))
-    yield finding_of(driver, BESIDE, run, "turn by turn with another", "alone", off)
+    yield against_run(driver, BESIDE, run, "turn by turn with another", "alone", np.array(trace))
 
 
 def threads(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFinding]:
@@ -157,8 +169,9 @@ def threads(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFindi
     with ThreadPoolExecutor(_THREADS) as pool:
         jobs = [[pool.submit(once, run.point, run.steps) for _ in range(_EACH)] for run in runs]
         for run, of in zip(runs, jobs, strict=True):
-            off = driver.gap(run, *(job.result() for job in of))
-            yield finding_of(driver, THREADS, run, f"a pool of {_THREADS} threads", "alone", off)
+            futures = (job.result() for job in of)
+            case = f"a pool of {_THREADS} threads"
+            yield against_run(driver, THREADS, run, case, "alone", *futures)
 
 
 def pools(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
@@ -166,8 +179,8 @@ def pools(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     if run.point.swings:  # they take no controller
         return
     for name, several in driver.pools().items():
-        off = driver.gap(run, *several(run.point, run.steps))
-        yield finding_of(driver, POOLS, run, name, "alone, step by step", off)
+        futures = several(run.point, run.steps)
+        yield against_run(driver, POOLS, run, name, "alone, step by step", *futures)
 
 
 # Save, go on, restore, go on: is it the same future? Which state vector suffices?
@@ -199,8 +212,7 @@ def tried(driver: Driver, run: ReferenceRun, way: SaveMethod) -> Iterator[AuditF
     experiment, case = (WITHOUT, way.left_out) if way.left_out else (RESTORE, way.name)
     futures = driver.futures(run.point, run.steps, way)
     for into, future in futures.items():
-        off = driver.gap(run, future)
-        yield finding_of(driver, experiment, run, case, into, off, way.promised)
+        yield against_run(driver, experiment, run, case, into, future, promised=way.promised)
     among = worst([gap(*pair, driver.coordinates) for pair in combinations(futures.values(), 2)])
     yield finding_of(driver, experiment, run, case, EACH_OTHER, among, way.agree)
 
@@ -217,24 +229,19 @@ def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFindi
     if run is None or hidden is None:
         return
 
-    def future(save: Save | None, change: Callable[[Machine], None] | None) -> Array:
-        with driver.at(run.point) as machine, (save or _nothing)(machine) as restore:
+    def future(save: Save, change: Callable[[Machine], None] | None) -> Array:
+        with driver.at(run.point) as machine, save(machine) as restore:
             if change:
                 change(machine)
             restore(machine)
             return driver.drive(machine, run.point, run.steps)
 
-    for name, save in {NOT_RESTORED: None, **hidden.ways}.items():
+    ways = {NOT_RESTORED: lambda _machine: nullcontext(lambda _other: None), **hidden.ways}
+    for name, save in ways.items():
         unchanged = future(save, None)
         for what, change in hidden.changes.items():
             off = gap(unchanged, future(save, change), driver.coordinates)
             yield finding_of(driver, FORGETS, run, what, name, off, promised=False)
-
-
-@contextmanager
-def _nothing(_machine: Machine) -> Iterator[Restore]:
-    """The way that neither saves nor restores."""
-    yield lambda _other: None
 
 
 def contacts_off(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:

@@ -93,8 +93,8 @@ def ask(question: str, engine: str) -> Answers | None:
 
 def _absent(looked: Absent) -> Answers:
     counted = Measurement(f"functions called …{'…, …'.join(looked.words)}…:", len(looked.names))
-    words = ", ".join(looked.names) or NO_ANSWER
-    return (EngineAnswer(words, (counted, *looked.figures), looked.part),)
+    figures = (counted, *looked.figures)
+    return (EngineAnswer(", ".join(looked.names) or NO_ANSWER, figures, looked.part),)
 
 
 def probe(
