@@ -24,7 +24,8 @@ _MORE = f"""\
 more commands:
 {{commands}}
 
-`{PROGRAM}` alone lists the lessons; `{PROGRAM} COMMAND --help` shows the options of one."""
+`{PROGRAM}` alone lists the lessons.
+`{PROGRAM} COMMAND --help` shows the options of a command."""
 _SAID: set[str] = set()
 
 

@@ -249,7 +249,7 @@ def test_moments_that_both_have_are_compared_and_no_others() -> None:
 
 def test_what_makes_it_less_than_a_comparison_of_engines_is_said(hold: Trace, box: Trace) -> None:
     notes = " ".join(compare(hold, box).notes)
-    assert_in(notes, "other digests", "missing on one side: box", "experiments are two")
+    assert_in(notes, "different model files", "missing on one side: box", "experiments are two")
     qpos = hold.qpos.copy()
     qpos[0, 0] = 0.1
     assert "not start in the same state" in " ".join(compare(hold, changed(hold, qpos=qpos)).notes)

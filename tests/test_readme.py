@@ -218,7 +218,7 @@ def test_what_is_counted() -> None:
             f"{word[len(PATH)]} lessons",
             f"{word[len(ASKED)]} questions",
             f"{word[len(JUDGES)]} functions",
-            f"fault is put into the arm, one at a time, {word[len(FAULTS)]} in all",
+            f"fault is put into the arm at a time, {word[len(FAULTS)]} in all",
         ),
         "docs/audit.md": (f"{word[len(QUESTIONS)]} questions",),
     }

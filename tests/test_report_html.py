@@ -350,7 +350,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     (table,) = [block for block in causes(noisy) if isinstance(block, Table)]
     assert [row[3] for row in table.rows] == ["60.0 %", "< 20.0 %", "50.0 %*"]
     chaos = explanation_of(hold, floor=0.04)
-    assert answer(chaos).startswith("Nothing can be concluded: chaos alone makes 2.29°")
+    assert answer(chaos).startswith("Nothing can be concluded: the gap is 2.58°, and the chaos")
     assert chaos.is_rounding
     assert answer(explanation_of(hold, negligible=1.0)).startswith("The two sides move alike")
     # Where something cannot be brought to the same, a location is no explanation.

@@ -89,6 +89,7 @@ class _HelpAll(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         for action, text in (self.const or {}).items():
             action.help = text
+        self.help = "every option: this list"
         parser.print_help()
         parser.exit()
 
@@ -151,7 +152,7 @@ DEFAULTS = (
 )
 SIDES = ("left", "right")
 PARTS = ("actuators", "floor")  # of a file, that another side can have, too
-JOBS = ("--jobs", "N", "processes here (one a processor)")
+JOBS = ("--jobs", "N", "parallel processes (default: one a processor)")
 SECONDS = ("--seconds", "S", "simulated time")
 TRUST = (
     "--trust-binary",
@@ -179,7 +180,7 @@ def model_of(model: str) -> Row:
 
 def seed_of(what: str) -> Row:
     """The option --seed."""
-    return "--seed", "N", f"of {what} (0)", {"default": 0}
+    return "--seed", "N", f"random seed of {what} (0)", {"default": 0}
 
 
 def on_each_backend(

@@ -11,7 +11,7 @@ OPTIONS: tuple[Row, ...] = (
     (
         "--uncertainty",
         "SIZE",
-        "what your robot's start is uncertain by, such as 0.1mm or 0.1deg",
+        "how uncertain the start of your robot is, such as 0.1mm or 0.1deg",
         REPEATED,
     ),
     ("--no-chaos", "", "do not look for the chaos floor: faster"),

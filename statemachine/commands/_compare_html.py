@@ -17,7 +17,7 @@ OPTIONS: tuple[Row, ...] = (
         "PAGE.html",
         "write a report that stands alone: both runs in 3D, curves, figures, what causes it",
     ),
-    ("--no-why", "", "of --html: do not look for what causes it"),
+    ("--no-why", "", "with --html: skip the search for causes"),
 )
 
 

@@ -49,6 +49,7 @@ def run(options: argparse.Namespace) -> int:
         hint = f"two words: {PROGRAM} compare --models {' '.join(typed)}"
     digits = 6 if options.digits is None else options.digits
     refuse(
+        *((True, f"--models compares descriptions; {word} is a run") for word in options.what),
         (
             len(given) != 2 or len(options.models) > 2,
             f"--models wants {hint}; got {len(options.models)}",

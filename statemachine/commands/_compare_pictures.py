@@ -26,7 +26,6 @@ OF_FILM: tuple[Row, ...] = (
         "--renderer",
         "NAME",
         "of the film: an engine that draws, or auto: the first that can here",
-        {"default": "auto"},
     ),
 )
 OPTIONS: tuple[Row, ...] = (
@@ -72,8 +71,9 @@ def checked(options: argparse.Namespace) -> Pictures:
         check_size(options.size, films.SMALLEST)
         check_place(film)
         with progress("looking for OpenGL"):
-            renderer = renderer_here(None if options.renderer == "auto" else options.renderer)
-        if options.renderer == "auto" and renderer.name != renderers()[0]:
+            asked = None if options.renderer == "auto" else options.renderer
+            renderer = renderer_here(asked)
+        if not asked and renderer.name != renderers()[0]:
             complain(f"no OpenGL here: the film is drawn by {renderer}", 0)
     return Pictures(plot, film, renderer)
 

@@ -14,7 +14,7 @@ OPTIONS: tuple[Row, ...] = (
     (
         "--measure",
         None,
-        "which figure of it (worst)",
+        "which figure of the gap is explained (worst)",
         {"choices": ("worst", "end", "rms")},
     ),
     ("--finer", "", "every difference by its entries"),

@@ -55,8 +55,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
-        "Exit code 1: something differs, or a run ends before its time; with --why: something\n"
-        "stays unexplained."
+        "Exit code 1: something differs, or a run ends before its time; with --why:\n"
+        "something stays unexplained."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add_table(
@@ -117,7 +117,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 _OF_RUN = (
-    "what why quantity html plot film model seconds timestep tolerance uncertainty every keyframe "
+    "why quantity html plot film model seconds timestep tolerance uncertainty every keyframe "
     "actuators floor"
 )
 RULES: tuple[Rule, ...] = (
@@ -170,7 +170,7 @@ def run_options() -> tuple[Row, ...]:
         ("--model", "NAME|FILE", "instead of the experiment's own", {"action": _Once}),
         *menagerie(),
         SECONDS,
-        ("--timestep", "S", "of each step [s]"),
+        ("--timestep", "S", "length of a step [s]"),
         seed_of("what is drawn"),
     )
 

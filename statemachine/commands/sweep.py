@@ -44,8 +44,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
-        "Exit code 1: a cell failed; of a report, that two engines do not agree in "
-        "all\nsettings. docs/sweeps.md has the columns of the dataset."
+        "Exit code 1: a run failed; with --report: two engines differ in some setting.\n"
+        "docs/sweeps.md has the columns of the dataset."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add_table(

@@ -173,8 +173,8 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
     notes: list[Note] = [
         (
             a.provenance.model_sha256 != b.provenance.model_sha256,
-            f"the models are two: {a.provenance.model_file} and {b.provenance.model_file} "
-            "have other digests",
+            f"the two sides use different model files: {a.provenance.model_file} and "
+            f"{b.provenance.model_file}",
         ),
         *_of_joints(one, two, labels),
         (columns, f"not compared, for one side does not tell it: {', '.join(columns)}"),

@@ -229,7 +229,10 @@ def tables(results: Mapping[str, Gravity]) -> dict[str, Any]:
                 "servos on, worst": partial(on, None),
                 "servos off, until one touches": partial(off, False),
                 "servos off, after that": partial(off, True),
-                **{f"servos off, {k}, at the end": partial(_ends_apart, k) for k in first.longer},
+                **{
+                    f"servos off, {k}, at {run.time[-1]:g} s": partial(_ends_apart, k)
+                    for k, run in first.longer.items()
+                },
             },
         ),
     }

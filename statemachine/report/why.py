@@ -31,11 +31,12 @@ MISSING = {
     "actuators": "The {side} has no actuators, the {other} has: --actuators {other} gives it those",
     "floor": "The {side} has no floor, the {other} has: --floor {other} gives it that",
 }
+ADD = "add what the left has"
 PLAYED = "the models were run again, with the recorded starts and commands"
 ANSWERS = {
     "rounding": "The two sides move alike: {gap} is rounding",
     "alike": "The two sides move alike, although they differ: {gap} is rounding",
-    "chaos": "Nothing can be concluded: chaos alone makes {floor}, and the gap is {gap}",
+    "chaos": "Nothing can be concluded: the gap is {gap}, and the chaos floor {floor}",
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
     "masked": "No single difference causes the {gap}: the differences hide one another",
@@ -194,7 +195,8 @@ def steps(result: Explanation) -> list[Block]:
         if (row.share or 0.0) >= _NO_PART and not row.note:
             left, right = _values(row)
             place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
-            lines.append(f"{place}{row.name}: {right} → {left}")
+            change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
+            lines.append(f"{place}{row.name}: {change.format(left=left, right=right)}")
     hidden = result.is_rounding or not lines
     return [] if hidden else [Text("What to change on the right:"), Items(lines)]
 

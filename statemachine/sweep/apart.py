@@ -46,7 +46,7 @@ def _begin_trackers() -> None:
         os.environ.update({} if told is None else {"PYTHONWARNINGS": told})
 
 
-def _deaf() -> None:
+def _block_sigint() -> None:
     """Processes that this thread begins never take a Ctrl-C: it is for the driver to answer it."""
     if hasattr(signal, "pthread_sigmask"):  # not on Windows
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -104,7 +104,7 @@ def apart(ready: PreparedSweep, batches: Iterable[Batch], jobs: int) -> Results:
 
     if os.name != "nt":
         _begin_trackers()
-    with ThreadPoolExecutor(jobs, initializer=_deaf) as threads:
+    with ThreadPoolExecutor(jobs, initializer=_block_sigint) as threads:
         try:
             coming = iter(batches)
             waiting = {threads.submit(run, batch) for batch in islice(coming, jobs)}
