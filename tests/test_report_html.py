@@ -346,6 +346,11 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         rows = zip(explanation_of(hold).shares, shares, strict=True)
         masked = explanation_of(hold, shares=[replace(row, share=share) for row, share in rows])
         assert answer(masked).startswith("No single difference causes the 2.58°"), shares
+    # Two values that read the same are shown with all their digits.
+    close = ("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
+    rounded = replace(explanation_of(hold).shares[0], values=(close,), unit="rad")
+    found = answer(explanation_of(hold, shares=(rounded,)))
+    assert "1.5708 on the left and 1.570796 on the right" in found
     noisy = explanation_of(hold, floor=0.2 * located.gap)
     (table,) = [block for block in causes(noisy) if isinstance(block, Table)]
     assert [row[3] for row in table.rows] == ["60.0 %", "< 20.0 %", "50.0 %*"]
