@@ -24,13 +24,13 @@ _APART = {
 # ... and of the figures themselves.
 _SHOWN = {unit: _APART[unit] for unit in ("m", "m³", _MOMENT)}
 _LAST = {
-    "places": "so",
+    "places": "effect",
     "armature": "share",
-    "drive": "holds",
+    "drive": "effect",
     "effort": "ratio",
     "damping": "slows in, left / right",
     "dry friction": "share",
-    "limits": "so",
+    "limits": "effect",
     "mass": "share",
     "centre of mass": "load",
     "inertia": "share",

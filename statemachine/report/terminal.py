@@ -81,9 +81,10 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
             choice = reader.ask(block) if reader else None
             said = None if choice is None else (block, choice)
             answered += [choice == block.right] if said else []
-            if reader is None and block.always:
+            if choice is None and block.always:
                 right = "none of the above" if block.right is None else block.choices[block.right]
-                _write(tell, [Text(block.text), Text(f"Answer: {right}. {block.because}")])
+                asked = [] if reader else [Text(block.text)]
+                _write(tell, [*asked, Text(f"Answer: {right}. {block.because}")])
             continue
         if isinstance(block, RobotPicture):
             continue
