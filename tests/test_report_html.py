@@ -9,6 +9,7 @@ import io
 import itertools
 import json
 import re
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -929,6 +930,15 @@ def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, seen: Seen) 
         assert "no poses" in tab.locator("#still").inner_text()
         go(tab, 100)
         assert tab.locator("#clock").inner_text() == "0.500 s"
+
+
+def test_a_page_without_matplotlib_says_where_its_charts_are(
+    hold: Made, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    text = page_of(hold)
+    assert "No chart: a figure needs matplotlib" in text
+    assert "<polyline" not in text
 
 
 # Shapes.

@@ -52,12 +52,12 @@ def quantity_row(quantity: QuantityChart) -> Html:
     )  # fmt: skip
 
 
-def _figure(picture: Traces, caption: str, said: str) -> Html | None:
-    """A chart with the cursor of time over its axes; nothing where matplotlib is not installed."""
+def _figure(picture: Traces, caption: str, said: str) -> Html:
+    """A chart with the cursor of time over its axes; a line where matplotlib is not installed."""
     try:
         text = chart(picture, "svg", _SIZE, _BOX).decode()
-    except MissingEngineError:
-        return None
+    except MissingEngineError as error:
+        return tag("p", f"No chart: {error}.", class_="foot")
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r' id="[a-z]+[\d_]+"', "", text)
