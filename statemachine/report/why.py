@@ -321,7 +321,7 @@ def _sides(figure: tuple[str, object, object], unit: str) -> tuple[str, str]:
             cut = () if len(apart) == len(one) else ("…",)
             one, two = ((*(pair[k] for pair in apart), *cut) for k in (0, 1))
     left, right = _value(one, unit), _value(two, unit)
-    exact = [np.ravel(value) for value in figure[1:]]
+    exact = [np.atleast_1d(np.array(value)) for value in figure[1:]]
     if left == right and all(numbers.dtype.kind == "f" for numbers in exact):
         differing = int(np.argmax(exact[0] != exact[1]))  # with all its digits
         return f"{exact[0][differing]:.12g}", f"{exact[1][differing]:.12g}"
