@@ -321,10 +321,9 @@ def _sides(figure: tuple[str, object, object], unit: str) -> tuple[str, str]:
             cut = () if len(apart) == len(one) else ("…",)
             one, two = ((*(pair[k] for pair in apart), *cut) for k in (0, 1))
     left, right = _value(one, unit), _value(two, unit)
-    exact = [np.atleast_1d(np.array(value)) for value in figure[1:]]
-    if left == right and all(numbers.dtype.kind == "f" for numbers in exact):
-        differing = int(np.argmax(exact[0] != exact[1]))  # with all its digits
-        return f"{exact[0][differing]:.12g}", f"{exact[1][differing]:.12g}"
+    if left == right and _relative(figure):  # numbers, which read the same: with all their digits
+        a, b = (np.array(value, dtype=float).ravel() for value in figure[1:])
+        left, right = (f"{each[np.argmax(a != b)]:.12g}" for each in (a, b))
     return left, right
 
 
