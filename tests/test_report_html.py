@@ -9,7 +9,6 @@ import io
 import itertools
 import json
 import re
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -25,7 +24,7 @@ from statemachine.compare import Comparison, compare, series, touches
 from statemachine.compare.series import total_forces
 from statemachine.compare.why import CauseShare, Explanation, FirstTouch, Located
 from statemachine.drawing import drawing_of
-from statemachine.errors import BadInputError
+from statemachine.errors import BadInputError, MissingEngineError
 from statemachine.measures import Deviation
 from statemachine.measures.text import quantity
 from statemachine.page import (
@@ -935,7 +934,10 @@ def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, seen: Seen) 
 def test_a_page_without_matplotlib_says_where_its_charts_are(
     hold: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    def lacking(*_: object) -> None:
+        raise MissingEngineError("a figure needs matplotlib", engine="matplotlib")
+
+    monkeypatch.setattr("statemachine.report.html.charts.chart", lacking)
     text = page_of(hold)
     assert "No chart: a figure needs matplotlib" in text
     assert "<polyline" not in text
