@@ -396,6 +396,7 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
         (("--film", "a.webp", "--size", "7x9"), "width of a film is even"),
         (("--film", "a.webp", "--size", "large"), "a size reads like 640x480"),
         (("--fps", "10"), "--fps goes with --film"),
+        (("--fps", "30"), "--fps goes with --film"),
         (("--plot", "a.svg", "--size", "320x240"), "--size goes with --film"),
         (("--why", "--renderer", "auto"), "--renderer goes with --film"),
         (("--film", "a.webp", "--why"), "go without it"),

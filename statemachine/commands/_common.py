@@ -69,10 +69,11 @@ def add_rules(parser: argparse.ArgumentParser, *rules: Rule) -> None:
 
 def check_rules(options: argparse.Namespace) -> None:
     """Raise BadInputError for the first rule of a command that is broken."""
+    # A default is one object: what is typed is another, also where it is equal.
     given = [
         name
         for name, usual in getattr(options, "usual", {}).items()
-        if getattr(options, name, usual) not in (usual, [])
+        if getattr(options, name, usual) is not usual and getattr(options, name) != []
     ]
     for names, needs_or_excludes, others, *text in getattr(options, "rules", ()):
         present = [other for other in others.split() if other in given]
