@@ -49,14 +49,14 @@ class _Parser(argparse.ArgumentParser):
         if rest:
             given, _, choices = rest.partition(" (choose from ")
             known = [choice.strip() for choice in choices.rstrip(")").split(",")]
-            hint = did_you_mean(given, known)
+            hint = did_you_mean(given, known) or f"; known: {', '.join(known)}"
             from .lessons import LESSONS
 
             if given in LESSONS:
                 hint = f". Did you mean {PROGRAM} lesson {given}?"
             elif given in COMMANDS:
                 hint = f". Did you mean {PROGRAM} {given}?"
-            message = f"{wrong}no {given!r}; known: {', '.join(known)}{hint}"
+            message = f"{wrong}no {given!r}{hint}"
         if "expected one argument" in message:
             flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
             named = {name: each for each in self._actions for name in each.option_strings}

@@ -13,6 +13,7 @@ from statemachine.compare.one_step import RELATIVE
 from statemachine.compare.perturbed import Rerun
 from statemachine.compare.stages import STAGES
 from statemachine.errors import BadInputError
+from statemachine.report.one_step import page
 from statemachine.runs.scenarios import scenario
 
 from .small_models import LINKS_AND_BALL, model_of
@@ -82,6 +83,22 @@ def test_a_contact_shows_from_the_moment_at_which_it_begins(tmp_path: Path) -> N
     assert found.spikes
     assert found.spikes[0].stage == "contact force"
     assert found.spikes[0].where == "ball on floor"
+
+
+def test_a_later_stage_leads_where_no_earlier_one_differs(tmp_path: Path) -> None:
+    """Dry friction differs all the time, contacts from 0.17 s on: each has its own cause."""
+    text = LINKS_AND_BALL
+    for stage in ("contact force", "other constraints"):
+        text = text.replace(*CHANGES[stage][:2])
+    found = stepped(tmp_path, text)
+    stages = {gap.stage: gap for gap in found.stages}
+    touching, apart = stages["contact force"].leads, stages["other constraints"].leads
+    assert first(found) == "contact force"
+    assert touching == stages["contact force"].beyond > 0
+    assert touching + apart == found.moments
+    assert stages["acceleration"].leads == 0
+    end = page(found, ("one", "two"), "hold").headline.end
+    assert end.endswith(f"is other constraints ({apart}): that has another cause.")
 
 
 def test_joints_in_another_order_are_matched(tmp_path: Path) -> None:

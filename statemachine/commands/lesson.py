@@ -189,7 +189,7 @@ def _path(options: argparse.Namespace, reader: Any) -> int:
             everything[lesson.name] = results
             code = code if page.holds else SAYS_NO
             if not options.json:
-                title = f"{number} of {len(PATH)}: {page.title}"
+                title = f"{number} of {len(PATH)}, {page.title}"
                 terminal.show(replace(page, title=title), "", reader)
         except (Stopped, KeyboardInterrupt) as stop:
             if reader:
@@ -222,7 +222,8 @@ def _last_page(options: argparse.Namespace, reader: Any) -> int:
         )
         certificate = page(results)
         code = 0 if certificate.holds else SAYS_NO
-        terminal.show(certificate, "", reader)
+        title = f"The last page: {certificate.title}"
+        terminal.show(replace(certificate, title=title), "", reader)
     except MissingEngineError as error:  # nobody can compute it here
         complain(error, MISSING)
     (reader.read if reader else sys.stdout.write)(_NEXT)

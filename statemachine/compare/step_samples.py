@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -43,6 +44,7 @@ class StageGap:
         worst: The largest difference; at: when [s from the start].
         where: The joint, body or pair to look at then.
         beyond: At how many moments it is beyond the tolerance and beyond the null.
+        leads: At how many of them no earlier stage is, so that it has a cause of its own.
         first: The first of them [s]; None if there is none.
     """
 
@@ -57,6 +59,7 @@ class StageGap:
     at: float | None = None
     where: str = ""
     beyond: int = 0
+    leads: int = 0
     first: float | None = None
 
 
@@ -158,7 +161,7 @@ class StepSamples:
 
     def gaps(self, measures: Sequence[StageMeasure]) -> tuple[StageGap, ...]:
         """Each stage, by that of its units that is farthest beyond its tolerance."""
-        found = []
+        found, leading = [], Counter(stage for stage, _ in self._firsts(measures))
         for stage in STAGES:
             own = [self._gap(each) for each in measures if each.group.stage == stage]
             if not own:
@@ -166,7 +169,8 @@ class StepSamples:
                 reason = "nothing touches" if touches else "an engine does not tell it"
                 own = [StageGap(stage, touches, reason)]
             # Of the measures of one stage that of pairs comes last, and says more than joints do.
-            found.append(max(reversed(own), key=_how_far if stage != FORCE else _differs))
+            gap = max(reversed(own), key=_how_far if stage != FORCE else _differs)
+            found.append(replace(gap, leads=leading[stage]))
         return tuple(found)
 
     def _gap(self, each: StageMeasure) -> StageGap:
@@ -207,7 +211,7 @@ class StepSamples:
 
     def _firsts(self, measures: Sequence[StageMeasure]) -> list[tuple[str, str]]:
         """For each moment the first stage beyond its tolerance, and its worst element."""
-        found = [(AFTER, "")] * len(self.times)
+        found = [("", "")] * len(self.times)
         for each in sorted(measures, key=lambda m: -STAGES.index(m.group.stage)):
             for row in np.flatnonzero(each.beyond.any(axis=1)).tolist():
                 found[row] = each.group.stage, _culprit(each, row)

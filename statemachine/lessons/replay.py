@@ -35,7 +35,7 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
         check_name("way to break a replay", options["break"], BREAKS)
     steps = as_count(options["steps"], "steps")
     write, said = (
-        "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]",
+        "data.ctrl[:2] += (0.4, -0.2)" if model.nu > 1 else "data.ctrl += 0.4",
         "  # pan and lift" if is_the_arm(model) else "",
     )
     if options["ctrl"] is not None:
@@ -215,7 +215,7 @@ def tables(results: Mapping[str, Replay]) -> dict[str, Any]:
         "np.allclose": lambda r: str(r.close),
         "difference at the end": lambda r: f"{r.difference[-1]:.1e}",
         "largest on the way": lambda r: f"{r.difference.max():.1e}",
-        "a hinge moves by": lambda r: degrees(r.travel, 1),
+        "largest turn of a hinge": lambda r: degrees(r.travel, 1),
     }
     touched = {
         "fewest contacts in a step": lambda r: str(r.contacts.min()),

@@ -24,7 +24,11 @@ _WATCHED = 600  # steps under the keyframe's own ctrl
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
-    """Change everything, reset, and reset to a keyframe."""
+    """Change everything, reset, and reset to the first keyframe, if there is one."""
+    to_keyframe = """\
+sm.reset(model, data, keyframe=0)
+print(model.keyframes[0].name, data.time, data.qpos[1:3].round(3))
+"""
     return f"""\
 import statemachine as sm
 
@@ -34,11 +38,8 @@ data.qvel += 0.1
 data.ctrl += 0.1
 sm.step(model, data, {_STEPS})
 sm.reset(model, data)
-print(data.time, data.qpos[:3])
-for frame in model.keyframes[:1]:
-    sm.reset(model, data, keyframe=0)
-    print(frame.name, data.time, data.qpos[:3].round(3) + 0.0)
-"""
+print(data.time, data.qpos[1:3])
+{to_keyframe if model.keyframes else ""}"""
 
 
 @dataclass(frozen=True)
@@ -226,7 +227,7 @@ def _keyframe(number: int, scenes: Mapping[str, KeyframeScene]) -> Table:
         rows += [
             (f"{after}the robot touches the {first.body}", *(str(s.robot_steps) for s in each)),
             (f"{after}the world touches it", *(str(s.world_steps) for s in each)),
-            ("it rises meanwhile by", *(millimetres(s.rise) for s in each)),
+            ("its height changes meanwhile by", *(millimetres(s.rise) for s in each)),
         ]
     return Table(
         ("what touches", *scenes),

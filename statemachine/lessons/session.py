@@ -9,7 +9,7 @@ import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
@@ -190,7 +190,8 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
         "printed": Printed({name: run.printed for name, run in taken.items()}),
         **(lesson_module.tables(results) if hasattr(lesson_module, "tables") else {}),
     }
-    return template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
+    page = template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
+    return replace(page, title=f"{lesson.name}: {lesson.question}")
 
 
 def stepping_loop(model: Model, marks: Sequence[float], seconds: float) -> tuple[str, str]:

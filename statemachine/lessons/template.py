@@ -2,7 +2,7 @@
 
 A template is Markdown with named slots. Its paragraphs become the blocks of a page:
 
-    # Six numbers in                  the title of the page
+    # Six numbers in                  the title of the page; a lesson has its question as title
     ## Which arrays does it change?   a heading
     {costs}                           alone: a block that the lesson made, or several
     ? {right}: How far is it?         a question: below it "a) …", "b) …" and "> " with the reason

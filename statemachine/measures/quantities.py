@@ -13,7 +13,7 @@ from .text import milliseconds, rounded
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
 COUNT = 2 * np.pi / 4096
-_COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as in the SO-101's servos"
+_COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as small servos have"
 _LEVER = 0.065  # m; what is shorter moves by less than 0.1 mm with one count
 _ENERGY = 0.01  # of what the energy changes by in the run
 _FORCE = 0.05  # of its mean while it acts

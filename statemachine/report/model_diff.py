@@ -7,7 +7,7 @@ from itertools import groupby
 
 from ..compare.models import AgreedFigures, Compared, DescribedFile, Difference
 from ..compare.models.ledger import SUBJECTS, Value
-from ..measures.text import after, capital, listed, reading, rounded, sentence, significant
+from ..measures.text import after, capital, count, listed, reading, rounded, sentence, significant
 from ..page import Block, Items, Page, Table, Text
 from . import template
 from .template import if_true, versions_of
@@ -125,7 +125,8 @@ def _name(side: DescribedFile) -> str:
 def _described(side: DescribedFile) -> str:
     """A side in a few words: how it was read, and what it has."""
     how = "loaded into" if side.format == "engine" else f"{side.format}, by"
-    what = f"{side.links} links, {side.joints} joints, {side.shapes} shapes"
+    parts = ("link", side.links), ("joint", side.joints), ("shape", side.shapes)
+    what = ", ".join(count(number, part) for part, number in parts)
     return f"{side.file} ({how} {side.reader}; {what})"
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..compare import StepComparison
 from ..compare.step_samples import StageGap
-from ..measures.text import NONE, figure, quantity, sentence, short_time
+from ..measures.text import NONE, figure, listed, quantity, sentence, short_time
 from ..page import Headline, Items, Page, Table, TableCell, Text
 from . import template
 
@@ -14,7 +14,8 @@ SAME_BITS = "From the same state both sides take the same step, to the last bit"
 SAME_STEP = "From the same state both sides take the same step"
 PART = "The sides part in the stage “{stage}”, {when} (at {beyond} of {moments} moments): {where}"
 BEFORE = "What comes before it in a step is the same on both sides."
-_HEADS = ("stage", "differs", "of", "largest", "at, s", "where", "from, s", "null", "tolerance")
+OTHERS = "At other moments the first stage that differs is {stages}: that has another cause."
+_HEADS = ("stage", "differs", "first", "largest", "at, s", "where", "from, s", "null", "tolerance")
 
 
 def page(
@@ -35,7 +36,7 @@ def page(
     notes += [sentence(line) for line in result.notes]
     stages = Table(
         _HEADS,
-        [_row(gap, result.moments) for gap in result.stages],
+        [_row(gap) for gap in result.stages],
         "The stages of a step, in their order",
         words=frozenset({0, 5}),
         emphasis=frozenset(k for k, gap in enumerate(result.stages) if gap is result.first),
@@ -61,13 +62,13 @@ def page(
     )
 
 
-def _row(gap: StageGap, moments: int) -> tuple[str, ...]:
+def _row(gap: StageGap) -> tuple[str, ...]:
     if not gap.told or not gap.unit:
         return gap.stage, NONE, NONE, gap.reason or NONE, NONE, NONE, NONE, NONE, NONE
     return (
         gap.stage,
         str(gap.beyond),
-        str(moments),
+        str(gap.leads),
         quantity(gap.worst, gap.unit) if gap.beyond else "≈ 0" if gap.worst else "0",
         TableCell(f"{gap.at:.3f}", at=gap.at) if gap.beyond and gap.at is not None else NONE,
         gap.where if gap.beyond else NONE,
@@ -104,4 +105,6 @@ def _headline(result: StepComparison) -> Headline:
     lead = PART.format(
         stage=first.stage, when=when, beyond=first.beyond, moments=result.moments, where=first.where
     )
-    return Headline(lead, end=BEFORE, holds=False)
+    others = [f"{gap.stage} ({gap.leads})" for gap in result.stages if gap.leads and gap != first]
+    end = f"{BEFORE} {OTHERS.format(stages=listed(others))}" if others else BEFORE
+    return Headline(lead, end=end, holds=False)

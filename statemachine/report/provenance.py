@@ -65,10 +65,7 @@ def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
         ("rows", f"{comparison.one.rows}", f"{comparison.two.rows}"),
         ("seed", *("none drawn" if p.seed is None else f"{p.seed}" for p in (a, b))),
         ("energies by", *(header.energy_by or "–" for header in headers)),
-        (
-            "made again by",
-            *(TableCell(h.command, code=True) if h.command else "–" for h in headers),
-        ),
+        ("made again by", *(TableCell(h.command, code=True) for h in headers)),
     ]
     labels = comparison.one.label, comparison.two.label
     told = [row for row in rows if any(row[1:])]

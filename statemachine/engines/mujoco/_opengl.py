@@ -72,4 +72,4 @@ def diagnosis() -> tuple[bool, str, str]:
         return True, "offscreen", ""
     found = f"offscreen with MUJOCO_GL={works}" if works else "offscreen by default"
     step = f"export MUJOCO_GL={works}" if works else "unset MUJOCO_GL"
-    return True, found, f"{step}, before rendering"
+    return True, found, f"this library sets that itself; in programs of your own: {step}"
