@@ -11,6 +11,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import FloorBand, Uncertainty, chaos_floor, compare, perturbed_runs
+from statemachine.compare.matching import match_models
 from statemachine.compare.perturbed import ROUNDING, Rerun, parse_uncertainty
 from statemachine.compare.why.gap import Ruler
 from statemachine.errors import BadInputError
@@ -132,10 +133,10 @@ def test_a_command_that_stays_as_it_is_does_not_wander() -> None:
 def test_the_ruler_of_causes_has_a_floor_too(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 2.0, qpos=np.array([2.5, 1.0]))
     trace = run.record(derive=False)
-    ruler = Ruler(run.model, trace, trace)
+    ruler = Ruler(match_models(run.model, run.model), trace, trace)
     curves = ruler.curves(trace)
     assert curves is not None
-    floor = ruler.floor(curves, map(ruler.curves, perturbed_runs(run, derive=False)))
+    floor = ruler.floor(curves, [*map(ruler.curves, perturbed_runs(run, derive=False))])
     assert 0 < floor["joints"].worst < 1e-9
     assert floor["joints"].unit == "rad"
 

@@ -269,6 +269,7 @@ def test_why_of_what_cannot_move_is_one_line(tmp_path: Path, cli: Cli) -> None:
 
 def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Model) -> None:
     """A table of 60 000 × 60 000 numbers would be 29 GB."""
+    from statemachine.compare.matching import match_models
     from statemachine.compare.why.gap import Ruler
 
     short = record(mujoco_arm, seconds=0.1, derive=False)
@@ -279,7 +280,7 @@ def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Mo
         {n: np.broadcast_to(short[n][0], (rows, *short[n].shape[1:])).copy()
          for n in ("qpos", "qvel", "ctrl")} | {"time": time},
     )  # fmt: skip
-    ruler = Ruler(mujoco_arm, long, long)
+    ruler = Ruler(match_models(mujoco_arm, mujoco_arm), long, long)
     assert np.array_equal(ruler.time, time)
     assert not ruler.between
 

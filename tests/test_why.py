@@ -601,9 +601,7 @@ def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(
     assert rows["timestep"].last == pytest.approx(expected, abs=1e-9)
     assert rows["timestep"].alone > 0.05
     # The engine has the rotor and the friction of the model only in the model's servo law.
-    assert {name for name, row in rows.items() if row.alone is None} == {
-        TITLES[name] for name in NEEDS
-    }
+    assert {name for name, row in rows.items() if row.alone is None} == {*NEEDS}
 
 
 @pytest.mark.slow

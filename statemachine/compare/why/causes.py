@@ -68,16 +68,15 @@ def differences_of(
         rows += sensors_of(matched)
     if finer:
         rows = [part for row in rows for part in own.entries(two.compiled, row)]
-    for side, only in enumerate(matched.only):
-        for name in only.get("joint", ()):
-            values = (("joint", "there", None) if side == 0 else ("joint", None, "there"),)
-            rows.append(
-                ModelDifference(
-                    *("extra joint", "joint", name, values),
-                    refused="a joint cannot be added or taken away",
-                )
-            )
-    return tuple(rows)
+    extra = [
+        ModelDifference(
+            *("extra joint", "joint", name, (("joint", *there),)),
+            refused="a joint cannot be added or taken away",
+        )
+        for only, there in zip(matched.only, (("there", None), (None, "there")), strict=True)
+        for name in only.get("joint", ())
+    ]
+    return (*rows, *extra)
 
 
 def sensors_of(matched: Matched) -> list[ModelDifference]:

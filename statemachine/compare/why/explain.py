@@ -19,8 +19,9 @@ from ...runs.scenarios import Scenario
 from ..labels import files_apart
 from ..matching import match_alike, match_models, missing_parts
 from ..perturbed import EXACT, Uncertainty
-from .causes import Cause, causes
+from .causes import Cause
 from .locate import Located, locate
+from .of_the_run import order_of_joints
 from .places import Place, places_of
 from .shapley import Method, Shares, shapley
 from .touches import FirstTouch, touched_at_start
@@ -32,6 +33,7 @@ ROUNDING = {"rad": 1e-8, "m": 1e-9}
 UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
 _STILL = 1e-3  # [rad or m] over a whole run
 NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
+_NOT_RUN = "no set of causes with it could be run"
 
 
 @dataclass(frozen=True)
@@ -144,8 +146,7 @@ class Explanation:
         Where something differs that cannot be brought to the same, what is only located may come
         from that, and counts as unexplained.
         """
-        differs = any(row.note for row in self.shares)
-        stays = 1.0 - self.explained if differs else self.unexplained
+        stays = 1.0 - self.explained if any(row.note for row in self.shares) else self.unexplained
         return self.is_rounding or abs(stays) <= UNEXPLAINED
 
 
@@ -199,7 +200,7 @@ def explain(
         BadInputError: Nothing can be measured, or `jobs` is less than 1.
         UnknownNameError: There is no such quantity, or name.
     """
-    began, called = time.perf_counter(), labels or _labels(one, two)
+    began, (left, right) = time.perf_counter(), labels or _labels(one, two)
     scenario = scenario if recordings else scenario.on(one)
     compiled = one.compiled is not None and two.compiled is not None
     matched = match_models(one, two, names) if compiled else match_alike(one, two)
@@ -217,15 +218,14 @@ def explain(
     units = trials.ruler.units
     if quantity is not None and quantity not in units:
         raise unknown_name("quantity", quantity, units)
-    listed = causes(trials.differences(finer), finer)
-    trials.know(listed)
+    listed = trials.causes(finer)
     able = [cause.name for cause in listed if not cause.refused]
     first = trials.gaps(frozenset())
     if not first:
         raise _ended(trials, able)
     if scenario.own and not trials.repeats():
         raise BadInputError(
-            f"two runs of {called[0]} from the same start differ: "
+            f"two runs of {left} from the same start differ: "
             f"{scenario.name} does not command the same twice, and so no gap has a cause; give "
             "what it draws a seed, and let it keep nothing from one run to the next"
         )
@@ -234,8 +234,8 @@ def explain(
     if quantity is None:
         quantity = _quantity(trials, first, floors, measure, one)
     gap, floor = getattr(first[quantity], measure), floors.get(quantity, 0.0)
-    bound = max(ROUNDING[units[quantity]], floor)
-    nothing = gap <= max(ROUNDING[units[quantity]], floor / NOISY)
+    negligible = ROUNDING[units[quantity]]
+    nothing = gap <= max(negligible, floor / NOISY)
     if nothing:
         listed = tuple(cause for cause in listed if cause.kind != "sensor")
 
@@ -254,9 +254,13 @@ def explain(
         needs=trials.needs,
     )
     brought = gap if nothing else value(frozenset(able))
-    rest: tuple[Located, ...] = ()
-    if not nothing and brought is not None:
-        rest = locate(trials, frozenset(able), quantity, measure, gap, brought, bound)
+    rest = (
+        ()
+        if nothing or brought is None
+        else locate(
+            trials, frozenset(able), quantity, measure, gap, brought, max(negligible, floor)
+        )
+    )
     shares = _shares(listed, divided, rest, two, nothing)
     explained, located, unexplained = _parts(gap, brought, rest, nothing)
     progress(1.0)
@@ -264,8 +268,8 @@ def explain(
         experiment=scenario.name,
         says=scenario.says,
         seconds=length,
-        one=called[0],
-        two=called[1],
+        one=left,
+        two=right,
         quantity=quantity,
         unit=units[quantity],
         measure=measure,
@@ -279,13 +283,14 @@ def explain(
         explained=explained,
         located=located,
         unexplained=unexplained,
-        negligible=ROUNDING[units[quantity]],
+        negligible=negligible,
         floor=floor,
         redundant=_redundant(shares, explained),
         impossible=divided.impossible,
         unmatched=matched.only,
         missing=missing_parts(one, two),
-        notes=(*matched.notes, *trials.notes()),
+        # What a function of the user's may stumble over.
+        notes=(*matched.notes, *(order_of_joints(matched) if scenario.own else ())),
         still=_still(listed, one, trials.traces[0]),
         touch=None if nothing else trials.touch(quantity),
         moments=len(trials.ruler.time),
@@ -342,25 +347,21 @@ def _shares(
 ) -> tuple[CauseShare, ...]:
     """The causes, the largest share first; of what was found by a setting of one side, too."""
     places = {} if nothing else places_of(right.path, listed)
-    rows = []
-    for cause in listed:
-        note = cause.refused
-        if not note and divided.share.get(cause.name, 0.0) is None:
-            note = "no set of causes with it could be run"
-        rows.append(
-            CauseShare(
-                name=cause.name,
-                kind=cause.kind,
-                values=tuple(value for row in cause.differences for value in row.values),
-                unit=cause.differences[0].unit,
-                share=divided.share.get(cause.name),
-                error=divided.error.get(cause.name, 0.0),
-                alone=divided.alone.get(cause.name),
-                last=divided.last.get(cause.name),
-                note=note,
-                place=places.get(cause.name),
-            )
+    rows = [
+        CauseShare(
+            name=cause.name,
+            kind=cause.kind,
+            values=tuple(value for row in cause.differences for value in row.values),
+            unit=cause.differences[0].unit,
+            share=divided.share.get(cause.name),
+            error=divided.error.get(cause.name, 0.0),
+            alone=divided.alone.get(cause.name),
+            last=divided.last.get(cause.name),
+            note=cause.refused or _NOT_RUN * (divided.share.get(cause.name, 0.0) is None),
+            place=places.get(cause.name),
         )
+        for cause in listed
+    ]
     rows += [
         CauseShare(
             name=part.name,
@@ -392,13 +393,14 @@ def _parts(
 def _still(listed: tuple[Cause, ...], model: Model, trace: Trace) -> tuple[str, ...]:
     """Joints of some causes, hinges and slides, that hardly move in a run."""
     names = {row.where for cause in listed if cause.kind == "joint" for row in cause.differences}
-    scalar = (JointType.HINGE, JointType.SLIDE)
     return tuple(
         name
         for name, kind, place in zip(
             model.joint_names, model.jnt_type, model.jnt_qposadr, strict=True
         )
-        if name in names and kind in scalar and np.ptp(trace.qpos[:, place]) < _STILL
+        if name in names
+        and kind in (JointType.HINGE, JointType.SLIDE)
+        and np.ptp(trace.qpos[:, place]) < _STILL
     )
 
 
@@ -415,12 +417,10 @@ def _redundant(shares: tuple[CauseShare, ...], explained: float) -> tuple[str, .
     return tuple(names) if len(names) > 1 and explained > UNEXPLAINED else ()
 
 
-def _labels(one: Model, two: Model) -> tuple[str, str]:
+def _labels(one: Model, two: Model) -> Sequence[str]:
     """File and engine of both, with the folders by which two files of one name differ."""
-    files = files_apart(one.path.parts, two.path.parts)
-    labels = [
+    return [
         f"{file} on {model.backend} {model.engine_version}"
-        + (", engine defaults" if getattr(model, "defaults", "model") == "engine" else "")
-        for file, model in zip(files, (one, two), strict=True)
+        + ", engine defaults" * (getattr(model, "defaults", "model") == "engine")
+        for file, model in zip(files_apart(one.path.parts, two.path.parts), (one, two), strict=True)
     ]
-    return labels[0], labels[1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
@@ -38,34 +38,25 @@ class Ruler:
         units: Unit of each quantity.
     """
 
-    def __init__(
-        self, model: Model, one: Trace, two: Trace, matched: Matched | None = None
-    ) -> None:
+    def __init__(self, matched: Matched, one: Trace, two: Trace) -> None:
         """Of two runs as they come.
 
         Args:
-            model: That of `one`; poses are computed with it, unless `curves` is given another.
-            one: A run.
-            two: The other.
-            matched: What of `model` is what of the other's Model; None if they are built alike.
+            matched: What of the one Model is what of the other. Poses are computed with the
+                first, unless `curves` is given another.
+            one: A run of the first Model.
+            two: One of the second.
         """
-        if matched is None and (model.nq, model.joint_names) != (two.header.nq, two.header.joints):
-            raise BadInputError("the two models have other joints: there is nothing to attribute")
         try:
             self.between = False
             self.time = common_moments(one.time, two.time, (one.timestep, two.timestep)).time
         except TraceError:  # too few: rows of the second are made up between its own
             time, end = one.time - one.time[0], two.time[-1] - two.time[0]
-            slack = SAME * one.header.timestep
-            self.between, self.time = True, time[time <= end + slack]
-        self._model = model
-        joints = np.tile(np.arange(model.njnt), (2, 1))
-        models, self._tips = (model, model), (usual_site(model.site_names),) * 2
-        if matched is not None:
-            joints = np.array(matched.joints, dtype=np.int64).reshape(-1, 2).T
-            tip = usual_site([model.site_names[a] for a, _ in matched.sites])
-            models = matched.one, matched.two
-            self._tips = (None, None) if tip is None else matched.sites[tip]
+            self.between, self.time = True, time[time <= end + SAME * one.header.timestep]
+        self._model = model = matched.one
+        joints, models = np.array(matched.joints, np.int64).reshape(-1, 2).T, (model, matched.two)
+        tip = usual_site([model.site_names[a] for a, _ in matched.sites])
+        self._tips = (None, None) if tip is None else matched.sites[tip]
         self._places = [
             JointPlaces.of(m.jnt_type[j], m.jnt_qposadr[j])
             for m, j in zip(models, joints, strict=True)
@@ -96,8 +87,8 @@ class Ruler:
         self.units = {name: QUANTITIES[kind].unit for name, kind in self._kinds.items()}
         if not self.units:
             raise BadInputError(
-                f"nothing can be measured in {model.path.name}: it has no joint"
-                + ("" if matched is None else " that the other has, too")
+                f"nothing can be measured in {model.path.name}: it has no joint that the other "
+                "has, too"
             )
 
     def curves(self, trace: Trace, model: Model | None = None, side: int = 0) -> Curves | None:
@@ -182,7 +173,7 @@ class Ruler:
         """In every quantity."""
         return {name: self.gap(name, one, two) for name in self.units}
 
-    def floor(self, run: Curves, perturbed: Iterable[Curves | None]) -> dict[str, Deviation]:
+    def floor(self, run: Curves, perturbed: Sequence[Curves | None]) -> dict[str, Deviation]:
         """The chaos floor of every quantity: a gap that is no larger says nothing.
 
         Args:
@@ -193,7 +184,6 @@ class Ruler:
         Returns:
             Of each figure the largest that a perturbed run has to `run`.
         """
-        runs = list(perturbed)
         boundless = np.full(len(self.time), np.inf)
         return {
             name: reduce(
@@ -202,7 +192,7 @@ class Ruler:
                     Deviation.of(boundless, self.time, unit)
                     if curves is None
                     else self.gap(name, run, curves)
-                    for curves in runs
+                    for curves in perturbed
                 ],
                 Deviation(unit),
             )

@@ -42,11 +42,6 @@ class Located:
     is_setting: bool
 
 
-def _choice(side: int | None, integrator: str) -> tuple[str, str]:
-    """What the sides have where one of them has another integrator than its file's."""
-    return ("its own", integrator) if side else (integrator, "its own")
-
-
 def locate(
     trials: Trials,
     brought: frozenset[str],
@@ -88,11 +83,11 @@ def locate(
             continue
         without, integrator = more, best
         name, words = (feature.name, feature.without) if feature else ("integrator", "")
-        values = None if feature else _choice(trials.selects, best)
+        chosen = ("its own", best) if trials.selects else (best, "its own")
+        values = None if feature else chosen
         moved = trials.moved(quantity, without, integrator)
         still = bool(without) and trials.extent(quantity, without) < _STILL * extent
         setting = values is not None and not without
-        share = (left - rest) / gap
-        rows.append(Located(name, words, values, share, rest, moved, still, setting))
+        rows.append(Located(name, words, values, (left - rest) / gap, rest, moved, still, setting))
         left = rest
     return tuple(rows)

@@ -29,13 +29,14 @@ TITLES: Mapping[str, str] = {
     "limits": "joint limits",
     "surfaces": "surfaces",
 }
-# An engine's explicit damping does not stand without its motors, and what the engine lacks, or has
-# in another way, an adapter can give it only together with the model's servo law.
+# Of a title the one that it needs. An engine's explicit damping does not stand without its motors,
+# and what the engine lacks, or has in another way, an adapter can give it only together with the
+# model's servo law.
 NEEDS: Mapping[str, str] = {
-    "servo": "damping",
-    "armature": "servo",
-    "frictionloss": "servo",
-    "limits": "servo",
+    "servo law": "damping",
+    "armature": "servo law",
+    "dry friction": "servo law",
+    "joint limits": "servo law",
 }
 _FINER = 4
 
@@ -139,14 +140,14 @@ class OwnSettings:
 
     def _own_word(self, name: str) -> str:
         """What the engine has of a setting, in a few words."""
-        dials = self._dials
-        if name in ("gravity", "timestep"):
-            return _word(name, dials.model)
-        if name == "servo":
-            return "its motors" if self._actuated else "motors hold"
-        if name == "surfaces":
-            return f"friction {_span(dials.frictions)}, hard"
-        return dials.words[name]
+        match name:
+            case "gravity" | "timestep":
+                return _word(name, self._dials.model)
+            case "servo":
+                return "its motors" if self._actuated else "motors hold"
+            case "surfaces":
+                return f"friction {_span(self._dials.frictions)}, hard"
+        return self._dials.words[name]
 
 
 def leave_out(model: Model, features: frozenset[str]) -> Model:
@@ -160,21 +161,21 @@ def leave_out(model: Model, features: frozenset[str]) -> Model:
 
 
 def _word(name: str, model: Model) -> str:
-    if name == "gravity":
-        return rounded(float(np.linalg.norm(model.gravity)), "m/s²")
-    if name == "timestep":
-        text = milliseconds(model.timestep, 3)
-        return f"{text} / {model.substeps}" if model.substeps > 1 else text
-    if name in ("armature", "damping", "frictionloss"):
-        return _span(getattr(model, f"dof_{name}"))
-    if name == "servo":
-        gains = model.actuator_kp
-        known = gains[np.isfinite(gains)]
-        return f"kp {_span(known)}" if known.size else "no servos"
-    if name == "limits":
-        return f"of {int(model.jnt_limited.sum())} joints"
-    if name == "surfaces" and model.compiled is not None:
-        return f"friction {_span(model.compiled.geom_friction[:, 0])}"
+    match name:
+        case "gravity":
+            return rounded(float(np.linalg.norm(model.gravity)), "m/s²")
+        case "timestep":
+            text = milliseconds(model.timestep, 3)
+            return f"{text} / {model.substeps}" if model.substeps > 1 else text
+        case "armature" | "damping" | "frictionloss":
+            return _span(getattr(model, f"dof_{name}"))
+        case "servo":
+            gains = model.actuator_kp[np.isfinite(model.actuator_kp)]
+            return f"kp {_span(gains)}" if gains.size else "no servos"
+        case "limits":
+            return f"of {int(model.jnt_limited.sum())} joints"
+        case "surfaces" if model.compiled is not None:
+            return f"friction {_span(model.compiled.geom_friction[:, 0])}"
     return "of the file"
 
 

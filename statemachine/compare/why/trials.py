@@ -29,9 +29,9 @@ from ...runs.scenarios import Controller, Scenario
 from ..alike import beginning_with, commands_alike, retold, translated
 from ..matching import Matched, SideStart, start_of
 from ..perturbed import RUNS, Rerun, Uncertainty, perturbed_run
-from .causes import Cause, built, differences_of
+from .causes import Cause, built, causes, differences_of
 from .gap import Curves, Ruler
-from .of_the_run import COMMANDS, ORDER, START, of_the_run, order_of_ctrl, order_of_joints
+from .of_the_run import COMMANDS, ORDER, START, of_the_run, order_of_ctrl
 from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, Feature, OwnSettings, leave_out
 from .touches import FirstTouch, first_touch
 
@@ -146,16 +146,16 @@ class Trials:
         # What is derived is read from a second run: so four were made.
         self._took = (time.perf_counter() - began) / 4
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
-        self.ruler = Ruler(one, traces[0], traces[1], matched)
+        self.ruler = Ruler(matched, traces[0], traces[1])
         for side, trace in enumerate(traces):
             self._runs[_Run(side, _NONE)] = self._measured(side, self._models[side], trace)
             self.ended = self.ended or trace.header.ended
 
-    def differences(self, finer: bool) -> tuple[ModelDifference, ...]:
-        """All that can be a cause: of the files, of an engine's own settings, of the run.
+    def causes(self, finer: bool) -> tuple[Cause, ...]:
+        """All that can be one: of the files, of an engine's own settings, of the run.
 
         Args:
-            finer: Differences of files by their single entries.
+            finer: Differences of files by their single entries, each by itself.
         """
         one, two = self._models
         own = [setting for setting in self._own if setting]
@@ -177,7 +177,11 @@ class Trials:
         replaced = [] if own else list(self._by_option())
         self._replaced = frozenset(row.subject for row in replaced)
         rows += replaced
-        return (*rows, *(order_of_ctrl(self._matched) if self._scenario.own else ()))
+        listed = causes(
+            (*rows, *(order_of_ctrl(self._matched) if self._scenario.own else ())), finer
+        )
+        self._by_name = {cause.name: cause for cause in listed}
+        return listed
 
     def _by_option(self) -> Iterator[ModelDifference]:
         """What differs and is brought over by `Model.replace`."""
@@ -193,27 +197,17 @@ class Trials:
                 unit = "s" if name == "timestep" else ""
                 yield ModelDifference(name, "option", "", values, unit)
 
-    def know(self, causes: Sequence[Cause]) -> None:
-        """The causes that can be brought to the same, by their names."""
-        self._by_name = {cause.name: cause for cause in causes}
-
-    def notes(self) -> tuple[str, ...]:
-        """What a function of the user's may stumble over."""
-        return order_of_joints(self._matched) if self._scenario.own else ()
-
     def touch(self, quantity: str) -> FirstTouch | None:
         """The first contact of either side; None where nothing touches, or it is not told."""
         one, two = (self._runs[_Run(side, _NONE)].curves for side in (0, 1))
-        if not one or not two:
-            return None
-        return first_touch(self.traces, self.ruler.time, self.ruler.distances(quantity, one, two))
+        gap = self.ruler.distances(quantity, one, two) if one and two else None
+        return None if gap is None else first_touch(self.traces, self.ruler.time, gap)
 
     @property
     def needs(self) -> dict[str, str]:
         """Of a cause the one that has to be brought to the same before it."""
-        own = any(self._own)
-        pairs = ((TITLES[a], TITLES[b]) for a, b in NEEDS.items()) if own else ()
-        return {a: b for a, b in pairs if {a, b} <= self._by_name.keys()}
+        known = self._by_name.keys() if any(self._own) else set[str]()
+        return {a: b for a, b in NEEDS.items() if {a, b} <= known}
 
     def gaps(
         self, brought: frozenset[str], without: frozenset[str] = _NONE, integrator: str = ""
@@ -225,17 +219,14 @@ class Trials:
             without: Features that are left out on both sides.
             integrator: Another one, on the side that has several.
         """
-        curves = [self._run(run) for run in self._pair(brought, without, integrator)]
-        return self.ruler.gaps(curves[0], curves[1]) if curves[0] and curves[1] else {}
+        one, two = (self._run(run) for run in self._pair(brought, without, integrator))
+        return self.ruler.gaps(one, two) if one and two else {}
 
     def _pair(
         self, brought: frozenset[str], without: frozenset[str] = _NONE, integrator: str = ""
-    ) -> tuple[_Run, _Run]:
+    ) -> list[_Run]:
         chosen = [integrator if k == self.selects else "" for k in (0, 1)]
-        one, two = (
-            _Run(side, self._acting(side, brought), without, chosen[side]) for side in (0, 1)
-        )
-        return one, two
+        return [_Run(side, self._acting(side, brought), without, chosen[side]) for side in (0, 1)]
 
     @property
     def selects(self) -> int | None:
@@ -314,8 +305,7 @@ class Trials:
         try:
             model = self._model(run)
             ran = True
-            trace = self._rerun(run, model).record(derive=False)
-            return self._measured(run.side, model, trace)
+            return self._measured(run.side, model, self._rerun(run, model).record(derive=False))
         except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
             return _Outcome(None, str(error), ran)
 
@@ -430,16 +420,12 @@ class Trials:
         return base if model.compiled is None else base.with_compiled(model.compiled)
 
 
-def _own_settings(
-    models: tuple[Model, Model], options: dict[str, Any]
-) -> tuple[OwnSettings | None, OwnSettings | None]:
+def _own_settings(models: tuple[Model, Model], options: dict[str, Any]) -> list[OwnSettings | None]:
     """Of each side that comes with its engine's settings, where the other does not."""
     dials = [room(model.backend).dials(model, options) for model in models]
-    if all(dials):
-        return None, None
-    actuated = options.get("actuation", True)
-    one, two = (
-        OwnSettings(own, models[1 - side].replace(**options), actuated) if own else None
-        for side, own in enumerate(dials)
-    )
-    return one, two
+    return [
+        OwnSettings(own, other.replace(**options), options.get("actuation", True))
+        if own and not all(dials)
+        else None
+        for own, other in zip(dials, reversed(models), strict=True)
+    ]
