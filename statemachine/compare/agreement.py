@@ -226,8 +226,7 @@ def _first_touches(
         if len(known) == 1:  # as late as can be: it had not touched when the comparison ended
             side = first.index(None)
             pairs = same_pairs({touch.pair: None}, dict.fromkeys((one, two)[side].touches()))
-            word = "later" if touch.pair in pairs else "never"
-            note = f"{word} {on(labels[side])}"
+            note = f"{'later' if touch.pair in pairs else 'never'} {on(labels[side])}"
             known.append(until)
         gap = abs(known[0] - known[1])
         name, at = f"{touch.pair}, first touch", np.array([min(known)])

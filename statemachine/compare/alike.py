@@ -14,7 +14,7 @@ from ..interface import Array, Data, Model
 from ..runs import Trace, model_file
 from ..runs.recorder import layout_of
 from ..runs.scenarios import Controller
-from .matching import Matched, Pairs, match_models, start_of
+from .matching import Matched, Pairs, SideStart, match_models, start_of
 from .sides import Request
 
 
@@ -84,14 +84,8 @@ def translated(trace: Trace, matched: Matched, start: tuple[Array, Array, Array]
         start: Qpos (nq,), qvel (nv,) and ctrl (nu,) of the second, for what the first has no
             counterpart of.
     """
-    qpos, qvel, ctrl = start
-    return replace_layout(
-        trace,
-        matched.two,
-        matched.qpos(trace.qpos, qpos),
-        matched.qvel(trace.qvel, qvel),
-        matched.ctrl(trace.ctrl, ctrl),
-    )
+    recorded = SideStart(trace.qpos, trace.qvel, trace.ctrl)
+    return replace_layout(trace, matched.two, *matched.start(recorded, SideStart(*start)))
 
 
 def for_left(trace: Trace, model: Model, request: Request) -> Trace:
@@ -115,16 +109,21 @@ def in_terms_of_right(left: Trace, right: Trace | None, matched: Matched | None)
     """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
     if matched is None:
         return left
-    start = start_of(matched.two, None)
-    if right is not None:
-        start = right.qpos[0], right.qvel[0], right.ctrl[0]
+    start = (
+        start_of(matched.two, None)
+        if right is None
+        else (right.qpos[0], right.qvel[0], right.ctrl[0])
+    )
     return translated(left, matched, start)
 
 
 def same_commands(theirs: Trace, right: Trace) -> bool:
     """Whether the right was told what the left was, from the same start."""
-    starts = (np.array_equal(theirs[name][0], right[name][0]) for name in ("qpos", "qvel"))
-    return all(starts) and commands_alike(theirs, right)
+    return (
+        np.array_equal(theirs.qpos[0], right.qpos[0])
+        and np.array_equal(theirs.qvel[0], right.qvel[0])
+        and commands_alike(theirs, right)
+    )
 
 
 def commands_alike(theirs: Trace, right: Trace) -> bool:

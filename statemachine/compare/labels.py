@@ -45,15 +45,11 @@ def labels_of(one: Header, two: Header) -> Labels:
     backends = one.backend, two.backend
     own = [", engine defaults" * (header.defaults == "engine") for header in (one, two)]
     ways = backends[0] + own[0], backends[1] + own[1]
-    if one.backend != two.backend:
-        short = backends
-    elif ways[0] != ways[1]:
-        short = ways
-    else:
-        short = next(iter(others), engines if engines[0] != engines[1] else ways)
+    # The first by which they differ.
+    short = next((two for two in (backends, ways, *others, engines) if two[0] != two[1]), ways)
     parts = [*([engines] if engines[0] != engines[1] or not others else []), *others]
     long = ", ".join(part[0] for part in parts), ", ".join(part[1] for part in parts)
-    return Labels(_numbered(long), _numbered(short))
+    return Labels(numbered(long), numbered(short))
 
 
 def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterator[str]:
@@ -72,8 +68,7 @@ def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterato
 
 def files_apart(one: Sequence[str], two: Sequence[str]) -> Two:
     """The shortest ends of two paths, given by their parts, that are not the same."""
-    most = max(len(one), len(two))
-    for count in range(1, most + 1):
+    for count in range(1, max(len(one), len(two)) + 1):
         ends = "/".join(one[-count:]), "/".join(two[-count:])
         if ends[0] != ends[1]:
             return ends
@@ -99,13 +94,12 @@ def options_apart(one: Mapping[str, Any], two: Mapping[str, Any]) -> Two:
 
 def typed_option(name: str, value: Any) -> str:
     """An option as one types it: "timestep=0.002", "contacts=off", "gravity=0,0,-9.8"."""
-    if isinstance(value, bool):
-        text = "on" if value else "off"
-    elif isinstance(value, str) or value is None:
-        text = str(value)
-    else:
-        text = ",".join(f"{number:.15g}" for number in np.atleast_1d(value))
-    return f"{name}={text}"
+    match value:
+        case bool():
+            return f"{name}={'on' if value else 'off'}"
+        case str() | None:
+            return f"{name}={value}"
+    return f"{name}={','.join(f'{number:.15g}' for number in np.atleast_1d(value))}"
 
 
 def _apart(one: Header, two: Header) -> Iterator[Two]:
@@ -141,7 +135,7 @@ def _with_known(header: Header, other: Header) -> dict[str, Any]:
     return {**header.options, **{name: known[name] for name in missing}}
 
 
-def _numbered(names: Two) -> Two:
+def numbered(names: Two) -> Two:
     """Two that are alike, with their places."""
     return names if names[0] != names[1] else (f"{names[0]} (first)", f"{names[1]} (second)")
 

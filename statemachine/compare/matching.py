@@ -195,20 +195,18 @@ def _solid(pair: Pair) -> BodyPair:
     return BodyPair(bodies[0], bodies[1], pair.align, pair.moved)
 
 
-def _led(one: Model, two: Model, given: Mapping[str, str]) -> Iterator[BodyPair]:
-    """The mocap bodies: no joint moves them, but they are no part of the world; by name."""
+def _led(one: Model, two: Model, given: Mapping[str, str]) -> list[BodyPair]:
+    """The mocap bodies: no joint moves them, but they are no part of the world; by name.
+
+    Those without a name in both are one where as many others come before them.
+    """
+    bodies = [np.flatnonzero(model.compiled.body_mocapid >= 0).tolist() for model in (one, two)]
     ours, theirs = (
-        [int(body) for body in np.flatnonzero(model.compiled.body_mocapid >= 0)]
-        for model in (one, two)
+        [m.body_names[b] for b in own] for m, own in zip((one, two), bodies, strict=True)
     )
-    names = {two.body_names[b]: b for b in theirs}
-    for place, a in enumerate(ours):
-        name = one.body_names[a]
-        b = names.get(given.get(name, name)) if name else None
-        if not name and place < len(theirs) and not two.body_names[theirs[place]]:
-            b = theirs[place]
-        if b is not None:
-            yield BodyPair(a, b, HERE, False)
+    nameless = [(k, k) for k, names in enumerate(zip(ours, theirs, strict=False)) if not any(names)]
+    pairs = sorted([*_by_name(ours, theirs, given), *nameless])
+    return [BodyPair(bodies[0][a], bodies[1][b], HERE, False) for a, b in pairs]
 
 
 def _by_name(ours: Sequence[str], theirs: Sequence[str], given: Mapping[str, str]) -> Pairs:

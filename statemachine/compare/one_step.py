@@ -179,16 +179,15 @@ def _taken(
     """Take a step, and read what it was made of, and how the velocity changed a second."""
     model, (qpos, qvel) = data.model, start
     # After a step, derived arrays are of the state before its last engine step.
-    behaviour = model.capabilities.behaviours["stale after a step"].support
-    after = model.substeps == 1 and behaviour != "unsupported"
-    if not after:
-        forward(model, data)
-        found = reader.read(side, data, qpos)
+    stale = model.capabilities.behaviours["stale after a step"].support
+    if model.substeps == 1 and stale != "unsupported":
         step(model, data)
+        reading = reader.read(side, data, qpos)
     else:
+        forward(model, data)
+        reading = reader.read(side, data, qpos)
         step(model, data)
-        found = reader.read(side, data, qpos)
-    return found, (data.qvel - qvel) / model.timestep
+    return reading, (data.qvel - qvel) / model.timestep
 
 
 def _notes(matched: Matched, samples: StepSamples) -> tuple[str, ...]:

@@ -86,10 +86,9 @@ class Side:
         model = self.taken.given_to(load_it())
         return model.replace(**options) if options else model
 
-    def taking(self, parts: Iterable[str], of: Side, names: Mapping[str, str]) -> Side:
+    def taking(self, parts: Sequence[str], of: Side, names: Mapping[str, str]) -> Side:
         """Itself with some parts of another side's file; `names` as of `TakenParts`."""
-        parts = tuple(parts)
-        return replace(self, taken=TakenParts(parts, of, names)) if parts else self
+        return replace(self, taken=TakenParts(tuple(parts), of, names)) if parts else self
 
 
 @dataclass(frozen=True)
@@ -294,17 +293,16 @@ class Request:
             if side.taken
         )
 
-    def on_backends(self, model: str) -> tuple[Side, Side]:
+    def on_backends(self, model: str) -> list[Side]:
         """The two sides of one model, where only backends were said.
 
         Args:
             model: The experiment's own, where none was said either.
         """
-        one, two = (
+        return [
             Side(self.model or model, backend, self.defaults, {}, self.menagerie)
             for backend in self.backends
-        )
-        return one, two
+        ]
 
     def scenario(self) -> Scenario:
         """What is run: an experiment of ours, or the function of the user's.
@@ -394,6 +392,5 @@ def _another(sides: Sequence[Side]) -> str:
     """An example of the side that is missing."""
     if not sides:
         return "so101@pybullet"
-    side = sides[0]
-    other = next(name for name in reversed(PAIR) if name != side.engine)
-    return f"{Path(side.file).name}@{other}"
+    other = next(name for name in reversed(PAIR) if name != sides[0].engine)
+    return f"{Path(sides[0].file).name}@{other}"

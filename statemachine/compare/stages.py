@@ -209,8 +209,7 @@ def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
     geoms = ["world", *([""] * (len(labels) - 1))]
     names = ContactNames(labels, geoms, range(len(labels)), parents)
     right = [counterpart[int(body)] for body in two.geom_bodyid]
-    left = one.geom_bodyid.tolist()
-    return (names.pair, left), (names.pair, right)
+    return (names.pair, one.geom_bodyid.tolist()), (names.pair, right)
 
 
 def _dofs(model: Model, joints: Sequence[int]) -> tuple[Ints, list[str], NDArray[np.bool_]]:

@@ -165,9 +165,8 @@ class StepSamples:
         for stage in STAGES:
             own = [self._gap(each) for each in measures if each.group.stage == stage]
             if not own:
-                touches = stage == FOUND
-                reason = "nothing touches" if touches else "an engine does not tell it"
-                own = [StageGap(stage, touches, reason)]
+                reason = "nothing touches" if stage == FOUND else "an engine does not tell it"
+                own = [StageGap(stage, stage == FOUND, reason)]
             # Of the measures of one stage that of pairs comes last, and says more than joints do.
             gap = max(reversed(own), key=_how_far if stage != FORCE else _differs)
             found.append(replace(gap, leads=leading[stage]))
@@ -203,10 +202,11 @@ class StepSamples:
             stands &= (most >= padded[:-2]) & (most > padded[2:])  # no flank of another
             for row in np.flatnonzero(stands).tolist():
                 joint = each.group.names[int(np.argmax(each.apart[row]))]
-                spike = StepSpike(
-                    self.times[row], float(most[row]), each.group.unit, joint, *firsts[row]
+                found.append(
+                    StepSpike(
+                        self.times[row], float(most[row]), each.group.unit, joint, *firsts[row]
+                    )
                 )
-                found.append(spike)
         return tuple(sorted(found, key=lambda spike: -spike.size)[:_MOST_SPIKES])
 
     def _firsts(self, measures: Sequence[StageMeasure]) -> list[tuple[str, str]]:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..backends import backend_names, load
+from ..backends import backend_names
 from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError, check_name
 from ..installed import DEFAULT
 from ..interface import Model
@@ -75,8 +75,7 @@ class SidesRun:
         """What could not be matched, and what was matched by more than its name."""
         if self.matched is None:
             return ()
-        labels = labels_of(self.left.header, self.right.header).long
-        lines = [*lacking(self.matched.only, labels)]
+        lines = [*lacking(self.matched.only, labels_of(self.left.header, self.right.header).long)]
         if any(only.get("joint") for only in self.matched.only):
             lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
@@ -139,7 +138,6 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
     if matched is not None:
         both = [told_alike(one, each, matched) for each in rights]
         one, rights = both[0][0], [two for _, two in both]
-    file = left.path if left.path == right.path else None
     return SidesRun(
         left=one,
         right=rights[0],
@@ -147,7 +145,7 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
         commands=commands,
         matched=matched,
         reruns=reruns,
-        file=file,
+        file=left.path if left.path == right.path else None,
         missing=missing_parts(*models),
         said=(*said, *request.taken),
     )
@@ -258,13 +256,13 @@ def sides_of(
     what = request.what[0]
     if what not in SCENARIOS and Path(what).is_file():
         raise BadInputError(f"{what!r} is no trace: a trace ends in .npz or .parquet")
-    request.scenario()
+    model = request.scenario().model
     for name in request.backends:
         check_name("backend", name, backend_names())
     said: list[str] = []
     traces = [
-        _run(request, name, said, part_of(progress, 0.5 * k, 0.5))
-        for k, name in enumerate(request.backends)
+        _run(request, side, said, part_of(progress, 0.5 * k, 0.5))
+        for k, side in enumerate(request.on_backends(model))
     ]
     if all(trace.header.recorded for trace in traces):
         raise MissingEngineError("no engine of the two is installed here", engine=DEFAULT)
@@ -293,13 +291,12 @@ def recorded_sides(
         sides = (*sides, _other_side(request, sides[0]))
     header = traces[0].header
     seconds = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
-
-    def controller(_model: Model, _seed: int) -> Controller:
-        return commands_of(traces[0])
-
-    options = header.options if request.sides else {}
-    name, says = header.experiment, header.says
-    again = Scenario(name, says, "", seconds, controller, lambda _: says, options=options)
+    again = Scenario(
+        *(header.experiment, header.says, "", seconds),
+        lambda _model, _seed: commands_of(traces[0]),
+        lambda _: header.says,
+        options=header.options if request.sides else {},
+    )
     return again, (sides[0], sides[1]), traces
 
 
@@ -329,15 +326,10 @@ def _refuse_of_run(request: Request, **given: bool) -> None:
         raise BadInputError(f"--{option} is of a run, and a trace is a run that was made")
 
 
-def _run(request: Request, backend: str, said: list[str], progress: Progress) -> Trace:
-    asked = request.scenario()
+def _run(request: Request, side: Side, said: list[str], progress: Progress) -> Trace:
+    asked, backend = request.scenario(), side.engine
     try:
-        model = load(
-            request.model or asked.model,
-            backend=backend,
-            defaults=request.defaults,
-            menagerie=request.menagerie,
-        )
+        model = side.load()
     except MissingEngineError as error:
         if request != Request(request.what, request.backends, request.defaults):
             raise  # nothing like it was recorded

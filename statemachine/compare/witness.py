@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..backends import load
-from ..errors import MissingEngineError, StateMachineError
+from ..errors import StateMachineError
 from ..installed import WITNESS
 from ..kinematics import Kinematics, shared_joints
 from ..measures import distances
@@ -82,8 +82,6 @@ def _readable(file: Path, header: Header, site: str) -> Kinematics:
         try:
             found = Kinematics(path)
             names = [header.joints[k] for k in shared_joints(found, header.joints)]
-        except MissingEngineError:
-            raise
         except StateMachineError:
             continue
         if site in found.site_names:

@@ -219,8 +219,9 @@ def compare(
         if robot.format != "URDF":  # which no engine has read
             engine, _, version = robot.reader.partition(" ")
             versions[engine] = version
-    left, right = _side(trees[0].robot), _side(robots[1])
-    return Compared(left, right, found, digits, versions, tuple(skipped))
+    return Compared(
+        _side(trees[0].robot), _side(robots[1]), found, digits, versions, tuple(skipped)
+    )
 
 
 def _mass(robot: Robot) -> float:

@@ -143,8 +143,7 @@ def _is_told(difference: ModelDifference) -> bool:
     names = {name.partition("[")[0] for name, _, _ in difference.values}
     if difference.subject in _UNTOLD or (names and names <= _UNTOLD_FIGURES):
         return False
-    known = _SUBJECTS.get(difference.kind, {})
-    return difference.kind in _SETTINGS or difference.subject in known
+    return difference.kind in _SETTINGS or difference.subject in _SUBJECTS.get(difference.kind, ())
 
 
 def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) -> None:

@@ -77,13 +77,14 @@ class _Driven:
     def effect_of_drive(self, field: str, drive: Actuator) -> str:
         """Of kp the sag under the load that a joint may have; of kv the damping ratio."""
         kp = drive.kp or 0.0
-        if field == "kp" and kp > 0:
-            return f"sags {rounded(self.load / kp, 'm' if self.slides else 'rad', 2)}"
-        if field == "kv" and kp > 0 < self.inertia:
-            damping = (drive.kv or 0.0) + (self.joint.damping or 0.0)
-            return f"damping ratio {damping / (2 * math.sqrt(kp * self.inertia)):.2g}"
-        if field in ("kp", "kv") or (field == "controls" and drive.kind == "position"):
-            return ""
+        match field, drive.kind:
+            case "kp", _ if kp > 0:
+                return f"sags {rounded(self.load / kp, 'm' if self.slides else 'rad', 2)}"
+            case "kv", _ if kp > 0 < self.inertia:
+                damping = (drive.kv or 0.0) + (self.joint.damping or 0.0)
+                return f"damping ratio {damping / (2 * math.sqrt(kp * self.inertia)):.2g}"
+            case ("kp" | "kv", _) | ("controls", "position"):
+                return ""
         return f"at most {self.force(self.joint.effort)}"
 
     def force(self, value: float | None) -> str:
@@ -191,9 +192,7 @@ def of_settings(book: Ledger, one: GroupTree, two: GroupTree) -> Iterator[str]:
     """Settings of the simulation; where a format has none, what the other would change."""
     robots = one.robot, two.robot
     settings = [robot.settings for robot in robots]
-    if settings == [None, None]:
-        return
-    if None in settings:
+    if settings.count(None) == 1:
         silent, said = robots if settings[0] is None else robots[::-1]
         for name, value in (said.settings or {}).items():
             usual = said.defaults.get(name)
