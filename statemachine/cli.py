@@ -60,9 +60,9 @@ class _Parser(argparse.ArgumentParser):
         if "expected one argument" in message:
             flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
             named = {name: each for each in self._actions for name in each.option_strings}
-            typed = _after(flag)
-            if typed and typed not in named:
-                message += f" (one that begins with a minus: {flag}={typed})"
+            behind = sys.argv[sys.argv.index(flag) + 1 :] if flag in sys.argv else []
+            if behind and behind[0] and behind[0] not in named:
+                message += f" (one that begins with a minus: {flag}={behind[0]})"
             elif flag in named and isinstance(metavar := named[flag].metavar, str):
                 message += f": {flag} {metavar}"
         if message.startswith("unrecognized arguments: -"):
@@ -71,12 +71,6 @@ class _Parser(argparse.ArgumentParser):
             message += did_you_mean(given, known, 0.6)
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
-
-
-def _after(flag: str) -> str:
-    """What was typed after a flag, to show it as it would be taken."""
-    typed = sys.argv[sys.argv.index(flag) + 1 :] if flag in sys.argv else []
-    return typed[0] if typed else ""
 
 
 def _flags(parser: argparse.ArgumentParser, words: Sequence[str]) -> set[str]:
@@ -103,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         options = _options(list(sys.argv[1:] if arguments is None else arguments))
-        code = _run(options)
+        code = options.run(options)
         sys.stdout.flush()
         return code
     except MissingEngineError as error:
@@ -137,26 +131,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _options(words: list[str]) -> argparse.Namespace:
     named = next((word for word in words if word in COMMANDS), "lesson")
     parser = _parser([named])
-    if named != "lesson":
-        return parser.parse_args(words)
-    from .commands import lesson
+    if named == "lesson":
+        from .commands import lesson
 
-    for k, word in enumerate(words[1:], start=1):
-        if words[k - 1] == "lesson":  # one of the path may be called by its number
-            words[k] = lesson.by_number(word)
+        parser.set_defaults(run=lesson.overview)
+        for k, word in enumerate(words[1:], start=1):
+            if words[k - 1] == "lesson":  # one of the path may be called by its number
+                words[k] = lesson.by_number(word)
     options = parser.parse_args(words)
-    if getattr(options, "run", None) is None:
-        options.run = lesson.overview
-    return options
-
-
-def _run(options: argparse.Namespace) -> int:
     if getattr(options, "trust_binary", False):
         from .backends.binary import TRUST
 
         os.environ[TRUST] = "1"  # which workers inherit
     check_rules(options)
-    return options.run(options)
+    return options
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:
@@ -189,5 +177,7 @@ def _parser(wanted: Collection[str]) -> argparse.ArgumentParser:
         shown: dict[str, Any] = {"help": says} if name in FIRST else {}
         command = commands.add_parser(name, **shown)
         if name in wanted:
-            importlib.import_module(f".commands.{name}", __package__).add(command)
+            module = importlib.import_module(f".commands.{name}", __package__)
+            command.set_defaults(run=module.run)
+            module.add(command)
     return parser

@@ -1,7 +1,7 @@
 """The commands of the command line, one file each; importing them loads no engine.
 
-A command is a module of this package, imported when it is typed, with `add(parser)`: it gives the
-parser its options, and the default `run`, which takes the parsed options and returns the exit code.
+A command is a module of this package, imported when it is typed, with two functions: `add(parser)`
+gives the parser its options, and `run(options)` takes the parsed ones and returns the exit code.
 """
 
 from __future__ import annotations

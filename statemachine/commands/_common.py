@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,24 @@ def one_line(text: object) -> str:
     A name may come from a file that somebody else made.
     """
     return "".join(c if c.isprintable() else "?" for c in " ".join(str(text).split()))
+
+
+@contextmanager
+def resumable(written: Path | None, what: str, but: str = "") -> Iterator[None]:
+    """Say, where a Ctrl-C ends it, what there is already, and how to go on.
+
+    Args:
+        written: The file or the folder that it is in.
+        what: What was done with what is there.
+        but: What is to be typed otherwise.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        if written is not None and written.exists():
+            text = f"stopped; {written} has what was {what}. Type the same{but} to go on"
+            raise SystemExit(complain(text, 130)) from None
+        raise
 
 
 def refuse(*rows: tuple[object, str]) -> None:
@@ -211,12 +230,16 @@ def on_each_backend(
             continue
         with progress(f"{what} on {backend}") as report:
             results[backend] = run(loaded, backend, report)
-    refusals = list({str(error): error for error in missing}.values())  # each text once
-    for error in refusals if results else refusals[:-1]:
-        complain(error, MISSING)
-    if not results:
-        raise refusals[-1]
+    say_missing([*{str(error): error for error in missing}.values()], results)  # each text once
     return results
+
+
+def say_missing(errors: Sequence[StateMachineError], others: Collection[Any]) -> None:
+    """A line for each engine that is missing; the last one is raised where there is no other."""
+    for error in errors if others else errors[:-1]:
+        complain(error, MISSING)
+    if not others:
+        raise errors[-1]
 
 
 def pairs_of(given: list[str], option: str) -> dict[str, str]:

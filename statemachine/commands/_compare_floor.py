@@ -18,18 +18,12 @@ OPTIONS: tuple[Row, ...] = (
 )
 
 
-def check(options: argparse.Namespace) -> None:
-    """Raise BadInputError for an uncertainty that is no size."""
-    from ..compare.perturbed import parse_uncertainty
-
-    parse_uncertainty(options.uncertainty)
-
-
 def floor_of(
     options: argparse.Namespace,
     request: Any,
     comparison: Any,
-    traces: tuple[Any, Any],
+    one: Any,
+    two: Any,
     rerun: Any = None,
 ) -> Any:
     """The chaos floor of an experiment; None where nothing can be run again.
@@ -38,13 +32,13 @@ def floor_of(
         options: `uncertainty` and `no_chaos` are read.
         request: The `compare.Request`.
         comparison: Of the traces.
-        traces: Both sides.
+        one: The trace of the left side.
+        two: That of the right.
         rerun: How the left was run, if sides were given.
 
     Raises:
         BadInputError: An uncertainty was given, and the left side was not run here.
     """
-    one, two = traces
     if options.no_chaos:
         return None
     if (request.is_traces and not request.sides) or one.header.recorded:

@@ -106,9 +106,8 @@ def _why(options: argparse.Namespace, request: Any, traces: tuple[Any, Any]) -> 
 
 def _models(request: Any, traces: tuple[Any, Any]) -> Any:
     """The page of what each engine makes of the model; None where that cannot be read."""
-    names = [trace.header.provenance.model_file for trace in traces]
-    if request.sides:
-        names = [side.path for side in request.sides]
+    recorded = [trace.header.provenance.model_file for trace in traces]
+    names = [side.path for side in request.sides] or recorded
     engines = tuple(trace.header.backend for trace in traces)
     if engines[0] == engines[1] and names[0] == names[1]:
         return None
@@ -117,14 +116,14 @@ def _models(request: Any, traces: tuple[Any, Any]) -> Any:
 
     files = [request.model or name for name in names]
     try:
-        found = compare(
-            files[0],
-            files[1],
-            engines=engines,
-            rename=request.names,
-            menagerie=request.menagerie,
+        return page(
+            compare(
+                *files,
+                engines=engines,
+                rename=request.names,
+                menagerie=request.menagerie,
+            )
         )
-        return page(found)
     except (StateMachineError, OSError):
         return None
 

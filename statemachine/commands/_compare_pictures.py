@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from ..errors import ModelFileError, UnknownNameError
-from ._common import Row, complain
+from ._common import Row, complain, file_name
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -29,23 +27,14 @@ OF_FILM: tuple[Row, ...] = (
     ),
 )
 OPTIONS: tuple[Row, ...] = (
-    ("--plot", "FILE", "write a figure: .svg, .png or .pdf"),
-    ("--film", "FILE", "write a film of both sides: .webp or .mp4"),
+    ("--plot", "FILE", "write a figure: .svg, .png or .pdf", {"type": file_name}),
+    ("--film", "FILE", "write a film of both sides: .webp or .mp4", {"type": file_name}),
     *OF_FILM,
 )
 
 
-@dataclass(frozen=True)
-class Pictures:
-    """What was asked for, and can be made here."""
-
-    plot: Path | None
-    film: Path | None
-    renderer: Any = None
-
-
-def checked(options: argparse.Namespace) -> Pictures:
-    """What was asked for, before anything runs.
+def checked(options: argparse.Namespace) -> Any:
+    """What draws the film, before anything runs; None where none is asked for.
 
     Raises:
         BadInputError: A file has another suffix or cannot be written, or a figure is none.
@@ -53,33 +42,32 @@ def checked(options: argparse.Namespace) -> Pictures:
     """
     from ..runs.whole import check_place
 
-    plot, film = (None if word is None else Path(word) for word in (options.plot, options.film))
-    if plot is not None:
+    if options.plot is not None:
         from ..report import figures
 
-        figures.check_suffix(plot)
-        check_place(plot)
+        figures.check_suffix(options.plot)
+        check_place(options.plot)
     renderer = None
-    if film is not None:
+    if options.film is not None:
         from ..rendering import renderer_here, renderers
         from ..rendering.pictures import check_size, check_speed
         from ..report import film as films
         from ..report.progress import progress
 
-        films.check_suffix(film)
+        films.check_suffix(options.film)
         check_speed(options.fps, options.slow)
         check_size(options.size, films.SMALLEST)
-        check_place(film)
+        check_place(options.film)
         with progress("looking for OpenGL"):
             asked = None if options.renderer == "auto" else options.renderer
             renderer = renderer_here(asked)
         if not asked and renderer.name != renderers()[0]:
             complain(f"no OpenGL here: the film is drawn by {renderer}", 0)
-    return Pictures(plot, film, renderer)
+    return renderer
 
 
 def write(
-    pictures: Pictures,
+    renderer: Any,
     options: Any,
     one: Any,
     two: Any = None,
@@ -90,8 +78,9 @@ def write(
     """Write what was asked for; a line for each file on standard error.
 
     Args:
-        pictures: From `checked`.
-        options: Those of a film; `model` and `menagerie` say what it shows, if not the traces.
+        renderer: From `checked`.
+        options: `plot`, `film` and those of a film; `model` and `menagerie` say what it shows, if
+            not the traces.
         one: A trace.
         two: The other one; None for pictures of one trace.
         comparison: Of the two.
@@ -100,7 +89,7 @@ def write(
     """
     from ..report.progress import progress
 
-    if pictures.plot is not None:
+    if options.plot is not None:
         from ..report import plot
 
         with progress("figure"):
@@ -109,9 +98,9 @@ def write(
                 if two is None
                 else plot.of_comparison(one, two, comparison, floor)
             )
-            size = plot.write_plot(figure, pictures.plot)
-        complain(f"{pictures.plot}: a figure, {_bytes(size)}", 0)
-    if pictures.film is not None:
+            size = plot.write_plot(figure, options.plot)
+        complain(f"{options.plot}: a figure, {_bytes(size)}", 0)
+    if options.film is not None:
         from ..report import film as films
 
         files = [side.path for side in request.sides] if request else []
@@ -122,7 +111,7 @@ def write(
             one, two = with_bodies_of(one, models[0]), with_bodies_of(two, models[1])
         with progress("film") as told:
             film = films.write_film(
-                pictures.film,
+                options.film,
                 one,
                 two,
                 comparison,
@@ -130,7 +119,7 @@ def write(
                 fps=options.fps,
                 slow=options.slow,
                 models=models,
-                renderer=pictures.renderer,
+                renderer=renderer,
                 progress=told,
             )
         complain(

@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ..errors import BadInputError
-from ._common import PROGRAM
-
 
 def both_of(request: Any) -> tuple[Any, Any]:
     """How both sides of a request are run: each a `compare.Rerun`.
@@ -20,9 +17,10 @@ def both_of(request: Any) -> tuple[Any, Any]:
     from ..compare import run_sides
 
     run = run_sides(request)
-    if run.reruns:
-        return run.reruns
-    return played_on(request, 0, run.left), played_on(request, 1, run.right)
+    return run.reruns or (
+        played_on(request, 0, run.left),
+        played_on(request, 1, run.right),
+    )
 
 
 def played_on(request: Any, place: int, trace: Any) -> Any:
@@ -35,19 +33,12 @@ def played_on(request: Any, place: int, trace: Any) -> Any:
 
 def side_of(request: Any, place: int) -> Any:
     """How one of two engines runs an experiment, as a `compare.Rerun`."""
-    from ..backends import load
     from ..compare import rerun_of
 
     asked = request.scenario()
-    model = load(
-        request.model or asked.model,
-        backend=request.backends[place],
-        defaults=request.defaults,
-        menagerie=request.menagerie,
-    )
     return rerun_of(
         asked,
-        model,
+        request.on_backends(asked.model)[place].load(),
         seconds=request.seconds,
         seed=request.seed,
         defaults=request.defaults,
@@ -57,18 +48,10 @@ def side_of(request: Any, place: int) -> Any:
 
 def finer(request: Any, times: int) -> Any:
     """The same request with so many engine steps to one of before."""
+
+    def with_more(options: dict[str, Any], usual: int) -> dict[str, Any]:
+        return {**options, "substeps": options.get("substeps", usual) * times}
+
     given = request.options.get("substeps", 1)
-    sides = []
-    for side in request.sides:
-        own = side.options.get("substeps", given) * times
-        sides.append(replace(side, options={**side.options, "substeps": own}))
-    options = {**request.options, "substeps": given * times}
-    return replace(request, options=options, sides=tuple(sides))
-
-
-def refuse_recorded(request: Any, flag: str) -> None:
-    """Raise BadInputError where only recorded runs are asked for."""
-    if request.is_traces and not request.sides:
-        raise BadInputError(
-            f"{flag} runs both sides, and a trace is a run that was made: {PROGRAM} compare hold"
-        )
+    sides = tuple(replace(s, options=with_more(s.options, given)) for s in request.sides)
+    return replace(request, options=with_more(request.options, 1), sides=sides)

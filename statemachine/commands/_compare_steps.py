@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ._common import Row, show
-from ._compare_rerun import both_of, finer, refuse_recorded
+from ._common import PROGRAM, Row, refuse, show
+from ._compare_rerun import both_of, finer
 
 OPTIONS: tuple[Row, ...] = (
     (
@@ -30,19 +30,27 @@ def run(options: argparse.Namespace, request: Any) -> int:
         options: `one_step` and `json` are read.
         request: The `compare.Request`; not of recorded traces alone.
     """
-    refuse_recorded(request, "--one-step" if options.one_step else "--converge")
+    refuse(
+        (
+            request.is_traces and not request.sides,
+            f"{'--one-step' if options.one_step else '--converge'} runs both sides, and a trace is "
+            f"a run that was made: {PROGRAM} compare hold",
+        )
+    )
     return _one_step(options, request) if options.one_step else _converge(options, request)
 
 
 def _one_step(options: argparse.Namespace, request: Any) -> int:
     from ..compare import one_step
+    from ..compare.labels import numbered
     from ..report.one_step import page
     from ..report.progress import progress
 
     left, right = both_of(request)
     with progress("one step") as told:
         found = one_step(left, right.model, names=request.names, progress=told)
-    return show(page(found, _labels(request), _name(request)), found, options.json)
+    labels = numbered(tuple(side.label for side in request.sides) or request.backends)
+    return show(page(found, labels, _name(request)), found, options.json)
 
 
 def _converge(options: argparse.Namespace, request: Any) -> int:
@@ -62,9 +70,3 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
 def _name(request: Any) -> str:
     """What is run: an experiment, or a file without its folder."""
     return Path(request.what[0]).name
-
-
-def _labels(request: Any) -> tuple[str, str]:
-    """What the sides are called."""
-    one, two = [side.label for side in request.sides] or request.backends
-    return (one, two) if one != two else (f"{one} (first)", f"{two} (second)")

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
-from ._common import JOBS, Row, refuse, show
+from ._common import JOBS, Row, show
 
 OPTIONS: tuple[Row, ...] = (
     ("--why", "", "which difference explains how much of the gap"),
@@ -21,14 +21,6 @@ OPTIONS: tuple[Row, ...] = (
     ("--budget", "N", "how many sets of causes may be run where they interact (200)"),
     JOBS,
 )
-
-
-def check(options: argparse.Namespace) -> None:
-    """Raise BadInputError for a budget of no runs."""
-    few = options.budget is not None and options.budget < 1
-    refuse(
-        (few, f"--budget wants a number of runs, at least 1; got {options.budget}"),
-    )
 
 
 def run(options: argparse.Namespace, request: Any) -> int:

@@ -15,9 +15,8 @@ RULE = ("quantity tolerance fit varied floor_cells no_runs html plot", NEEDS, "r
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Those of the report."""
-    group = parser.add_argument_group("from a sweep to an answer")
     add_table(
-        group,
+        parser.add_argument_group("from a sweep to an answer"),
         (
             "--report",
             "DIR",
@@ -105,7 +104,6 @@ def report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
     from ..report.progress import progress
     from ..sweep.analysis import FLOOR_CELLS, sweep_report
 
-    cells = FLOOR_CELLS if options.floor_cells is None else options.floor_cells
     with progress("report") as told:
         found = sweep_report(
             folder,
@@ -114,7 +112,7 @@ def report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
             tolerances=parse_tolerances(options.tolerance),
             fit=options.fit,
             varied=options.varied,
-            floor_cells=cells,
+            floor_cells=FLOOR_CELLS if options.floor_cells is None else options.floor_cells,
             run=not options.no_runs,
             menagerie=options.menagerie,
             jobs=options.jobs,
@@ -129,17 +127,12 @@ def report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
         target = write_report(options.html, text)
         print(f"wrote {target} ({len(text.encode()) / 1e6:.2f} MB)", file=sys.stderr)
     if options.plot is not None:
+        from ..report.figures import write_pictures
         from ..report.sweep_pictures import pictures
 
-        _plot(pictures(found), options.plot)
+        if drawn := pictures(found):
+            size = write_pictures(drawn, options.plot)
+            print(f"wrote {options.plot} ({size / 1e3:.0f} kB)", file=sys.stderr)
+        else:
+            complain("nothing is varied: there is no picture", 0)
     return found, page
-
-
-def _plot(pictures: Any, target: Path) -> None:
-    from ..report.figures import write_pictures
-
-    if not pictures:
-        complain("nothing is varied: there is no picture", 0)
-        return
-    size = write_pictures(pictures, target)
-    print(f"wrote {target} ({size / 1e3:.0f} kB)", file=sys.stderr)

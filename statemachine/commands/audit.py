@@ -39,7 +39,6 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("--steps", "N", "of each future (60)", {"default": 60}),
         seed_of("the commands"),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -13,9 +13,9 @@ from ._common import (
     SAYS_NO,
     add_rules,
     add_table,
-    complain,
     file_name,
     json_of,
+    resumable,
     show,
 )
 
@@ -92,7 +92,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         ),
         json_of("judgement"),
     )
-    parser.set_defaults(run=run, parser=parser)
+    parser.set_defaults(parser=parser)
     add_rules(parser, ("only", NEEDS, "mutants"))
 
 
@@ -109,8 +109,7 @@ def run(options: argparse.Namespace) -> int:
     several = len(options.files) > 1 or (folder and not one)
     if (options.mutants is not None or several) and options.gradescope:
         options.parser.error("--gradescope goes with one FILE, or one FOLDER")
-    there = all(Path(file).exists() for file in options.files)
-    if not several and there and table:
+    if not several and table and all(Path(file).exists() for file in options.files):
         options.parser.error(
             "--csv, --jobs, --roster and --tests go with several files, or a folder"
         )
@@ -172,20 +171,15 @@ def _class(options: argparse.Namespace) -> int:
     found = classroom.submissions(options.files)
     if options.roster:
         found = classroom.enrolled(found, options.roster)
-    try:
-        with progress(f"{len(found)} files") as report:
-            entries = classroom.judge_all(
-                found,
-                options.backend,
-                time_limit=options.time_limit,
-                jobs=options.jobs,
-                table=options.csv,
-                tests=options.tests,
-                progress=report,
-            )
-    except KeyboardInterrupt:
-        if options.csv:
-            complain(f"stopped; {options.csv} has what was judged. Type the same to go on", 130)
-        raise
+    with resumable(options.csv, "judged"), progress(f"{len(found)} files") as report:
+        entries = classroom.judge_all(
+            found,
+            options.backend,
+            time_limit=options.time_limit,
+            jobs=options.jobs,
+            table=options.csv,
+            tests=options.tests,
+            progress=report,
+        )
     show(words.page(entries, classroom.not_looked_at(options.files)), entries, options.json)
     return 0 if all(entry.judged for entry in entries) else SAYS_NO

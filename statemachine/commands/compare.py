@@ -80,9 +80,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         *_compare_html.OPTIONS,
         json_of(),
     )
-    group = parser.add_argument_group("two sides")
     add_table(
-        group,
+        parser.add_argument_group("two sides"),
         (
             "--map",
             "LEFT=RIGHT",
@@ -107,7 +106,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("comparing descriptions of a robot", _compare_models.OPTIONS),
     ):
         add_table(parser.add_argument_group(title), *rows)
-    parser.set_defaults(run=run, words_in="what")
+    parser.set_defaults(words_in="what")
     add_rules(parser, *RULES)
     shorten_help(
         parser,
@@ -227,15 +226,26 @@ def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any)
         refuse_given(options, PARTS, f"{{}} is of two sides: {PROGRAM} compare hold LEFT RIGHT")
     if not (len(what) == 1 and is_function(what[0])):
         refuse_given(options, ["every", "keyframe"], "{} goes with FILE.py:FUNCTION")
-    few = options.every is not None and options.every < 1
-    refuse((few, f"--every wants a number of steps, at least 1; got {options.every}"))
+    refuse(
+        (
+            options.every is not None and options.every < 1,
+            f"--every wants a number of steps, at least 1; got {options.every}",
+        )
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
+    from ..compare.perturbed import parse_uncertainty
+
     _compare_html.check(options)
-    _compare_floor.check(options)
-    _compare_why.check(options)
+    parse_uncertainty(options.uncertainty)  # which refuses what is no size
+    refuse(
+        (
+            options.budget is not None and options.budget < 1,
+            f"--budget wants a number of runs, at least 1; got {options.budget}",
+        )
+    )
     if options.models:
         return _compare_models.run(options)
     refuse(
@@ -248,22 +258,21 @@ def run(options: argparse.Namespace) -> int:
     if options.one_step or options.converge:
         return _compare_steps.run(options, request_of(options))
     if options.why and not options.html:
-        return _run_why(options)
+        refuse(
+            (
+                options.tolerance,
+                "--why takes no --tolerance: it explains the gap, whatever its size",
+            ),
+            (
+                options.plot or options.film,
+                "--why runs many times: --plot and --film go without it",
+            ),
+        )
+        try:
+            return _compare_why.run(options, request_of(options))
+        except EndedEarlyError as error:  # what there is until then, and no cause
+            return _run_compare(options, f"No cause is named: {error}.")
     return _run_compare(options)
-
-
-def _run_why(options: argparse.Namespace) -> int:
-    refuse(
-        (options.tolerance, "--why takes no --tolerance: it explains the gap, whatever its size"),
-        (
-            options.plot or options.film,
-            "--why runs many times: --plot and --film go without it",
-        ),
-    )
-    try:
-        return _compare_why.run(options, request_of(options))
-    except EndedEarlyError as error:  # what there is until then, and no cause
-        return _run_compare(options, f"No cause is named: {error}.")
 
 
 def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
@@ -275,10 +284,10 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
     tolerances = parse_tolerances(options.tolerance)
     request = request_of(options)
     if request.is_traces and len(request.what) == 2:
-        text = "{} is of a run, and two traces are runs that were made"
-        refuse_given(options, ["backends"], text)
-    wanted = pictures.checked(options)
-    run = None
+        refuse_given(
+            options, ["backends"], "{} is of a run, and two traces are runs that were made"
+        )
+    renderer, run = pictures.checked(options), None
     with progress("compare") as told:
         if request.sides:
             run = run_sides(request, told)
@@ -292,10 +301,9 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
             complain(line, 0)
     asked = witness(one, two, run.file if run else None)
     rerun = run.reruns[0] if run and run.reruns else None
-    floor = _compare_floor.floor_of(options, request, found, (one, two), rerun)
+    floor = _compare_floor.floor_of(options, request, found, one, two, rerun)
     if options.html:
         _compare_html.write(options, request, found, (one, two), said, asked, run, played, floor)
-    why_not = "" if found.ended else why_not  # which the page says itself
     page = report.page(
         found,
         one,
@@ -305,7 +313,7 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
         run=run,
         played=played,
         floor=floor,
-        why_not=why_not,
+        why_not="" if found.ended else why_not,  # which the page says itself
     )
     result = {
         "comparison": found,
@@ -322,5 +330,5 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
             "only": run.matched.only if run.matched else ({}, {}),
         }
     code = show(page, result, options.json)
-    pictures.write(wanted, options, one, two, found, request, floor)
+    pictures.write(renderer, options, one, two, found, request, floor)
     return code

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from ..errors import BadInputError, MissingEngineError
+from ..errors import MissingEngineError
 from ..installed import ENGINES, available
-from ._common import MISSING, PROGRAM, add_table, complain, json_of, show
+from ._common import EXCLUDES, PROGRAM, add_rules, add_table, json_of, say_missing, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +24,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("--backend", "NAME", "an engine, or all (default all)", {"default": "all"}),
         json_of(),
     )
-    parser.set_defaults(run=run)
+    add_rules(
+        parser, ("calls", EXCLUDES, "question", "{flag} shows all calls: it takes no question")
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -33,8 +35,6 @@ def run(options: argparse.Namespace) -> int:
     from ..report import conventions as report
     from ..report.progress import progress
 
-    if options.calls and options.question:
-        raise BadInputError("--calls shows all calls: it takes no question")
     conventions.check_questions(options.question)
     engines = _engines(options.backend)
     if options.calls:
@@ -63,8 +63,5 @@ def _engines(asked: str) -> list[str]:
             missing.append(error)
         else:
             found.append(name)
-    for error in missing if found else missing[:-1]:
-        complain(error, MISSING)
-    if not found:
-        raise missing[-1]
+    say_missing(missing, found)
     return found

@@ -10,7 +10,6 @@ from ._common import MISSING, add_table, json_of, show
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
     add_table(parser, json_of("findings"))
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

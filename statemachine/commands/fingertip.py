@@ -35,7 +35,6 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("--witness", "FILE", "what Pinocchio reads (default: the model)"),
         ("--witness-frame", "NAME", "the frame's name there"),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from ._common import SAYS_NO, TRUST, add_table, complain, json_of, seed_of, show
+from ._common import SAYS_NO, TRUST, add_table, file_name, json_of, resumable, seed_of, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -31,6 +30,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             "TABLE",
             "write the table there after each model, .csv or .json; typed again, it examines "
             "only models that are new or changed",
+            {"type": file_name},
         ),
         ("--quick", "", "leave out the experiments and the costs"),
         ("--seconds", "S", "that a model may take (60)", {"default": 60.0}),
@@ -39,7 +39,6 @@ def add(parser: argparse.ArgumentParser) -> None:
         TRUST,
         json_of("table"),
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -50,25 +49,19 @@ def run(options: argparse.Namespace) -> int:
     from ..robots.table import check_suffix
     from ..runs.whole import check_place
 
-    out = Path(options.out) if options.out else None
-    if out is not None:
-        check_suffix(out)
-        check_place(out)
+    if options.out is not None:
+        check_suffix(options.out)
+        check_place(options.out)
     models = find(options.paths)
-    try:
-        with progress(f"{len(models)} models") as told:
-            survey = examine_all(
-                models,
-                quick=options.quick,
-                seconds=options.seconds,
-                jobs=options.jobs,
-                seed=options.seed,
-                table=out,
-                progress=told,
-            )
-    except KeyboardInterrupt:
-        if out is not None and out.exists():
-            return complain(f"stopped; {out} has what was examined. Type the same to go on", 130)
-        raise
+    with resumable(options.out, "examined"), progress(f"{len(models)} models") as told:
+        survey = examine_all(
+            models,
+            quick=options.quick,
+            seconds=options.seconds,
+            jobs=options.jobs,
+            seed=options.seed,
+            table=options.out,
+            progress=told,
+        )
     show(words.page(survey), survey, options.json)
     return SAYS_NO if survey.wrong else 0

@@ -19,6 +19,7 @@ from ._common import (
     complain,
     json_of,
     menagerie,
+    resumable,
     shorten_help,
     show,
 )
@@ -62,9 +63,8 @@ def add(parser: argparse.ArgumentParser) -> None:
             {"default": "1deg,1mm"},
         ),
     )
-    group = parser.add_argument_group("ranges")
     add_table(
-        group,
+        parser.add_argument_group("ranges"),
         ("--samples", "N", "Sobol points of the ranges, a power of 2", {"default": 0}),
         (
             "--indices",
@@ -73,9 +73,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         ),
         ("--design-seed", "N", "of what is drawn for them (0)", {"default": 0}),
     )
-    group = parser.add_argument_group("the run")
     add_table(
-        group,
+        parser.add_argument_group("the run"),
         ("--model", "NAME|FILE", "instead of the experiment's own"),
         SECONDS,
         ("--keyframe", "NAME", "where a FUNCTION starts"),
@@ -83,9 +82,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("--moments", "N", "of each run that are kept (20)", {"default": 20}),
         ("--timeout", "S", "that a cell may take (600)", {"default": 600.0}),
     )
-    group = parser.add_argument_group("where")
     add_table(
-        group,
+        parser.add_argument_group("where"),
         JOBS,
         ("--scheduler", "ADDRESS", "of Dask, whose workers run it instead"),
         ("--extend", "", "let the dataset in DIR grow by values, seeds, engines"),
@@ -93,7 +91,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     _sweep_report.add_options(parser)
     add_table(parser, DEFAULTS, *menagerie(), json_of("summary, or the report,"))
-    parser.set_defaults(run=run)
     add_rules(parser, _sweep_report.RULE)
     shorten_help(
         parser,
@@ -116,34 +113,23 @@ def run(options: argparse.Namespace) -> int:
     for line in ready.said:
         complain(line, 0)
     out = Path(options.out)
-    try:
-        with progress(f"{len(ready)} cells") as told:
-            summary = run_sweep(
-                ready,
-                out,
-                jobs=options.jobs,
-                scheduler=options.scheduler,
-                extend=options.extend,
-                retry_failed=options.retry_failed,
-                progress=told,
-            )
-    except KeyboardInterrupt:
-        if out.is_dir():
-            again = "Type the same" + ", without --retry-failed," * options.retry_failed
-            return complain(f"stopped; {out} has what was done. {again} to go on", 130)
-        raise
+    but = ", without --retry-failed," * options.retry_failed
+    with resumable(out, "done", but), progress(f"{len(ready)} cells") as told:
+        summary = run_sweep(
+            ready,
+            out,
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            extend=options.extend,
+            retry_failed=options.retry_failed,
+            progress=told,
+        )
+    if not (options.report and options.json):
+        show(words.page(ready, summary), summary, options.json)
+    code = 0
     if options.report:
-        return _reported(options, out, words.page(ready, summary), summary)
-    show(words.page(ready, summary), summary, options.json)
-    return SAYS_NO if summary.failed else 0
-
-
-def _reported(options: argparse.Namespace, out: Path, page: Any, summary: Any) -> int:
-    """Show what was run, then what it says."""
-    if not options.json:
-        show(page, summary, False)
-    found, answer = _sweep_report.report(options, out)
-    code = show(answer, {"summary": summary, "report": found}, options.json)
+        found, answer = _sweep_report.report(options, out)
+        code = show(answer, {"summary": summary, "report": found}, options.json)
     return SAYS_NO if summary.failed else code
 
 

@@ -20,6 +20,7 @@ from ._common import (
     json_of,
     menagerie,
     one_line,
+    refuse,
     show,
 )
 from .compare import EXPERIMENTS, experiments, run_options
@@ -28,7 +29,6 @@ from .compare import EXPERIMENTS, experiments, run_options
 def add(parser: argparse.ArgumentParser) -> None:
     """A parser for each thing to do."""
     parser.description = "Everything that a run did, in a file that opens without an engine."
-    parser.set_defaults(run=lambda _options: _none_given())
     named = parser.add_subparsers(metavar="action")
     file = ("file", "TRACE", "a file .npz or .parquet")
     own = ("--model", "NAME|FILE", "instead of the trace's own"), *menagerie()
@@ -45,7 +45,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         _output("WHAT.BACKEND.npz"),
     )
     play = file, ENGINE, DEFAULTS, *own, _output("TRACE.BACKEND.npz")
-    for name, help_, run, rows in (
+    for name, help_, action, rows in (
         ("record", "record an experiment, or a controller of your own", run_record, record),
         ("play", "play the ctrl of a trace on an engine", run_play, play),
         (
@@ -65,15 +65,15 @@ def add(parser: argparse.ArgumentParser) -> None:
             *(run_pictures, (file, _output("TRACE.webp"), *own, *pictures.OF_FILM)),
         ),
     ):
-        action = named.add_parser(
+        own_parser = named.add_parser(
             name,
             help=help_,
             description=_DESCRIPTIONS.get(name),
             epilog=f"experiments:\n{experiments()}" if name == "record" else None,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        add_table(action, *rows)
-        action.set_defaults(run=run, picture=name)
+        add_table(own_parser, *rows)
+        own_parser.set_defaults(run=action, picture=name)
 
 
 _DESCRIPTIONS = {
@@ -84,7 +84,8 @@ _DESCRIPTIONS = {
 }
 
 
-def _none_given() -> int:
+def run(_options: argparse.Namespace) -> int:
+    """Nothing, where no action was typed."""
     raise BadInputError(
         f"trace what? record, play, show, csv, plot or film: {PROGRAM} trace record hold"
     )
@@ -96,19 +97,22 @@ def _output(usual: str) -> Row:
 
 def run_record(options: argparse.Namespace) -> int:
     """Record, and write."""
-    if (options.what is None) == (options.controller is None):
-        raise BadInputError(
-            f"record what? Either an experiment ({', '.join(EXPERIMENTS)}) or --controller FILE.py"
-        )
+    refuse(
+        (
+            (options.what is None) == (options.controller is None),
+            f"record what? Either an experiment ({', '.join(EXPERIMENTS)}) or --controller FILE.py",
+        ),
+        (
+            options.what is not None and options.keyframe is not None,
+            f"--keyframe goes with --controller; {options.what} has its own start",
+        ),
+    )
     from ..backends import load
     from ..report.progress import progress
     from ..runs import record_scenario
     from ..runs.controllers import function_scenario
     from ..runs.scenarios import scenario
 
-    changes = {} if options.timestep is None else {"timestep": options.timestep}
-    if options.what is not None and options.keyframe is not None:
-        raise BadInputError(f"--keyframe goes with --controller; {options.what} has its own start")
     asked = (
         scenario(options.what)
         if options.what is not None
@@ -130,7 +134,7 @@ def run_record(options: argparse.Namespace) -> int:
             seed=options.seed,
             command=_typed(options),
             defaults=options.defaults,
-            options=changes,
+            options={} if options.timestep is None else {"timestep": options.timestep},
             progress=told,
         )
     return _written(trace, target)
@@ -144,9 +148,11 @@ def run_play(options: argparse.Namespace) -> int:
 
     trace = read(options.file)
     target = _target(options.output, f"{Path(options.file).stem}.{options.backend}.npz")
-    file, same = options.model, True
-    if file is None:
-        file, same = model_file(trace.header, options.menagerie, options.file)
+    file, same = (
+        (options.model, True)
+        if options.model
+        else model_file(trace.header, options.menagerie, options.file)
+    )
     model = load(
         file,
         backend=options.backend,
@@ -210,10 +216,9 @@ def run_pictures(options: argparse.Namespace) -> int:
     """A figure or a film of one trace."""
     from ..runs import read
 
-    name = options.picture
-    usual = f"{Path(options.file).stem}.{'svg' if name == 'plot' else 'webp'}"
+    usual = f"{Path(options.file).stem}.{'svg' if options.picture == 'plot' else 'webp'}"
     options.plot = options.film = None
-    setattr(options, name, options.output or usual)
+    setattr(options, options.picture, Path(options.output or usual))
     trace = read(options.file)
     pictures.write(pictures.checked(options), options, trace)
     return 0

@@ -59,7 +59,6 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("--seconds", "S", "end after so long"),
         *menagerie(),
     )
-    parser.set_defaults(run=run)
     text = "{flag} is for a simulation, and a trace is a recording"
     add_rules(parser, ("ghost keyframe site", EXCLUDES, "traces", text))
 
@@ -73,8 +72,7 @@ def run(options: argparse.Namespace) -> int:
     checked_speed(options.speed)
     if options.seconds is not None and not 0 < options.seconds < float("inf"):
         raise BadInputError(f"seconds must be above 0; got {options.seconds:g}")
-    port = free_port(options.host, options.port)
-    return (_play if options.traces else _simulate)(options, port)
+    return (_play if options.traces else _simulate)(options, free_port(options.host, options.port))
 
 
 def _simulate(options: argparse.Namespace, port: int) -> int:
@@ -116,12 +114,11 @@ def _play(options: argparse.Namespace, port: int) -> int:
     refuse((len(options.traces) > 2, f"view shows one trace or two; got {len(options.traces)}"))
     recording = TraceSession([read(path) for path in options.traces])
     header = recording.header
-    name, same = options.model or header.provenance.model_file.removesuffix(".xml"), True
-    if options.model:
-        model = load(name, menagerie=options.menagerie)
-    else:
-        file, same = model_file(header, options.menagerie, options.traces[0])
-        model = load(file)
+    name = options.model or header.provenance.model_file.removesuffix(".xml")
+    file, same = (
+        (name, True) if options.model else model_file(header, options.menagerie, options.traces[0])
+    )
+    model = load(file, menagerie=options.menagerie)
     if not same:
         complain(f"shown is {name} as it is here; the trace was recorded with another", 0)
     if model.body_names != header.bodies:
@@ -133,10 +130,11 @@ def _play(options: argparse.Namespace, port: int) -> int:
 
 def _keyframe(asked: str | None, model: Any) -> int | None:
     """Number of the keyframe to start from."""
-    if asked is None:
-        return 0 if model.keyframes else None
-    if asked == "default":
-        return None
+    match asked:
+        case None:
+            return 0 if model.keyframes else None
+        case "default":
+            return None
     return model.key_id(int(asked) if asked.isdecimal() else asked)
 
 
