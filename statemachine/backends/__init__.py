@@ -11,6 +11,7 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Literal, Protocol, cast
 
 from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
@@ -19,6 +20,7 @@ from ..interface import Model
 from ..measures import ContactNames, overlaps
 from ..measures.text import few
 from ..models import resolve
+from ..releases import is_release, version_of
 from ._hidden_data import HiddenData, HiddenModel
 from ._hidden_world import HiddenWorld, Moment
 from .binary import is_binary, read_binary
@@ -31,6 +33,7 @@ __all__ = [
     "Moment",
     "backend_engine",
     "backend_names",
+    "check_backend",
     "load",
     "loaders",
     "overlaps_at_start",
@@ -59,6 +62,19 @@ def backend_names() -> list[str]:
     """Names that `load` takes for `backend`, whether or not their engine is installed."""
     _discover()
     return list(_BACKENDS)
+
+
+def check_backend(kind: str, name: str) -> None:
+    """Raise UnknownNameError for what is neither a backend nor a release of an engine.
+
+    Args:
+        kind: What the message calls it.
+        name: As it was typed.
+    """
+    if is_release(name):
+        version_of(name)
+    else:
+        check_name(kind, name, backend_names())
 
 
 def backend_engine(name: str) -> str | None:
@@ -143,6 +159,8 @@ def load(
         raise MissingEngineError(
             f"backend {backend!r} cannot be loaded from {place!r}: {error}", engine=backend
         ) from error
+    if is_release(backend):
+        loader = partial(loader, release=backend)
     if not options:
         loaded = loader(path, defaults=defaults)
     elif "options" in inspect.signature(loader).parameters:
@@ -179,6 +197,8 @@ def on_default(model: Model) -> Model:
 
 
 def _find(name: str) -> str:
+    if isinstance(name, str) and is_release(name):
+        return f"{__name__}.release_backend:load"
     known = isinstance(name, str) and name in _BACKENDS
     if not known:
         _discover()

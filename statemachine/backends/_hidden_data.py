@@ -150,12 +150,12 @@ class Machine:
         try:
             time, given, before, memory = self.time, self.given, self._left[:2], start
             if steps > 1:
-                for _ in range(steps - 1):
-                    time, given = self._once(time, given)
-                    if world.diverging(self._fastest):
-                        self._diverge(time)
+                for count in [1] * (steps - 1) if self._longest else [steps - 1]:
+                    time, given = self._ahead(time, given, count)
                 before, memory = world.read(), world.memory
-            time, given = self._once(time, given)
+            given = self._commands(given)
+            world.step()
+            time += world.timestep
             moment = Moment(*before, self._acting, memory)
             qpos, qvel = world.read()
             if not bounded(qpos, qvel, self._fastest):
@@ -176,13 +176,21 @@ class Machine:
             self.moment, self.derived = kept
             raise
 
-    def _once(self, time: float, given: Array) -> tuple[float, Array]:
-        """Take an engine step; returns the time after it, and the commands until then."""
-        if self._longest:
-            self._pass_on(given)
-            given = np.concatenate([given[1:], self._ctrl[None]])
-        self.world.step()
-        return time + self.world.timestep, given
+    def _ahead(self, time: float, given: Array, count: int) -> tuple[float, Array]:
+        """Take engine steps before the last; the time after them, and the commands until then."""
+        given, timestep = self._commands(given), self.world.timestep
+        for _ in range(self.world.advance(count, self._fastest)):
+            time += timestep
+        if self.world.diverging(self._fastest):
+            self._diverge(time)
+        return time, given
+
+    def _commands(self, given: Array) -> Array:
+        """Pass on what acts in the next step; the commands until after it."""
+        if not self._longest:
+            return given
+        self._pass_on(given)
+        return np.concatenate([given[1:], self._ctrl[None]])
 
     def _diverge(self, time: float) -> None:
         """Raise DivergedError for the first coordinate that is not finite, or beyond its bound."""

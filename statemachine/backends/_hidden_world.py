@@ -135,6 +135,17 @@ class HiddenWorld(ABC):
         """
         return not bounded(*self.read(), fastest)
 
+    def advance(self, steps: int, fastest: float) -> int:
+        """Take engine steps under one command, up to one after which it is `diverging`; how many.
+
+        `step` follows where all were taken, and `read` and `memory` tell of before it.
+        """
+        for k in range(1, steps + 1):
+            self.step()
+            if self.diverging(fastest):
+                return k
+        return steps
+
     def renewed(self) -> HiddenWorld:
         """The world in which the state is overwritten: another, where `place` leaves traces.
 

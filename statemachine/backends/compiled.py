@@ -98,7 +98,7 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
         if binary is not None:
             raw = from_binary(binary)
         else:
-            spec = _with_packages(Path(text))
+            spec = spec_with_packages(Path(text))
             raw = spec.compile() if spec else mujoco.MjModel.from_xml_path(text)
     except (ValueError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
@@ -152,10 +152,10 @@ def read_spec(path: Path) -> mujoco.MjSpec:
     Raises:
         ValueError: MuJoCo cannot read it.
     """
-    return _with_packages(path) or mujoco.MjSpec.from_file(str(path))
+    return spec_with_packages(path) or mujoco.MjSpec.from_file(str(path))
 
 
-def _with_packages(path: Path) -> mujoco.MjSpec | None:
+def spec_with_packages(path: Path) -> mujoco.MjSpec | None:
     """A URDF whose meshes are in ROS packages, which MuJoCo does not look for; None of others."""
     if path.suffix.lower() != ".urdf":
         return None

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..backends import backend_names, load
+from ..backends import backend_names, check_backend, load
 from ..engines import room
 from ..errors import BadInputError, StateMachineError, check_name, shown, unknown_name
 from ..installed import DEFAULT, PAIR
@@ -30,7 +30,7 @@ from .matching import match_models
 
 _OPTION = re.compile(r"[A-Za-z_]+=\S*")
 _LAST_OPTION = re.compile(rf"\s+({_OPTION.pattern})\s*$")
-_ENGINE = re.compile(r"[\w-]+(:\w*)?")
+_ENGINE = re.compile(r"[\w-]+(==[\w.]+)?(:\w*)?")
 _SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 
 
@@ -189,7 +189,7 @@ def _side(word: str, menagerie: str | None) -> Side:
     if sign and before and _ENGINE.fullmatch(after) and not Path(word).exists():
         file = before
         engine, colon, defaults = after.partition(":")
-        check_name("engine", engine, backend_names())
+        check_backend("engine", engine)
         if colon and defaults != "engine":
             raise unknown_name(f"way to load a file on {engine}", defaults, ("engine",))
     elif not Path(word).exists():

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..backends import backend_names
-from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError, check_name
+from ..backends import check_backend
+from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError
 from ..installed import DEFAULT
 from ..interface import Model
 from ..measures import common_moments
@@ -258,7 +258,7 @@ def sides_of(
         raise BadInputError(f"{what!r} is no trace: a trace ends in .npz or .parquet")
     model = request.scenario().model
     for name in request.backends:
-        check_name("backend", name, backend_names())
+        check_backend("backend", name)
     said: list[str] = []
     traces = [
         _run(request, side, said, part_of(progress, 0.5 * k, 0.5))

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..backends import backend_names
+from ..backends import backend_names, check_backend
 from ..compare.perturbed import EXACT, parse_uncertainty
-from ..errors import BadInputError, MissingEngineError, StateMachineError, check_name
+from ..errors import BadInputError, MissingEngineError, StateMachineError
 from ..interface import Model, make_data
 from ..interface.options import checked_options
 from ..models import resolve
@@ -135,7 +135,8 @@ def _loaded(
     """
     asked = list(dict.fromkeys(sweep.backends))
     for name in asked:
-        check_name("backend", name, ["all", *backend_names()])
+        if name != "all":
+            check_backend("backend", name)
     models: list[Model] = []
     said: list[str] = []
     here: list[str] = []

@@ -15,13 +15,13 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ... import __version__
-from ...backends import backend_engine, backend_names
+from ...backends import backend_engine, backend_names, load
 from ...description import urdf
 from ...description.match import renamed
 from ...description.records import Robot
@@ -30,6 +30,7 @@ from ...engines import room, rooms_with
 from ...errors import StateMachineError, UnsupportedError, unknown_name
 from ...installed import DEFAULT
 from ...models import SUFFIXES, resolve
+from ...releases import is_release
 from .compiled import Compiled, compiled, enter_rest
 from .diff import Posed, diff
 from .engines import own_ways
@@ -116,7 +117,7 @@ class Compared:
 def split(text: str) -> tuple[str, str | None]:
     """A model and the engine that it is asked of: "so101@pybullet"; None: the file itself."""
     model, sign, engine = text.rpartition("@")
-    if sign and engine in backend_names():
+    if sign and (engine in backend_names() or is_release(engine)):
         return model, engine
     if sign and Path(model).suffix.lower() in SUFFIXES and not Path(text).exists():
         raise unknown_name("engine", engine, backend_names())
@@ -148,6 +149,10 @@ def read(
         if path.suffix.lower() == ".urdf":
             return urdf.read(path)
         return room(DEFAULT).read_file(path, name)
+    if is_release(engine):
+        made = load(path, backend=engine, defaults="engine")
+        described = room(DEFAULT).describe(made.compiled, name)
+        return replace(described, reader=engine.replace("==", " "), format="engine")
     backend_engine(engine)
     own = room(engine)
     if not own.can("read"):
@@ -191,10 +196,15 @@ def compare(
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
     sides, skipped = Compiled({}, None, complete=False), list[str]()
     formats = [robot.format for robot in robots]
-    if all(engine in (None, DEFAULT) for engine in engines) and formats != ["URDF"] * 2:
+    compilers = [engine or DEFAULT for engine in engines]
+    if all(name == DEFAULT or is_release(name) for name in compilers) and formats != ["URDF"] * 2:
         files = [resolve(m, menagerie) for m in (one, two)]
         try:
-            sides = compiled(files, rename or {}, trees[0], complete="URDF" not in formats)
+            models = [
+                load(file, backend=name, defaults="engine")
+                for file, name in zip(files, compilers, strict=True)
+            ]
+            sides = compiled(models, rename or {}, trees[0], complete="URDF" not in formats)
         except StateMachineError as error:
             why = str(error).splitlines()[0]
             skipped.append(f"what only a compiled model tells was not compared: {why}")

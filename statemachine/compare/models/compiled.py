@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ...backends import load
 from ...description.records import Robot
 from ...description.tree import GroupTree
 from ...engines.records import ModelDifference
+from ...interface import Model
 from ...measures.text import few
 from ..matching import Matched, match_models
 from ..why.causes import differences_of, sensors_of
@@ -73,7 +72,7 @@ class Compiled:
 
 
 def compiled(
-    files: Sequence[str | os.PathLike[str]],
+    models: Sequence[Model],
     names: Mapping[str, str],
     tree: GroupTree,
     *,
@@ -82,15 +81,15 @@ def compiled(
     """What two files differ in.
 
     Args:
-        files: The two, as `load` takes them.
+        models: The two.
         names: Joints, links and frames of the first that go by other names in the second.
         tree: The reading of the first, by these names.
         complete: Whether both say all that a compiled model has.
 
     Raises:
-        StateMachineError: One of them does not compile, or they cannot be matched.
+        StateMachineError: They cannot be matched.
     """
-    one, two = (load(file, defaults="engine") for file in files)
+    one, two = models
     here = {*one.joint_names, *one.body_names, *one.site_names, *one.actuator_names}
     matched = match_models(one, two, {a: b for a, b in names.items() if a in here})
     differences: dict[Key, list[ModelDifference]] = {}

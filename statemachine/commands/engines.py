@@ -1,0 +1,68 @@
+"""`statemachine engines`: releases of an engine, each in an environment of its own."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import asdict
+
+from ._common import PROGRAM, add_table, json_of
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = (
+        "Other releases of MuJoCo, each in an environment of its own. Where an engine is named, "
+        f"so can be a release: {PROGRAM} compare hold so101@mujoco==3.3.7 so101"
+    )
+    parser.set_defaults(run=run_list, json=False)
+    verbs = parser.add_subparsers(metavar="verb")
+    listing = verbs.add_parser("list", help="those that are here, and their size")
+    add_table(listing, json_of())
+    listing.set_defaults(run=run_list)
+    adding = verbs.add_parser("add", help="install a release")
+    adding.add_argument("name", metavar="NAME", help="as mujoco==3.3.7")
+    python = "the Python that it is to run on (default: this one)"
+    add_table(adding, ("--python", "EXE", python, {"default": sys.executable}))
+    adding.set_defaults(run=run_add)
+    removing = verbs.add_parser("remove", help="remove a release, and free its space")
+    removing.add_argument("name", metavar="NAME", help="as mujoco==3.3.7")
+    removing.set_defaults(run=run_remove)
+
+
+def run_list(options: argparse.Namespace) -> int:
+    """What is here."""
+    from ..page import Page, Table, Text
+    from ..releases import folder, releases
+    from ..report import terminal
+    from ..report.as_json import dumps
+
+    here = list(releases())
+    if options.json:
+        print(dumps([asdict(release) for release in here]))
+        return 0
+    rows = [(r.name, r.python, f"{r.size / 1e6:.0f} MB") for r in here]
+    hint = Text(f"To add one: {PROGRAM} engines add mujoco==3.3.7")
+    table = Table(("release", "python", "size"), rows, f"Releases in {folder()}")
+    terminal.show(Page("Releases of engines", "", [table] if rows else [hint]), "")
+    return 0
+
+
+def run_add(options: argparse.Namespace) -> int:
+    """Install one."""
+    from ..releases import add as add_release
+    from ..releases import releases
+
+    add_release(options.name, options.python)
+    size = next(release.size for release in releases() if release.name == options.name)
+    print(f"{options.name} is here: {size / 1e6:.0f} MB")
+    return 0
+
+
+def run_remove(options: argparse.Namespace) -> int:
+    """Remove one."""
+    from ..releases import remove
+
+    remove(options.name)
+    print(f"{options.name} is removed")
+    return 0

@@ -1,0 +1,156 @@
+"""Releases of an engine in environments of their own, beside the one that is installed.
+
+Each is a folder of the user's cache, with a Python and the engine in it; `statemachine engines`
+makes, lists and removes them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from .errors import BadInputError, EngineError, MissingEngineError
+
+_NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+(\.\w+)*)")
+_ENGINES = ("mujoco",)  # whose releases can be run
+
+
+@dataclass(frozen=True)
+class Release:
+    """One that is here.
+
+    Attributes:
+        name: As "mujoco==3.3.7".
+        python: Version of its Python.
+        size: Of its files [byte].
+    """
+
+    name: str
+    python: str
+    size: int
+
+
+def is_release(name: str) -> bool:
+    """Whether the name of a backend means a release of an engine."""
+    return "==" in name
+
+
+def version_of(name: str) -> str:
+    """The version that a release's name has.
+
+    Raises:
+        BadInputError: It is no such name, or of an engine whose releases cannot be run.
+    """
+    match = _NAME.fullmatch(name)
+    if match is None:
+        raise BadInputError(f"{name!r} is no release of an engine: type mujoco==3.3.7")
+    if match["engine"] not in _ENGINES:
+        raise BadInputError(f"releases of {match['engine']} cannot be run, those of mujoco can")
+    return match["version"]
+
+
+def folder() -> Path:
+    """Where the environments are: $STATEMACHINE_ENGINES, or a folder of the user's cache."""
+    given = os.environ.get("STATEMACHINE_ENGINES")
+    cache = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
+    return Path(given) if given else Path(cache or Path.home() / ".cache", "statemachine/engines")
+
+
+def python_of(name: str) -> Path:
+    """The Python of a release.
+
+    Raises:
+        MissingEngineError: It is not here.
+        BadInputError: As `version_of`.
+    """
+    version_of(name)
+    python = _python_in(folder() / name)
+    if not python.exists():
+        raise MissingEngineError(
+            f"{name} is not here; to have it: statemachine engines add {name}", engine=name
+        )
+    return python
+
+
+def _python_in(place: Path) -> Path:
+    return place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+
+
+def releases() -> Iterator[Release]:
+    """Those that are here, by name."""
+    for place in sorted(folder().glob("*==*")):
+        if place.name[0] == ".":  # is being made
+            continue
+        settings = (place / "pyvenv.cfg").read_text(encoding="utf-8")
+        python = re.search(r"^version(?:_info)? *= *(\S+)", settings, re.MULTILINE)
+        files = (file for file in place.rglob("*") if not file.is_symlink() and file.is_file())
+        yield Release(place.name, python[1] if python else "", sum(f.stat().st_size for f in files))
+
+
+def add(name: str, python: str = sys.executable, say: Callable[[str], object] = print) -> None:
+    """Make the environment of a release. What is half made is never found.
+
+    Args:
+        name: As "mujoco==3.3.7".
+        python: That it is to run on; the release needs a wheel for it.
+        say: Told what is being done.
+
+    Raises:
+        BadInputError: As `version_of`, or there is no such Python.
+        EngineError: It cannot be installed, or does not run.
+    """
+    version, home = version_of(name), folder()
+    if _python_in(home / name).exists():
+        say(f"{name} is here already")
+        return
+    if shutil.which(python) is None:
+        raise BadInputError(f"there is no Python {python!r} to make it with")
+    home.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=home) as made:
+        place = Path(made, "it")
+        own = str(_python_in(place))
+        say(f"making {home / name}")
+        uv = shutil.which("uv")
+        pip = [uv, "pip", "install", "--python", own] if uv else [own, "-m", "pip", "install"]
+        venv = [uv, "venv", "--python", python] if uv else [python, "-m", "venv"]
+        _run(name, *venv, str(place))
+        for numpy in ("numpy", "numpy<2"):  # old wheels were built against NumPy 1, and do not say
+            say(f"installing {name} and {numpy}")
+            _run(name, *pip, "--quiet", name, numpy)
+            code = "import numpy, mujoco; print(mujoco.__version__)"
+            done = subprocess.run([own, "-I", "-c", code], capture_output=True, text=True)  # noqa: PLW1510
+            if done.returncode == 0:
+                break
+        if done.stdout.strip() != version:
+            said = (done.stdout + done.stderr).strip().splitlines() or ["it says nothing"]
+            raise EngineError(f"{name} was installed and does not run: {said[-1]}")
+        if not (home / name).exists():  # else another process was faster
+            place.rename(home / name)
+
+
+def _run(name: str, *command: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)  # noqa: PLW1510
+    if done.returncode:
+        lines = (done.stderr or done.stdout).strip().splitlines()
+        errors = [line for line in lines if line.lower().startswith("error")] or lines[-1:]
+        reason = errors[-1] if errors else f"exit code {done.returncode}"
+        raise EngineError(f"{name} cannot be installed: {reason}")
+
+
+def remove(name: str) -> None:
+    """Remove the environment of a release.
+
+    Raises:
+        MissingEngineError: It is not here.
+    """
+    python_of(name)
+    gone = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=folder()))
+    (folder() / name).rename(gone / "it")  # at once: nobody finds a part of it
+    shutil.rmtree(gone)
