@@ -29,7 +29,7 @@ CHANGES = {
     "contact force": ('name="floor" type="plane"', 'name="floor" type="plane" solref="0.05 1"',
                       "ball on floor"),
     "other constraints": ('frictionloss="0.01"', 'frictionloss="0.02"', "elbow (dry friction)"),
-    "acceleration": ('integrator="implicitfast"/>',
+    "velocity update": ('integrator="implicitfast"/>',
         'integrator="Euler"><flag eulerdamp="disable"/></option>', ""),
 }  # fmt: skip
 
@@ -96,7 +96,7 @@ def test_a_later_stage_leads_where_no_earlier_one_differs(tmp_path: Path) -> Non
     assert first(found) == "contact force"
     assert touching == stages["contact force"].beyond > 0
     assert touching + apart == found.moments
-    assert stages["acceleration"].leads == 0
+    assert stages["velocity update"].leads == 0
     end = page(found, ("one", "two"), "hold").headline.end
     assert end.endswith(f"is other constraints ({apart}): that has another cause.")
 

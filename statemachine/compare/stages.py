@@ -16,7 +16,7 @@ from ..runs.derived import array_or_nan
 from .matching import Matched
 
 KINEMATICS, MASS, FOUND, FORCE = "kinematics", "mass matrix", "contacts found", "contact force"
-AFTER = "acceleration"
+ACCELERATION, AFTER = "acceleration", "velocity update"
 # In the order in which a step computes them; arrays of the contract are behind their stage.
 ARRAYS = {
     "bias": ("qfrc_bias",),
@@ -24,6 +24,7 @@ ARRAYS = {
     "passive": ("qfrc_passive",),
     FORCE: ("qfrc_contact",),
     "other constraints": ("qfrc_friction", "qfrc_limit", "qfrc_equality"),
+    ACCELERATION: ("qacc",),
 }
 STAGES = (KINEMATICS, MASS, "bias", "actuator", "passive", FOUND, *list(ARRAYS)[3:], AFTER)
 _WORDS = {"qfrc_friction": "dry friction", "qfrc_limit": "limit", "qfrc_equality": "equality"}
@@ -96,9 +97,9 @@ class StageReader:
             labels = tuple(names[i] if i == j else f"{names[i]} and {names[j]}" for i, j in pairs)
             self._mass_units.append((rows, columns))
             self.groups.append(StageGroup(MASS, unit, labels))
-        for stage, arrays in ARRAYS.items():
-            self.groups += self._of_dofs(stage, names, ("N·m", "N"), arrays)
-        self.groups += self._of_dofs(AFTER, names, ("rad/s²", "m/s²"), ("",))
+        for stage, arrays in {**ARRAYS, AFTER: ("",)}.items():
+            units = ("rad/s²", "m/s²") if stage in (ACCELERATION, AFTER) else ("N·m", "N")
+            self.groups += self._of_dofs(stage, names, units, arrays)
         self._names = _contact_names(matched)
 
     def _of_dofs(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..interface import Array
 from .stages import (
+    ACCELERATION,
     AFTER,
     FORCE,
     FOUND,
@@ -154,7 +155,7 @@ class StepSamples:
             if masses[mass]:
                 least[unit] = pushed[force] / masses[mass]
         for each in found:
-            if each.group.stage in (*_FORCES, AFTER):
+            if each.group.stage in (*_FORCES, ACCELERATION, AFTER):
                 each.scale = max(each.scale, _LEAST * least[each.group.unit])
             each.tolerance = relative * each.scale
         return found

@@ -282,7 +282,7 @@ def _row(result: Explanation, row: CauseShare) -> tuple[str | TableCell, ...]:
 
 
 def _located_row(part: Located) -> tuple[str | TableCell, ...]:
-    """What a feature that was left out takes away; of an integrator, which it is on one side."""
+    """What a feature that was left out takes away; of an integrator, what the sides have."""
     left, right = part.values or (NONE, NONE)
     explains = TableCell(f"{percent(part.share)}*", share=part.share)
     return capital(part.name), left, right, explains, NONE, NONE

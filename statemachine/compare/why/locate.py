@@ -53,7 +53,7 @@ def locate(
 ) -> tuple[Located, ...]:
     """Leave features out on both sides, each on top of those that count.
 
-    The integrator comes first, of the side that has several, and is tried again once something is
+    The integrator comes first, of the sides that have several, and is tried again once something is
     left out: what differs by it may be hidden by what was left.
 
     Args:
@@ -83,11 +83,11 @@ def locate(
             continue
         without, integrator = more, best
         name, words = (feature.name, feature.without) if feature else ("integrator", "")
-        chosen = ("its own", best) if trials.selects else (best, "its own")
-        values = None if feature else chosen
+        on_left, on_right = (best if side in trials.selects else "its own" for side in (0, 1))
+        values = None if feature else (on_left, on_right)
         moved = trials.moved(quantity, without, integrator)
         still = bool(without) and trials.extent(quantity, without) < _STILL * extent
-        setting = values is not None and not without
+        setting = len(trials.selects) == 1 and not feature and not without
         rows.append(Located(name, words, values, (left - rest) / gap, rest, moved, still, setting))
         left = rest
     return tuple(rows)

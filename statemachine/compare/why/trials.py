@@ -225,20 +225,19 @@ class Trials:
     def _pair(
         self, brought: frozenset[str], without: frozenset[str] = _NONE, integrator: str = ""
     ) -> list[_Run]:
-        chosen = [integrator if k == self.selects else "" for k in (0, 1)]
+        chosen = [integrator if k in self.selects else "" for k in (0, 1)]
         return [_Run(side, self._acting(side, brought), without, chosen[side]) for side in (0, 1)]
 
     @property
-    def selects(self) -> int | None:
-        """The only side with integrators to choose from, 0 or 1; None if it is not the only."""
-        able = [side for side in (0, 1) if self._models[side].capabilities.integrators]
-        return able[0] if len(able) == 1 else None
+    def selects(self) -> tuple[int, ...]:
+        """The sides, 0 and 1, that have integrators to choose from."""
+        return tuple(k for k in (0, 1) if self._models[k].capabilities.integrators)
 
     @property
     def integrators(self) -> tuple[str, ...]:
-        """Those that the only side with several has."""
-        side = self.selects
-        return () if side is None else self._models[side].capabilities.integrators
+        """Those that all sides with several have."""
+        choices = [self._models[side].capabilities.integrators for side in self.selects]
+        return tuple(name for name in (choices or [()])[0] if all(name in own for own in choices))
 
     def can_be_without(self, feature: Feature) -> bool:
         """Whether a feature can be left out on both sides, and is not what the experiment sets."""
