@@ -54,10 +54,10 @@ class World:
 
     def advance(self, steps: int, fastest: float) -> int:
         """Take engine steps up to one after which a coordinate is beyond its bound; how many."""
-        data = self.data
+        model, data = self.model, self.data
+        qpos, qvel = data.qpos, data.qvel  # views of the engine's memory
         for k in range(1, steps + 1):
-            mujoco.mj_step(self.model, data)
-            qpos, qvel = data.qpos, data.qvel
+            mujoco.mj_step(model, data)
             if not (qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < fastest * fastest):
                 return k
         return steps
@@ -172,7 +172,8 @@ class Server:
 def flags_of(model, kind):
     """Names of the flags of a model that are set; kind: "disable" or "enable"."""
     bits = getattr(model.opt, f"{kind}flags")
-    return [name for name, bit in KINDS[kind].__members__.items() if bits & int(bit)]
+    members = KINDS[kind].__members__.items()
+    return [name for name, bit in members if "BL_" in name and bits & int(bit)]  # not mjNDISABLE
 
 
 def held(model, name):

@@ -37,6 +37,7 @@ from .mujoco_backend import load as load_installed
 _OWN = (
     *("bvh", "cam", "flex", "hfield", "light", "mat_", "mesh", "name", "oct", "sensor", "skin"),
     *("tex", "paths", "efm", "B_", "D_", "M_", "mapM", "mapD", "flg_", "ten_J"),
+    *("dof_length", "actuator_history", "sensor_history"),
 )
 _SAME = ("nq", "nv", "nu", "na", "nbody", "njnt", "ngeom", "nsite", "ntendon", "neq", "nkey")
 _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mjtEnableBit}
@@ -209,10 +210,9 @@ def _edits(release: str, base: mujoco.MjModel, raw: mujoco.MjModel, shared: froz
                     reason=reason,
                 )
             edits[name] = np.array(_field(raw, name))
-    for name, kinds in _FLAGS.items():
+    for name in _FLAGS:
         if _field(raw, name) != _field(base, name):
-            bits = kinds.__members__.items()
-            edits[name] = [flag for flag, bit in bits if _field(raw, name) & int(bit)]
+            edits[name] = child.flags_of(raw, name.removeprefix("opt.").removesuffix("flags"))
     return edits
 
 

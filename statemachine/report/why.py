@@ -58,6 +58,10 @@ LEFT_OUT = {
     "which is another motion.",
     True: "* Without {cause} nothing moves any more, so there can be no gap: a weak hint.",
 }
+INTEGRATOR = (
+    "* Localised by choosing it, not explained: both sides ran again with other integrators "
+    "({left} on the left, {right} on the right), which is another motion."
+)
 METHODS = {
     "nothing": None,
     "one at a time": "The parts add up, to within {adds_up} of the gap: each cause takes away as "
@@ -168,10 +172,7 @@ def causes(result: Explanation) -> list[Block]:
         chaos=floor if result.is_rounding and not small else None,
         same=if_true(not result.shares and not result.found_in),
         table=_table(result, able),
-        left_out=[
-            Text(LEFT_OUT[part.is_still].format(cause=part.name), small=True)
-            for part in result.found_in
-        ],
+        left_out=[Text(_left_out(part), small=True) for part in result.found_in],
         hardly_move=", ".join(result.still) or None,
         method=legend and legend.format(orders=result.orders, adds_up=f"{100 * ADDS_UP:g} %"),
         legend=if_true(legend),
@@ -279,6 +280,12 @@ def _row(result: Explanation, row: CauseShare) -> tuple[str | TableCell, ...]:
         explains += f" ± {percent(row.error)}"
     alone, last = (NONE if part is None else percent(part) for part in (row.alone, row.last))
     return what, left, right, TableCell(explains, share=row.share), alone, last
+
+
+def _left_out(part: Located) -> str:
+    if part.values:
+        return INTEGRATOR.format(left=part.values[0], right=part.values[1])
+    return LEFT_OUT[part.is_still].format(cause=part.name)
 
 
 def _located_row(part: Located) -> tuple[str | TableCell, ...]:

@@ -1,0 +1,196 @@
+"""Other releases of MuJoCo, each in an environment and a process of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import conformance, releases
+from statemachine.backends.release_backend import Server
+from statemachine.cli import main
+from statemachine.errors import BadInputError, EngineError, MissingEngineError, ModelError
+from statemachine.worlds import make_worlds, step
+
+OLD, STRANGE, SAME = "mujoco==3.3.7", "mujoco==3.0.1", f"mujoco=={mujoco.__version__}"
+HOLD = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]
+MISSING, BAD_INPUT, SAYS_NO = 3, 2, 1
+
+
+@pytest.fixture
+def nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user without any release."""
+    monkeypatch.setenv("STATEMACHINE_ENGINES", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user with three; they stay in the environment of the tests."""
+    monkeypatch.setenv("STATEMACHINE_ENGINES", str(Path(sys.prefix, "engines")))
+    for name in (OLD, STRANGE, SAME):
+        releases.add(name, say=lambda _line: None)
+
+
+installs = pytest.mark.usefixtures("here")
+
+
+def run_of(model: Any, nstep: int = 400, call: int = 1) -> Any:
+    """Positions of `hold` after each call of so many steps, and its Data."""
+    data = sm.make_data(model)
+    data.ctrl[:] = HOLD
+    rows = []
+    for _ in range(nstep // call):
+        sm.step(model, data, call)
+        rows.append(data.qpos.copy())
+    return np.array(rows), data
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "says"),
+    [
+        (OLD, MissingEngineError, f"statemachine engines add {OLD}"),
+        ("mujoco==new", BadInputError, "type mujoco==3.3.7"),
+        ("pybullet==3.2.5", BadInputError, "releases of pybullet cannot be run"),
+    ],
+)
+@pytest.mark.usefixtures("nothing")
+def test_what_is_not_here_is_one_line(name: str, error: type[Exception], says: str) -> None:
+    with pytest.raises(error, match=says):
+        sm.load("so101", backend=name)
+
+
+def test_commands_without_any(nothing: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["engines"]) == 0
+    assert main(["engines", "list", "--json"]) == 0
+    assert main(["engines", "remove", OLD]) == MISSING
+    assert main(["engines", "add", "mujoco"]) == BAD_INPUT
+    assert main(["engines", "add", OLD, "--python", "no-such-python"]) == BAD_INPUT
+    assert main(["compare", "hold", f"so101@{OLD}", "so101"]) == MISSING
+    assert "Traceback" not in capsys.readouterr().err
+    assert not list(nothing.iterdir())
+
+
+def test_what_is_half_made_is_never_found(nothing: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(name: str, *command: str) -> None:
+        if "venv" not in command:
+            raise EngineError(f"{name} cannot be installed: the disk is full")
+
+    monkeypatch.setattr(releases, "_run", refused)
+    with pytest.raises(EngineError, match="the disk is full"):
+        releases.add(OLD, say=lambda _line: None)
+    assert not list(nothing.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.network
+@installs
+class TestReleases:
+    def test_the_same_release_gives_the_same_bits(self) -> None:
+        ours, theirs = (
+            run_of(sm.load("so101/scene", backend=name), 600) for name in ("mujoco", SAME)
+        )
+        assert np.array_equal(ours[0], theirs[0])
+        for name in ("xpos", "site_xmat", "qacc", "qfrc_contact", "qfrc_friction"):
+            assert np.array_equal(getattr(ours[1], name), getattr(theirs[1], name)), name
+        assert np.array_equal(ours[1].contacts.geom, theirs[1].contacts.geom)
+        assert np.array_equal(ours[1].contacts.force, theirs[1].contacts.force)
+
+    @pytest.mark.parametrize("call", [2, 7, 100])
+    def test_steps_in_one_call_are_steps_one_by_one(self, call: int) -> None:
+        model = sm.load("so101/scene", backend=OLD)
+        singly, _ = run_of(model, 700)
+        together, data = run_of(model, 700, call)
+        assert np.array_equal(together, singly[call - 1 :: call])
+        assert data.time == pytest.approx(3.5)
+
+    def test_the_contract_is_kept(self) -> None:
+        assert not [o for o in conformance.run(SAME) if o.result == "failed"]
+
+    def test_until_3_4_a_clamped_servo_damps(self, capsys: pytest.CaptureFixture[str]) -> None:
+        """The update of velocities took kv in where the force is clamped; Euler's never did."""
+        new, old = (sm.load("so101", backend=name) for name in ("mujoco", OLD))
+        gap = np.degrees(np.abs(run_of(new)[0] - run_of(old)[0]).max())
+        assert gap == pytest.approx(6.2, abs=0.05)
+        euler = [run_of(m.replace(integrator="euler"))[0] for m in (new, old)]
+        assert np.degrees(np.abs(euler[0] - euler[1]).max()) < 1e-8
+        sides = ("hold", f"so101@{OLD}", "so101")
+        assert main(["compare", *sides, "--one-step"]) == SAYS_NO
+        assert "part in the stage “velocity update”" in capsys.readouterr().out
+        assert main(["compare", *sides, "--why"]) == 0
+        assert "with other integrators (euler on the left, euler on the right)" in " ".join(
+            capsys.readouterr().out.split()
+        )
+        assert main(["compare", "--models", *sides[1:]]) == 0
+        assert "loaded into mujoco 3.3.7" in capsys.readouterr().out
+
+    def test_what_a_release_cannot_read_is_said(self) -> None:
+        with pytest.raises(ModelError, match=r"MuJoCo 3\.0\.1 cannot read .*'kv'"):
+            sm.load("so101", backend=STRANGE)
+
+    @pytest.mark.parametrize(
+        "options",
+        [
+            {"contacts": False},
+            {"gravity": (0, 0, -1)},
+            {"mass": 2.0},
+            {"kp": 9.0},
+            {"timestep": 1e-3},
+        ],
+        ids=str,
+    )
+    def test_options_reach_it(self, options: dict[str, Any]) -> None:
+        model = sm.load("so101/scene", backend=SAME)
+        if "mass" in options:
+            options = {"mass": model.body_mass * 2}
+        ours = sm.load("so101/scene").replace(**options)
+        assert np.array_equal(run_of(ours)[0], run_of(model.replace(**options))[0])
+
+    def test_a_dead_process_is_one_error_and_the_others_go_on(self) -> None:
+        model = sm.load("so101", backend=OLD)
+        whole, _ = run_of(model, 20)
+        rows, data = run_of(model, 10)
+        other = run_of(model, 10)[1]
+        os.kill(Server.of(OLD)._process.pid, signal.SIGKILL)
+        time.sleep(0.2)
+        with pytest.raises(EngineError, match="its process is gone: ended by SIGKILL"):
+            sm.step(model, data)
+        assert np.array_equal(data.qpos, rows[-1])
+        for _ in range(10):  # what it was is known here
+            sm.step(model, other)
+        assert np.array_equal(other.qpos, whole[-1])
+        sm.reset(model, data)
+        sm.step(model, data)
+
+    def test_it_ends_with_its_parent(self) -> None:
+        code = (
+            "import statemachine as sm, time\n"
+            "from statemachine.backends.release_backend import Server\n"
+            f"sm.load('so101', backend={OLD!r})\n"
+            f"print(Server.of({OLD!r})._process.pid, flush=True)\n"
+            "time.sleep(60)"
+        )
+        with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as parent:
+            assert parent.stdout is not None
+            pid = int(parent.stdout.readline())
+            parent.kill()
+        deadline = time.monotonic() + 10
+        while Path(f"/proc/{pid}").exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not Path(f"/proc/{pid}/exe").exists()
+
+    def test_worlds_of_it(self) -> None:
+        model = sm.load("so101", backend=OLD)
+        with make_worlds(model, 3, workers=2) as worlds:
+            worlds.ctrl[:] = HOLD
+            step(worlds, 20)
+            assert np.array_equal(worlds.qpos[2], run_of(model, 20)[0][-1])
