@@ -17,9 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import BadInputError, EngineError, MissingEngineError
+from .installed import DEFAULT
 
 _NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+(\.\w+)*)")
-_ENGINES = ("mujoco",)  # whose releases can be run
+_EXAMPLE = f"{DEFAULT}==3.3.7"
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,9 @@ def version_of(name: str) -> str:
     """
     match = _NAME.fullmatch(name)
     if match is None:
-        raise BadInputError(f"{name!r} is no release of an engine: type mujoco==3.3.7")
-    if match["engine"] not in _ENGINES:
-        raise BadInputError(f"releases of {match['engine']} cannot be run, those of mujoco can")
+        raise BadInputError(f"{name!r} is no release of an engine: type {_EXAMPLE}")
+    if match["engine"] != DEFAULT:
+        raise BadInputError(f"releases of {match['engine']} cannot be run, those of {DEFAULT} can")
     return match["version"]
 
 
@@ -124,7 +125,7 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         for numpy in ("numpy", "numpy<2"):  # old wheels were built against NumPy 1, and do not say
             say(f"installing {name} and {numpy}")
             _run(name, *pip, "--quiet", name, numpy)
-            code = "import numpy, mujoco; print(mujoco.__version__)"
+            code = f"import numpy, {DEFAULT} as engine; print(engine.__version__)"
             done = subprocess.run([own, "-I", "-c", code], capture_output=True, text=True)  # noqa: PLW1510
             if done.returncode == 0:
                 break

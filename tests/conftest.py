@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from statemachine import backends, load
+from statemachine import backends, load, releases
 from statemachine.backends import backend_engine, backend_names
 from statemachine.cli import main
 from statemachine.errors import MissingEngineError
-from statemachine.installed import ENGINES, require
+from statemachine.installed import ENGINES, engine_version, require
 from statemachine.interface import Data, Model, make_data, reset, step
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import take
@@ -423,3 +423,15 @@ def without_pybullet(tmp_path: Path) -> dict[str, str]:
         "sys.meta_path.insert(0, Hide())\n"
     )
     return {"PYTHONPATH": os.pathsep.join((str(hidden), str(ROOT)))}
+
+
+# An old one, one that is too old for the arm, and the one that is installed.
+RELEASES = ("mujoco==3.3.7", "mujoco==3.0.1", f"mujoco=={engine_version('mujoco')}")
+
+
+@pytest.fixture
+def old_releases(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user with three releases; they stay in the environment of the tests."""
+    monkeypatch.setenv("STATEMACHINE_ENGINES", str(Path(sys.prefix, "engines")))
+    for name in RELEASES:
+        releases.add(name, say=lambda _line: None)

@@ -97,8 +97,9 @@ def test_a_later_stage_leads_where_no_earlier_one_differs(tmp_path: Path) -> Non
     assert touching == stages["contact force"].beyond > 0
     assert touching + apart == found.moments
     assert stages["velocity update"].leads == 0
-    end = page(found, ("one", "two"), "hold").headline.end
-    assert end.endswith(f"is other constraints ({apart}): that has another cause.")
+    headline = page(found, ("one", "two"), "hold").headline
+    assert headline
+    assert headline.end.endswith(f"is other constraints ({apart}): that has another cause.")
 
 
 def test_joints_in_another_order_are_matched(tmp_path: Path) -> None:

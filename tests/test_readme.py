@@ -86,6 +86,8 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
         need_engine("pybullet")
     if "fingertip" in words:
         need_engine("pinocchio")
+    if "mujoco==" in command:
+        request.getfixturevalue("old_releases")
     if "path/to/menagerie" in words:
         folder = request.getfixturevalue("menagerie")
         words = [str(folder) if word == "path/to/menagerie" else word for word in words]

@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -21,7 +20,9 @@ from statemachine.cli import main
 from statemachine.errors import BadInputError, EngineError, MissingEngineError, ModelError
 from statemachine.worlds import make_worlds, step
 
-OLD, STRANGE, SAME = "mujoco==3.3.7", "mujoco==3.0.1", f"mujoco=={mujoco.__version__}"
+from .conftest import RELEASES
+
+OLD, STRANGE, SAME = RELEASES
 HOLD = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]
 MISSING, BAD_INPUT, SAYS_NO = 3, 2, 1
 
@@ -33,15 +34,7 @@ def nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A user with three; they stay in the environment of the tests."""
-    monkeypatch.setenv("STATEMACHINE_ENGINES", str(Path(sys.prefix, "engines")))
-    for name in (OLD, STRANGE, SAME):
-        releases.add(name, say=lambda _line: None)
-
-
-installs = pytest.mark.usefixtures("here")
+installs = pytest.mark.usefixtures("old_releases")
 
 
 def run_of(model: Any, nstep: int = 400, call: int = 1) -> Any:

@@ -33,7 +33,7 @@ PARTS = {
 }
 
 
-class World:
+class ReleasedWorld:
     """One MjData, and how its State is put and read."""
 
     def __init__(self, model) -> None:
@@ -84,7 +84,7 @@ class World:
         return arrays
 
 
-class Server:
+class Answerer:
     """The models and worlds of this process, by number, and what can be asked of them."""
 
     def __init__(self) -> None:
@@ -136,7 +136,7 @@ class Server:
 
     def make(self, job, _):
         """A world of a model."""
-        return {"world": self.keep(World(self.things[job["model"]]))}, {}
+        return {"world": self.keep(ReleasedWorld(self.things[job["model"]]))}, {}
 
     def run(self, job, content):
         """Place a state if one is given, take a command and steps; one more is kept in reserve."""
@@ -188,7 +188,7 @@ def main() -> None:
     os.dup2(2, 1)  # what an engine prints is no answer
     if hasattr(mujoco, "set_mju_user_warning"):  # else it writes a file where it runs
         mujoco.set_mju_user_warning(lambda text: None)
-    server = Server()
+    server = Answerer()
     while True:
         lengths = source.read(SIZES.size)
         if len(lengths) < SIZES.size:

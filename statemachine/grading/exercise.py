@@ -26,6 +26,7 @@ from ..backends import backend_engine
 from ..errors import BadInputError, EngineError
 from ..installed import DEFAULT, engine_version
 from ..processes.parallel import in_parallel, unwinding
+from ..releases import is_release
 from .judges import JUDGES, Judgement, judge_of, judged
 from .own_files import LARGEST, digest, has_solutions, in_folder, named_by
 from .recording import FunctionRecording, Limits, record
@@ -130,6 +131,8 @@ class ExerciseJudge(ExitStack):
             raise BadInputError(
                 f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
             )
+        if is_release(backend):
+            raise BadInputError("exercises are judged on engines that are installed")
         engine = backend_engine(backend)
         self.backend = backend
         self.versions = {"statemachine": __version__, "python": sys.version.split()[0]}
