@@ -15,11 +15,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         "Other releases of MuJoCo, each in an environment of its own. Where an engine is named, "
         f"so can be a release: {PROGRAM} compare hold so101@mujoco==3.3.7 so101"
     )
-    parser.set_defaults(run=run_list, json=False)
+    parser.set_defaults(json=False)
     verbs = parser.add_subparsers(metavar="verb")
     listing = verbs.add_parser("list", help="those that are here, and their size")
     add_table(listing, json_of())
-    listing.set_defaults(run=run_list)
     adding = verbs.add_parser("add", help="install a release")
     adding.add_argument("name", metavar="NAME", help="as mujoco==3.3.7")
     python = "the Python that it is to run on (default: this one)"
@@ -30,7 +29,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     removing.set_defaults(run=run_remove)
 
 
-def run_list(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """What is here."""
     from ..page import Page, Table, Text
     from ..releases import folder, releases
