@@ -524,7 +524,7 @@ def test_real_time_is_the_loops_affair(cli: Cli) -> None:
 def test_the_whole_path_piped(cli: Cli) -> None:
     done = cli("lesson", code=0)
     assert done.stderr == ""
-    numbers = re.findall(r"^(\d+) of 10: ", done.stdout, re.MULTILINE)
+    numbers = re.findall(r"^(\d+) of 10, ", done.stdout, re.MULTILINE)
     assert numbers == [str(k) for k in range(1, 11)]
     assert max(map(cell_len, done.stdout.splitlines())) <= 80
     assert_not_in(done.stdout, "\x1b", "Your prediction")
@@ -613,7 +613,7 @@ def test_the_path_waits_for_its_reader() -> None:
         ("Enter for lesson 3", "q\n"),
     ]
     seen = _at_a_terminal("lesson", typed=typed)
-    assert_in(seen, "1 of 10: Two objects", "2 of 10: Positions")
+    assert_in(seen, "1 of 10, objects: ", "2 of 10, state: ")
     assert "3 of 10" not in seen
     assert "Go on later with: statemachine lesson --from write" in seen
     seen = _at_a_terminal("lesson", "--from", "9", typed=[("Your prediction", "q\n")])
