@@ -189,6 +189,18 @@ def test_a_strange_archive_is_one_line(box: Trace, tmp_path: Path) -> None:
             read(path)
 
 
+def test_what_a_reader_says_at_length_is_cut(tmp_path: Path) -> None:
+    """A damaged list of contents made a name of 3,000 characters, which zipfile repeated."""
+    file = tmp_path / "long.npz"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("x" * 3000 + ".npy", b"")
+    content = file.read_bytes()
+    file.write_bytes(content.replace(b"xx", b"yy", 1))
+    with pytest.raises(TraceError) as caught:
+        read(file)
+    assert len(str(caught.value)) < 300
+
+
 def test_a_name_from_a_file_does_nothing_to_a_terminal(
     box: Trace, tmp_path: Path, cli: Cli
 ) -> None:

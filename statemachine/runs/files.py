@@ -78,7 +78,7 @@ def read(path: str | os.PathLike[str]) -> Trace:
     except MissingEngineError:
         raise
     except Exception as error:  # bytes that are no trace may raise anything in those who read them
-        reason = (str(error) or type(error).__name__).splitlines()[0]
+        reason = (str(error) or type(error).__name__).splitlines()[0][:200]
         raise TraceError(f"{source.name} is no trace: {reason}") from None
 
 
