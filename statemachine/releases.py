@@ -17,9 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import BadInputError, EngineError, MissingEngineError
-from .installed import DEFAULT
+from .installed import DEFAULT, engine_version
 
 _NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+(\.\w+)*)")
+_ADD = "not here: {}; to have it: statemachine engines add {}"
 _EXAMPLE = f"{DEFAULT}==3.3.7"
 
 
@@ -74,10 +75,26 @@ def python_of(name: str) -> Path:
     version_of(name)
     python = _python_in(folder() / name)
     if not python.exists():
-        raise MissingEngineError(
-            f"{name} is not here; to have it: statemachine engines add {name}", engine=name
-        )
+        raise MissingEngineError(_ADD.format(name, name), engine=name)
     return python
+
+
+def backends_of(versions: str) -> list[str]:
+    """The backends of releases, and the one that is installed as the last.
+
+    Args:
+        versions: With commas between: "3.1.6,3.3.7".
+
+    Raises:
+        BadInputError: As `version_of`.
+        MissingEngineError: Some are not here; with the command that adds all of them.
+    """
+    names = [f"{DEFAULT}=={word.strip()}" for word in versions.split(",")]
+    others = [name for name in names if version_of(name) != engine_version(DEFAULT)]
+    missing = [name for name in others if not _python_in(folder() / name).exists()]
+    if missing:
+        raise MissingEngineError(_ADD.format(" and ".join(missing), " ".join(missing)))
+    return [*others, DEFAULT]
 
 
 def _python_in(place: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -69,7 +70,10 @@ def test_commands_without_any(nothing: Path, capsys: pytest.CaptureFixture[str])
     assert main(["engines", "add", "mujoco"]) == BAD_INPUT
     assert main(["engines", "add", OLD, "--python", "no-such-python"]) == BAD_INPUT
     assert main(["compare", "hold", f"so101@{OLD}", "so101"]) == MISSING
-    assert "Traceback" not in capsys.readouterr().err
+    assert main(["compare", "hold", "--versions", "3.1.6,3.3.7"]) == MISSING
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    assert said.endswith("statemachine engines add mujoco==3.1.6 mujoco==3.3.7\n")
     assert not list(nothing.iterdir())
 
 
@@ -125,6 +129,16 @@ class TestReleases:
         )
         assert main(["compare", "--models", *sides[1:]]) == 0
         assert "loaded into mujoco 3.3.7" in capsys.readouterr().out
+
+    def test_between_which_releases_it_changed(self, capsys: pytest.CaptureFixture[str]) -> None:
+        versions = ("--versions", "3.3.7," + SAME.partition("==")[2], "--model", "so101")
+        assert main(["compare", "hold", *versions, "--json"]) == SAYS_NO
+        (found,) = json.loads(capsys.readouterr().out)
+        assert [side["backend"] for side in (found["one"], found["two"])] == [OLD, "mujoco"]
+        assert main(["compare", "hold", *versions]) == SAYS_NO
+        assert "between MuJoCo 3.3.7 and 4.0.0" in " ".join(capsys.readouterr().out.split())
+        assert main(["compare", "fall", *versions]) == 0
+        assert "is the same" in capsys.readouterr().out
 
     def test_what_a_release_cannot_read_is_said(self) -> None:
         with pytest.raises(ModelError, match=r"MuJoCo 3\.0\.1 cannot read .*'kv'"):

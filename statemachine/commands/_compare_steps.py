@@ -1,8 +1,10 @@
-"""`statemachine compare --one-step` and `--converge`: is it a difference, and of which stage?"""
+"""`statemachine compare --one-step`, `--converge`, `--versions`: of what is it a difference?"""
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,11 @@ OPTIONS: tuple[Row, ...] = (
         "",
         "run with steps as given, halved and quartered: what vanishes is discretisation",
     ),
+    (
+        "--versions",
+        "V,V,…",
+        "run on releases of MuJoCo, and on the one that is installed: between which it changes",
+    ),
 )
 
 
@@ -30,14 +37,19 @@ def run(options: argparse.Namespace, request: Any) -> int:
         options: `one_step` and `json` are read.
         request: The `compare.Request`; not of recorded traces alone.
     """
+    asked = {"--one-step": _one_step, "--converge": _converge, "--versions": _versions}
+    flag = next(flag for flag in asked if getattr(options, flag[2:].replace("-", "_")))
     refuse(
         (
             request.is_traces and not request.sides,
-            f"{'--one-step' if options.one_step else '--converge'} runs both sides, and a trace is "
-            f"a run that was made: {PROGRAM} compare hold",
-        )
+            f"{flag} runs both sides, and a trace is a run that was made: {PROGRAM} compare hold",
+        ),
+        (
+            options.versions and request.sides,
+            "--versions goes without sides: --model names the file",
+        ),
     )
-    return _one_step(options, request) if options.one_step else _converge(options, request)
+    return asked[flag](options, request)
 
 
 def _one_step(options: argparse.Namespace, request: Any) -> int:
@@ -65,6 +77,25 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
     with progress("converge") as told:
         found = convergence(run, progress=told)
     return show(page(found, _name(request)), found, options.json)
+
+
+def _versions(options: argparse.Namespace, request: Any) -> int:
+    from ..compare import compare, sides_of
+    from ..measures import parse_tolerances
+    from ..releases import backends_of
+    from ..report.progress import progress
+    from ..report.versions import page
+    from ..runs.drive import part_of
+
+    tolerances = parse_tolerances(options.tolerance)
+    pairs = list(pairwise(backends_of(options.versions)))
+    comparisons = []
+    with progress("versions") as told:
+        for k, pair in enumerate(pairs):
+            share = part_of(told, k / len(pairs), 1 / len(pairs))
+            traces, _ = sides_of(replace(request, backends=pair), share)
+            comparisons.append(compare(*traces, tolerances=tolerances))
+    return show(page(comparisons, _name(request)), comparisons, options.json)
 
 
 def _name(request: Any) -> str:

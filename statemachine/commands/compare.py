@@ -127,7 +127,9 @@ RULES: tuple[Rule, ...] = (
     ("frame all digits", NEEDS, "models"),
     ("uncertainty", EXCLUDES, "no_chaos"),
     ("one_step converge", EXCLUDES, "why html plot film models uncertainty tolerance"),
+    ("versions", EXCLUDES, "why html plot film models uncertainty backends"),
     ("one_step", EXCLUDES, "converge"),
+    ("versions", EXCLUDES, "one_step converge"),
     (_OF_RUN, EXCLUDES, "models", "{flag} is of a run, and --models runs nothing"),
 )
 
@@ -255,7 +257,7 @@ def run(options: argparse.Namespace) -> int:
             f"{PROGRAM} compare hold",
         )
     )
-    if options.one_step or options.converge:
+    if options.one_step or options.converge or options.versions:
         return _compare_steps.run(options, request_of(options))
     if options.why and not options.html:
         refuse(

@@ -20,7 +20,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     listing = verbs.add_parser("list", help="those that are here, and their size")
     add_table(listing, json_of())
     adding = verbs.add_parser("add", help="install a release")
-    adding.add_argument("name", metavar="NAME", help="as mujoco==3.3.7")
+    adding.add_argument("names", metavar="NAME", nargs="+", help="as mujoco==3.3.7")
     python = "the Python that it is to run on (default: this one)"
     add_table(adding, ("--python", "EXE", python, {"default": sys.executable}))
     adding.set_defaults(run=run_add)
@@ -52,9 +52,11 @@ def run_add(options: argparse.Namespace) -> int:
     from ..releases import add as add_release
     from ..releases import releases
 
-    add_release(options.name, options.python)
-    size = next(release.size for release in releases() if release.name == options.name)
-    print(f"{options.name} is here: {size / 1e6:.0f} MB")
+    for name in options.names:
+        add_release(name, options.python)
+    for release in releases():
+        if release.name in options.names:
+            print(f"{release.name} is here: {release.size / 1e6:.0f} MB")
     return 0
 
 
