@@ -191,7 +191,8 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
         **(lesson_module.tables(results) if hasattr(lesson_module, "tables") else {}),
     }
     page = template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
-    return replace(page, title=f"{lesson.name}: {lesson.question}")
+    asked = f": {lesson.question}" if taken[first].arm else ""  # which is about the arm
+    return replace(page, title=f"{lesson.name}{asked}")
 
 
 def stepping_loop(model: Model, marks: Sequence[float], seconds: float) -> tuple[str, str]:
