@@ -186,10 +186,14 @@ def subject(
 
 
 def leading(comparison: Comparison) -> Agreement | None:
-    """The quantity farthest beyond its tolerance; of the motion if any of that is beyond."""
+    """The quantity farthest beyond its tolerance: a coordinate, of which --why speaks, if any is.
+
+    Else one of the motion, as the fingertip; else any.
+    """
     beyond = [a for a in comparison.agreements if a.verdict != "agrees"]
+    own = [a for a in beyond if QUANTITIES[a.kind].own]
     motion = [a for a in beyond if QUANTITIES[a.kind].moves]
-    return max(motion or beyond, key=_finite_first, default=comparison.worst)
+    return max(own or motion or beyond, key=_finite_first, default=comparison.worst)
 
 
 def _finite_first(agreement: Agreement) -> float:

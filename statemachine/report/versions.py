@@ -8,7 +8,7 @@ from ..compare import Comparison
 from ..measures.text import NONE, listed, quantity, short_time
 from ..page import Headline, Page, Table, TableCell
 from . import template
-from .finding import name_of
+from .finding import leading, name_of
 
 CHANGED = "The motion changes between {pairs}"
 SAME = "The motion is the same on all of them, within its tolerances"
@@ -45,7 +45,7 @@ def _version(comparison: Comparison, side: str) -> str:
 
 
 def _row(comparison: Comparison) -> tuple[str | TableCell, ...]:
-    worst = comparison.worst
+    worst = leading(comparison)
     if worst is None:
         return (NONE,) * 4
     largest, tolerance = quantity(worst.max, worst.unit), quantity(worst.tolerance, worst.unit)
