@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -25,7 +27,7 @@ from statemachine.report.plot import of_trace
 from statemachine.runs import Trace, record, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import lesson_result
+from .conftest import Cli, lesson_result
 from .small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
 
 
@@ -150,3 +152,15 @@ def test_the_joint_that_differs_most(types: list[int], two: Any, expected: Gap |
     assert (
         joint_gap("ab", types, [0, 1][: len(types)], np.zeros(len(two)), np.array(two)) == expected
     )
+
+
+def test_each_quantity_is_a_test_of_junit(tmp_path: Path, cli: Cli) -> None:
+    file = tmp_path / "found.xml"
+    sides = ("so101", "timestep=0.005", "so101", "timestep=0.0025")
+    told = json.loads(cli("compare", "hold", *sides, "--junit", file, "--json", code=1).stdout)
+    agreements = {found["name"]: found["verdict"] for found in told["comparison"]["agreements"]}
+    (suite,) = ElementTree.parse(file).getroot()
+    failed = {case.get("name"): case.find("failure") is not None for case in suite}
+    assert failed == {name: verdict != "agrees" for name, verdict in agreements.items()}
+    assert int(suite.get("failures", 0)) == sum(failed.values()) > 0
+    cli("compare", "hold", "--junit", tmp_path / "no" / "such.xml", code=2)

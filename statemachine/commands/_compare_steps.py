@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -88,6 +89,7 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
     from ..runs.drive import part_of
 
     tolerances = parse_tolerances(options.tolerance)
+    check_junit(options)
     pairs = list(pairwise(backends_of(options.versions)))
     comparisons = []
     with progress("versions") as told:
@@ -95,7 +97,25 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
             share = part_of(told, k / len(pairs), 1 / len(pairs))
             traces, _ = sides_of(replace(request, backends=pair), share)
             comparisons.append(compare(*traces, tolerances=tolerances))
+    write_junit(options, comparisons)
     return show(page(comparisons, _name(request)), comparisons, options.json)
+
+
+def check_junit(options: argparse.Namespace) -> None:
+    """Refuse a place for `--junit` that nothing can be written to, before anything runs."""
+    from ..runs.whole import check_place
+
+    if options.junit is not None:
+        check_place(options.junit)
+
+
+def write_junit(options: argparse.Namespace, comparisons: Sequence[Any]) -> None:
+    """Write the comparisons where `--junit` says."""
+    from ..report.junit import junit
+    from ..runs.whole import replace_text
+
+    if options.junit is not None:
+        replace_text(options.junit, junit(comparisons))
 
 
 def _name(request: Any) -> str:

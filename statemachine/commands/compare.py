@@ -29,6 +29,7 @@ from ._common import (
     add_rules,
     add_table,
     complain,
+    file_name,
     json_of,
     menagerie,
     pairs_of,
@@ -38,6 +39,7 @@ from ._common import (
     shorten_help,
     show,
 )
+from ._compare_steps import check_junit, write_junit
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -79,6 +81,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         *_compare_floor.OPTIONS,
         *_compare_html.OPTIONS,
         json_of(),
+        ("--junit", "FILE", "write each quantity as a test of JUnit, for CI", {"type": file_name}),
     )
     add_table(
         parser.add_argument_group("two sides"),
@@ -129,6 +132,7 @@ RULES: tuple[Rule, ...] = (
     ("one_step converge", EXCLUDES, "why html plot film models uncertainty tolerance"),
     ("versions", EXCLUDES, "why html plot film models uncertainty backends"),
     ("one_step", EXCLUDES, "converge"),
+    ("junit", EXCLUDES, "why one_step converge models"),
     ("versions", EXCLUDES, "one_step converge"),
     (_OF_RUN, EXCLUDES, "models", "{flag} is of a run, and --models runs nothing"),
 )
@@ -284,6 +288,7 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
     from ..report.progress import progress
 
     tolerances = parse_tolerances(options.tolerance)
+    check_junit(options)
     request = request_of(options)
     if request.is_traces and len(request.what) == 2:
         refuse_given(
@@ -331,6 +336,7 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
             "unmatched": run.unmatched,
             "only": run.matched.only if run.matched else ({}, {}),
         }
+    write_junit(options, [found])
     code = show(page, result, options.json)
     pictures.write(renderer, options, one, two, found, request, floor)
     return code

@@ -114,7 +114,8 @@ class Header:
     @property
     def label(self) -> str:
         """The backend and its version, and what is unusual about them."""
-        text = f"{self.backend} {self.provenance.versions.get(self.backend, '')}".strip()
+        version = self.provenance.versions.get(self.backend, "")
+        text = self.backend if self.backend.endswith(version) else f"{self.backend} {version}"
         if self.defaults == "engine":
             text += ", engine defaults"
         return text + (", recorded" if self.recorded else "")
