@@ -195,6 +195,19 @@ class TestReleases:
             time.sleep(0.05)
         assert not Path(f"/proc/{pid}/exe").exists()
 
+    def test_what_is_closed_or_collected_is_forgotten_there(self) -> None:
+        model = sm.load("so101", backend=OLD)
+        pid = Server.of(OLD)._process.pid
+        sizes = []
+        for _ in range(3):
+            for k in range(40):
+                data = sm.make_data(model.replace(damping=0.1 + k / 100))
+                sm.step(data.model, data)
+                if k % 2:
+                    data.close()
+            sizes.append(int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * 4096)
+        assert sizes[2] < sizes[0] + 20e6  # forgotten by nobody, 40 took 100 MB
+
     def test_worlds_of_it(self) -> None:
         model = sm.load("so101", backend=OLD)
         with make_worlds(model, 3, workers=2) as worlds:

@@ -162,12 +162,6 @@ class Answerer:
             mujoco.mj_forward(world.model, world.data)
         return {}, world.derived()
 
-    def free(self, job, _):
-        """Forget a model or a world."""
-        for number in job["numbers"]:
-            self.things.pop(number, None)
-        return {}, {}
-
 
 def flags_of(model, kind):
     """Names of the flags of a model that are set; kind: "disable" or "enable"."""
@@ -196,6 +190,8 @@ def main() -> None:
         size, rest = SIZES.unpack(lengths)
         job = json.loads(source.read(size))
         content = np.frombuffer(source.read(rest))
+        for number in job["free"]:  # models and worlds that nobody needs any more
+            server.things.pop(number, None)
         try:
             answer, arrays = getattr(server, job["verb"])(job, content)
         except Exception as error:

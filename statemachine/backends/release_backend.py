@@ -11,8 +11,8 @@ import copy
 import json
 import os
 import threading
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -78,6 +78,7 @@ class Server:
     def __init__(self, release: str) -> None:
         command = [str(python_of(release)), "-I", "-u", child.__file__]
         self.release, self._turn, self.lives = release, threading.RLock(), True
+        self.forgotten: list[int] = []  # models and worlds that it is to forget at the next call
         self._process = PipedChild(command, {**os.environ, "MUJOCO_GL": "disable"})
 
     @classmethod
@@ -99,9 +100,10 @@ class Server:
             ValueError: It raised an error, with its text.
         """
         blob = b"".join(array.tobytes() for array in content)
-        head = json.dumps({"verb": verb, **job}).encode()
         try:
             with self._turn:
+                free, self.forgotten = self.forgotten, []
+                head = json.dumps({"verb": verb, "free": free, **job}).encode()
                 self._process.to.write(child.SIZES.pack(len(head), len(blob)) + head + blob)
                 self._process.to.flush()
                 size, rest = child.SIZES.unpack(self._process.out.read(child.SIZES.size))
@@ -174,6 +176,7 @@ class Server:
                 edits=[(name, np.size(value)) for name, value in arrays.items()],
                 flags={name: value for name, value in edits.items() if name in _FLAGS},
             )
+            self.forgotten.append(number)
             number = answer["model"]
         return number, self.ask("make", model=number)[0]["world"]
 
@@ -294,6 +297,8 @@ class ReleaseWorld(HiddenWorld):
             self._model, self._world = self._server.opened(self._path, self._edits)
         except (LostError, ValueError) as error:
             raise EngineError(f"{self.engine} cannot make a world: {error}") from error
+        # No call: it may be collected in the midst of another.
+        self._end = weakref.finalize(self, _forget, self._server, self._model, self._world)
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
@@ -349,9 +354,11 @@ class ReleaseWorld(HiddenWorld):
         return {**values, "contacts": Contacts(geom=geom, **arrays)}
 
     def close(self) -> None:
-        if self._server.lives:
-            with suppress(LostError):
-                self._server.ask("free", numbers=[self._model, self._world])
+        self._end()
+
+
+def _forget(server: Server, *numbers: int) -> None:
+    server.forgotten.extend(numbers)
 
 
 def sizes_of(raw: mujoco.MjModel) -> tuple[float, Array, int, int, int]:
