@@ -136,7 +136,10 @@ class Server:
         except ValueError as error:
             raise ModelError(f"{engine} cannot read {path}: {error}") from error
         except LostError as error:
-            raise EngineError(f"{engine} cannot read {path}: {error}") from error
+            raise EngineError(
+                f"{engine} cannot be run: {error}; to make it anew: statemachine engines remove "
+                f"{self.release}, then add"
+            ) from error
         for name in _SAME:
             if name in fields and int(fields[name]) != getattr(raw, name):
                 raise ModelError(
