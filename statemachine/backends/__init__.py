@@ -127,7 +127,7 @@ def load(
 
     Args:
         model: A name ("so101/scene_box") or a path; see `models.resolve`.
-        backend: The engine to run it on.
+        backend: The engine to run it on, or a release of it, as "mujoco==3.3.7".
         defaults: "model" keeps the contract of this library on every backend;
             "engine" gives what the engine's own users get when they load the file.
         menagerie: A menagerie folder to look the name up in.
