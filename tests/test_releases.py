@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import signal
@@ -22,6 +23,7 @@ from statemachine.errors import BadInputError, EngineError, MissingEngineError, 
 from statemachine.worlds import make_worlds, step
 
 from .conftest import RELEASES
+from .small_models import LINKS_AND_BALL, model_of
 
 OLD, STRANGE, SAME = RELEASES
 HOLD = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]
@@ -195,10 +197,22 @@ class TestReleases:
             time.sleep(0.05)
         assert not Path(f"/proc/{pid}/exe").exists()
 
-    def test_what_is_closed_or_collected_is_forgotten_there(self) -> None:
+    def test_a_file_that_changed_is_not_another_robot(self, tmp_path: Path) -> None:
+        model = model_of(tmp_path, LINKS_AND_BALL, backend=OLD)
+        first = sm.make_data(model)
+        model.path.write_text(LINKS_AND_BALL.replace('damping="0.1"', 'damping="0.2"'))
+        sm.step(model, first)  # which was made before
+        with pytest.raises(EngineError, match="another file than when it was loaded"):
+            sm.make_data(model)
+
+    def test_what_is_closed_or_collected_is_forgotten_there(
+        self, request: pytest.FixtureRequest
+    ) -> None:
         model = sm.load("so101", backend=OLD)
         pid = Server.of(OLD)._process.pid
         sizes = []
+        gc.disable()  # no world waits for the collector of cycles
+        request.addfinalizer(gc.enable)
         for _ in range(3):
             for k in range(40):
                 data = sm.make_data(model.replace(damping=0.1 + k / 100))

@@ -8,14 +8,15 @@ child's release makes of the file, and edits reach the child by the names of fie
 from __future__ import annotations
 
 import copy
+import hashlib
 import json
 import os
 import threading
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import mujoco
 import numpy as np
@@ -63,6 +64,20 @@ def load(
     server = Server.of(release)
     installed = load_installed(path, defaults)
     return ReleaseModel(server.compiled(Path(path), installed), release)
+
+
+class FileReading(NamedTuple):
+    """What a release makes of a file.
+
+    Attributes:
+        model: In the installed release's terms.
+        shared: Names of the fields that both have.
+        digest: Of what the release read, by which a file that changed since then is seen.
+    """
+
+    model: MujocoModel
+    shared: frozenset[str]
+    digest: str
 
 
 class LostError(Exception):
@@ -124,15 +139,15 @@ class Server:
             arrays[name], start = values[start:stop].reshape(shape).copy(), stop
         return answer, arrays
 
-    def compiled(self, path: Path, installed: MujocoModel) -> tuple[MujocoModel, frozenset[str]]:
-        """What it makes of a file, in the installed release's terms; the fields that both have.
+    def compiled(self, path: Path, installed: MujocoModel) -> FileReading:
+        """What it makes of a file that the installed release has compiled.
 
         Raises:
             ModelError: It cannot read the file, or finds other parts in it.
         """
         engine, raw = f"MuJoCo {version_of(self.release)}", copy.copy(installed.raw)
         try:
-            answer, fields = self._loaded(path, [*_SAME, *_fields(raw)])
+            answer, fields, digest = self._loaded(path, raw)
         except ValueError as error:
             raise ModelError(f"{engine} cannot read {path}: {error}") from error
         except LostError as error:
@@ -140,6 +155,7 @@ class Server:
                 f"{engine} cannot be run: {error}; to make it anew: statemachine engines remove "
                 f"{self.release}, then add"
             ) from error
+        self.forgotten.append(answer["model"])
         for name in _SAME:
             if name in fields and int(fields[name]) != getattr(raw, name):
                 raise ModelError(
@@ -158,18 +174,26 @@ class Server:
             known = [int(kinds.__members__[own]) for own in names if own in kinds.__members__]
             setattr(*held(raw, name), sum(known))
         check_numbers(raw, f"{path} in {engine}")
-        return MujocoModel(raw, path, installed.substeps), frozenset(shared)
+        return FileReading(MujocoModel(raw, path, installed.substeps), frozenset(shared), digest)
 
     def _loaded(
-        self, path: Path, fields: Sequence[str] = ()
-    ) -> tuple[dict[str, Any], dict[str, Array]]:
+        self, path: Path, raw: mujoco.MjModel
+    ) -> tuple[dict[str, Any], dict[str, Array], str]:
+        """The number of a model and its flags, its fields, and a digest of them."""
         spec = spec_with_packages(path)
-        text = spec.to_xml() if spec else ""
-        return self.ask("load", file=str(path.resolve()), text=text, fields=fields)
+        text, names = spec.to_xml() if spec else "", [*_SAME, *_fields(raw)]
+        answer, fields = self.ask("load", file=str(path.absolute()), text=text, fields=names)
+        flags = repr([answer[name] for name in _FLAGS]).encode()
+        read = b"".join([flags, *(array.tobytes() for array in fields.values())])
+        return answer, fields, hashlib.sha256(read).hexdigest()
 
-    def opened(self, path: Path, edits: Mapping[str, Any]) -> tuple[int, int]:
+    def opened(self, reading: FileReading, edits: Mapping[str, Any]) -> tuple[int, int]:
         """A world of a file with some fields edited: the numbers of its model and of itself."""
-        number = self._loaded(path)[0]["model"]
+        path = reading.model.path
+        answer, _, digest = self._loaded(path, reading.model.raw)
+        number = answer["model"]
+        if digest != reading.digest:
+            raise ValueError(f"{path} is another file than when it was loaded")
         if edits:
             arrays = {name: value for name, value in edits.items() if name not in _FLAGS}
             answer, _ = self.ask(
@@ -198,16 +222,16 @@ def _field(raw: mujoco.MjModel, name: str) -> Any:
     return getattr(*held(raw, name))
 
 
-def _edits(release: str, base: mujoco.MjModel, raw: mujoco.MjModel, shared: frozenset[str]) -> Any:
+def _edits(release: str, reading: FileReading, raw: mujoco.MjModel) -> dict[str, Any]:
     """Fields of a compiled model that are another than those of the file; flags by their names.
 
     Raises:
         UnsupportedError: The release has no such field.
     """
-    edits: dict[str, Any] = {}
+    edits, base = dict[str, Any](), reading.model.raw
     for name in _fields(raw):
         if not np.array_equal(_field(raw, name), _field(base, name)):
-            if name not in shared:
+            if name not in reading.shared:
                 reason = "that release has no such field"
                 raise UnsupportedError(
                     f"{release} cannot be given another {name}: {reason}",
@@ -230,27 +254,24 @@ class ReleaseModel(HiddenModel):
     """
 
     release: str
-    _base: tuple[MujocoModel, frozenset[str]]
+    _reading: FileReading
     _inner: MujocoModel
 
     def __init__(
-        self,
-        base: tuple[MujocoModel, frozenset[str]],
-        release: str,
-        inner: MujocoModel | None = None,
+        self, reading: FileReading, release: str, inner: MujocoModel | None = None
     ) -> None:
-        inner = inner or base[0]
+        inner = inner or reading.model
         engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner
-        edits = _edits(release, base[0].raw, engine.raw, base[1])
+        edits = _edits(release, reading, engine.raw)
         names = ("path", "capabilities", "timestep", "substeps")
         super().__init__(
-            partial(ReleaseWorld, release, inner.path, edits, sizes_of(inner.raw)),
+            partial(ReleaseWorld, release, reading, edits, float(inner.raw.opt.timestep)),
             backend=release,
             engine_version=version_of(release),
             raw=inner.raw,
             release=release,
             max_qvel=fastest(inner.raw),
-            _base=base,
+            _reading=reading,
             _inner=inner,
             **facts(inner.raw),
             **{name: getattr(inner, name) for name in names},
@@ -263,30 +284,26 @@ class ReleaseModel(HiddenModel):
 
     def with_compiled(self, compiled: mujoco.MjModel) -> ReleaseModel:
         inner = self._inner.with_compiled(compiled)
-        return ReleaseModel(self._base, self.release, inner)._started_as(self, {})
+        return ReleaseModel(self._reading, self.release, inner)._started_as(self, {})
 
     def _replace(self, options: dict[str, Any]) -> ReleaseModel:
-        known = {name: value for name, value in options.items() if name != "max_qvel"}
-        return ReleaseModel(self._base, self.release, self._inner._replace(known))
+        return ReleaseModel(self._reading, self.release, self._inner._replace(options))
 
 
 class ReleaseWorld(HiddenWorld):
-    """A world in the process of a release."""
+    """A world in the process of a release; the engine's own object is there."""
 
-    errors = (LostError,)
+    errors, raw = (LostError,), None
 
-    def __init__(self, *opening: Any) -> None:
-        """Open it.
-
-        Args:
-            *opening: The release, the path of the file, its edits, and `sizes_of` it.
-        """
-        release, self._path, self._edits, self.timestep, self.qpos0, nv, na, nu = (
-            *opening[:3],
-            *opening[3],
-        )
-        self.engine, self.raw, self._opening = f"MuJoCo {version_of(release)}", self, opening
-        self._sizes = np.cumsum([len(self.qpos0), nv, nv])
+    def __init__(
+        self, release: str, reading: FileReading, edits: Mapping[str, Any], timestep: float
+    ) -> None:
+        """Open it; `timestep` is that of an engine step [s]."""
+        raw = reading.model.raw
+        self.engine, self.timestep = f"MuJoCo {version_of(release)}", timestep
+        self._opening, self.qpos0 = (release, reading, edits, timestep), np.array(raw.qpos0)
+        nv, na, nu = raw.nv, raw.na, raw.nu
+        self._sizes = np.cumsum([raw.nq, nv, nv])
         self.memory_layout = (("warmstart", nv), ("act", na))[: 1 + bool(na)]
         self._ctrl, self._fastest = np.zeros(nu), child.HUGE
         self._state, self._reserve = np.zeros(self._sizes[-1] + na), None
@@ -295,9 +312,10 @@ class ReleaseWorld(HiddenWorld):
 
     def _begin(self) -> None:
         """Be in the process of the release, which begins anew where it has ended."""
-        self._server, self._placed = Server.of(self._opening[0]), True
+        release, reading, edits, _ = self._opening
+        self._server, self._placed = Server.of(release), True
         try:
-            self._model, self._world = self._server.opened(self._path, self._edits)
+            self._model, self._world = self._server.opened(reading, edits)
         except (LostError, ValueError) as error:
             raise EngineError(f"{self.engine} cannot make a world: {error}") from error
         # No call: it may be collected in the midst of another.
@@ -362,8 +380,3 @@ class ReleaseWorld(HiddenWorld):
 
 def _forget(server: Server, *numbers: int) -> None:
     server.forgotten.extend(numbers)
-
-
-def sizes_of(raw: mujoco.MjModel) -> tuple[float, Array, int, int, int]:
-    """Of a compiled model: its timestep [s], qpos0, nv, na and nu."""
-    return float(raw.opt.timestep), np.array(raw.qpos0), raw.nv, raw.na, raw.nu
