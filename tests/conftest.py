@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import linecache
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -244,6 +245,10 @@ def shared(path: Path) -> Path:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A background job ignores Ctrl-C, and one of nohup ignores SIGHUP; so would their children.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if os.name == "posix":
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
     unknown = REQUIRED - set(ENGINES) - {"render", "shared", "browser"}
     if unknown:
         raise pytest.UsageError(f"STATEMACHINE_REQUIRE names no engine: {sorted(unknown)}")
