@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from ..engines import room
 from ..engines.records import LeftAlone
-from ..errors import UnsupportedError
+from ..errors import DivergedError, UnsupportedError
 from ..interface import Data, Model, make_data, reset
 from ..measures import largest
 from ..measures.text import NONE, apart, position, short_time, signed
@@ -135,9 +136,12 @@ def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) ->
     with make_data(model) as data:
         reset(model, data, start_keyframe(model))
         fall = Falling(data, joint, seconds, progress)
-        steps = steps_in(model, seconds)
-        error = drive(model, data, None, steps, after=lambda _k, _time: fall.note(contacts=False))
-        return fall.end(None if error is None else error.time)
+        try:
+            for _ in islice(drive(model, data, None, steps_in(model, seconds)), 1, None):
+                fall.note(contacts=False)
+        except DivergedError as error:
+            return fall.end(error.time)
+        return fall.end()
 
 
 def slots(result: Gravity) -> dict[str, Any]:

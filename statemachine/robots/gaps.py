@@ -65,16 +65,10 @@ def run(model: Model, orders: Array, nudge: np.random.Generator | None = None) -
         if nudge is not None:
             data.qpos[:], data.qvel[:] = nudged_start(model, data.qpos, data.qvel, nudge)
             controller = nudged_controller(controller, nudge)
-
-        def keep(_k: int, _time: float) -> None:
-            rows.append(np.concatenate((data.qpos, data.qvel)))
-
-        keep(0, 0.0)
         try:
-            error = drive(model, data, controller, len(orders), after=keep)
-        except StateMachineError as refusal:
-            error = refusal
-        if error is not None:
+            for _ in drive(model, data, controller, len(orders)):
+                rows.append(np.concatenate((data.qpos, data.qvel)))
+        except StateMachineError as error:
             ended = f"{model.backend} stopped: {error}"
     return np.array(rows), ended
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -68,27 +68,24 @@ def drive(
     controller: Controller | None,
     steps: int,
     *,
-    before: Callable[[int, float], object] | None = None,
-    after: Callable[[int, float], object] | None = None,
     once_more: bool = False,
-) -> DivergedError | None:
-    """Run a Data under the commands of a controller.
+) -> Iterator[float]:
+    """Run a Data under the commands of a controller, and stop at each moment for who looks on.
 
     Args:
         model: The Model of the Data.
         data: Advanced in place.
         controller: Asked for ctrl (nu,) before each step; None where nobody writes ctrl.
         steps: Number of timesteps.
-        before: Called with the number of the step, from 0, and the time [s], when the
-            controller has written.
-        after: Called with how many steps are over, and the time at which the last one began [s].
-        once_more: Whether the controller is asked, and `before` called, after the last step, too.
+        once_more: Whether the controller is asked after the last step, too.
 
-    Returns:
-        The error with which the engine diverged in a step; None if it did not.
+    Yields:
+        The time [s] of each moment, the start and the end included: the controller has written,
+        and derived arrays are of the state in which the step before began.
 
     Raises:
         BadInputError: The controller gave what is no ctrl.
+        DivergedError: The engine diverged in a step.
     """
     ctrl = data.ctrl
     plain, shape, real = np.ndarray, ctrl.shape, ctrl.dtype
@@ -102,17 +99,11 @@ def drive(
                     ctrl[:] = wanted
                 else:
                     _write_ctrl(data, wanted, now)
-        if before is not None:
-            before(k, now)
-        if k == steps:
-            break
-        try:
+        yield now
+        if k < steps:
             step(model, data)
-        except DivergedError as error:  # a controller's own, of another Data, is not meant
-            return error
-        if after is not None:
-            after(k + 1, now)
-    return None
+    if not once_more:
+        yield data.time
 
 
 def _write_ctrl(data: Data, wanted: Any, time: float) -> None:

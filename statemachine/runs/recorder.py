@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import BadInputError, EngineError, TraceError
+from ..errors import BadInputError, DivergedError, EngineError, TraceError
 from ..interface import Array, Data, Model, State, make_data, reset, set_state
 from ..interface.checks import HUGE
 from .derived import derived
@@ -262,26 +262,30 @@ def _run(
 ) -> tuple[dict[str, Array], str]:
     """The inputs of each row, as they are when the step begins, and why it ended early."""
     times: list[float] = []
-    kept: tuple[list[bytes], ...] = ([], [], [])
-    keep_time, (keep_qpos, keep_qvel, keep_ctrl) = times.append, (rows.append for rows in kept)
+    rows: tuple[list[bytes], ...] = ([], [], [])
+    # Bound methods: this loop is all that a recording costs while the run goes on.
+    keep_time, (keep_qpos, keep_qvel, keep_ctrl) = times.append, (row.append for row in rows)
     qpos, qvel, ctrl = data.qpos.tobytes, data.qvel.tobytes, data.ctrl.tobytes
-
-    def keep(k: int, now: float) -> None:
-        keep_time(now)
-        keep_qpos(qpos())
-        keep_qvel(qvel())
-        keep_ctrl(ctrl())
-        if k % 256 == 0:
-            progress(k / total)
-
-    error = drive(model, data, controller, total, before=keep, once_more=True)
-    # Without its advice, which is of no use here.
-    ended = "" if error is None else str(error).partition(". This Data")[0]
+    ended = ""
+    try:
+        for now in drive(model, data, controller, total, once_more=True):
+            keep_time(now)
+            keep_qpos(qpos())
+            keep_qvel(qvel())
+            keep_ctrl(ctrl())
+            if not len(times) & 255:
+                progress(len(times) / total)
+    except DivergedError as error:
+        if not data._trouble:  # a controller's own, of another Data
+            raise
+        ended = str(error).partition(". This Data")[
+            0
+        ]  # without its advice, which is of no use here
     found = {"time": np.array(times)}
-    for name, rows, width in zip(
-        ("qpos", "qvel", "ctrl"), kept, (model.nq, model.nv, model.nu), strict=True
+    for name, parts, width in zip(
+        ("qpos", "qvel", "ctrl"), rows, (model.nq, model.nv, model.nu), strict=True
     ):
-        found[name] = np.frombuffer(b"".join(rows)).reshape(len(times), width)
+        found[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
     # The last rows may have finite numbers that no trace holds.
     state = np.hstack([found["qpos"], found["qvel"]])
     stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))

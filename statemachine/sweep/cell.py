@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -65,25 +66,21 @@ def run_cell(
             controller = nudged_controller(controller, draw)
         qpos, qvel = data.qpos.copy(), data.qvel.copy()
 
-        def look(k: int, began: float) -> None:
-            row["steps"] = k
-            np.maximum(fastest, np.abs(data.qvel), out=fastest)
-            if "touch" not in row and len(contacts := data.contacts):
-                # As derived arrays are: of the state in which the step began.
-                row["first_touch"] = began
-                names = ContactNames.of(model)
-                pairs = {names.pair(*geoms) for geoms in contacts.geom.tolist()}
-                row["touch"] = ", ".join(sorted(pairs))
-            if k in keep:
-                rows.append(data.qpos.copy())
-                row["sample_time"].append(float(data.time))
-            if not k % _LOOKED and time.monotonic() > deadline:
-                raise timed_out(sweep.timeout)
-
         try:
-            error = drive(model, data, controller, total, after=look)
-            if error is not None:
-                raise error
+            for k, (began, _) in enumerate(pairwise(drive(model, data, controller, total)), 1):
+                row["steps"] = k
+                np.maximum(fastest, np.abs(data.qvel), out=fastest)
+                if "touch" not in row and len(contacts := data.contacts):
+                    # As derived arrays are: of the state in which the step began.
+                    row["first_touch"] = began
+                    names = ContactNames.of(model)
+                    pairs = {names.pair(*geoms) for geoms in contacts.geom.tolist()}
+                    row["touch"] = ", ".join(sorted(pairs))
+                if k in keep:
+                    rows.append(data.qpos.copy())
+                    row["sample_time"].append(float(data.time))
+                if not k % _LOOKED and time.monotonic() > deadline:
+                    raise timed_out(sweep.timeout)
         finally:
             row["max_qvel"] = float(np.nan_to_num(fastest).max(initial=0.0))
             row["qpos"], row["qvel"] = data.qpos.tolist(), data.qvel.tolist()
