@@ -12,8 +12,9 @@ import pytest
 import statemachine as sm
 from statemachine.interface import JointType
 from statemachine.models import model_names, models_dir
+from statemachine.rotations import matrix_from_quat
 
-from .conftest import opened
+from .conftest import need_engine, opened
 
 ARM = models_dir() / "so101" / "so101.xml"
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
@@ -58,26 +59,19 @@ def _touching(model: sm.Model, data: sm.Data) -> tuple[int, set[str]]:
     return len(names), set(names[(names == "box").any(axis=1)].ravel().tolist()) - {"box"}
 
 
-def test_keyframe_0_holds_the_box() -> None:
-    """While the arm moves: by both jaws, with less than a millimetre of slip."""
-    model = sm.load("so101/scene_box")
-    box, gripper = model.jnt_qposadr[model.joint_id("box")], model.body_id("gripper")
-    with opened(model, 0) as (_, data):
-        assert data.time == 6.0
+@pytest.mark.parametrize(("backend", "most"), [("mujoco", 1.0e-3), ("pybullet", 1.5e-3)])
+def test_a_held_box_does_not_slip(backend: str, most: float) -> None:
+    """While the arm moves; that both jaws keep it is a check of conformance."""
+    need_engine(backend)
+    places = []
+    with opened(sm.load("so101/scene_box", backend=backend), 0) as (model, data):
+        box, gripper = (model.body_id(name) for name in ("box", "gripper"))
         data.ctrl[:2] += 0.4, -0.2
-        places, counts = [], []
         for _ in range(600):
             sm.step(model, data)
-            count, bodies = _touching(model, data)
-            counts.append(count)
-            assert bodies == {"gripper", "moving_jaw_so101_v1"}
-            sm.forward(model, data)
-            turn = data.raw.xmat[gripper].reshape(3, 3)
-            places.append(turn.T @ (data.qpos[box : box + 3] - data.xpos[gripper]))
-            assert data.qpos[box + 2] > 0.06
-        assert abs(data.qpos[0]) > 0.35
-    assert 8 <= min(counts) <= max(counts) <= 12
-    assert np.linalg.norm(np.ptp(places, axis=0)) < 1.0e-3
+            turn = matrix_from_quat(data.xquat[gripper])
+            places.append(turn.T @ (data.xpos[box] - data.xpos[gripper]))
+    assert np.linalg.norm(np.ptp(places, axis=0)) < most
 
 
 @pytest.mark.parametrize(

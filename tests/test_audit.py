@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import gc
-import json
 import math
 import tempfile
 import threading
@@ -21,7 +20,6 @@ import statemachine as sm
 from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
-from statemachine.engines.auditing import Driver, ReferenceRun
 from statemachine.engines.futures import FutureGap, gap
 from statemachine.engines.mujoco.audit import MujocoDriver
 from statemachine.errors import BadInputError, EngineWarning
@@ -297,6 +295,8 @@ QUESTIONS = {
     "look": trials.look,
     "two at once": trials.beside,
     "restore": trials.restored,
+    "threads": lambda driver, run: trials.threads(driver, (run,)),
+    "pools": trials.pools,
 }
 
 
@@ -396,6 +396,18 @@ def one_disturbs_the_other(right: Any, model: Any, raw: Any) -> Callable[..., No
     return stepped
 
 
+@around(MujocoDriver, "advance")
+def another_thread_feels_it(right: Any, self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
+    if threading.current_thread() is not threading.main_thread():
+        nudge(machine)
+    right(self, machine, nstep)
+
+
+@around(MujocoDriver, "_batch")
+def pool_of_the_engine_is_cold(right: Any, *of: Any) -> list[Any]:
+    return [future + 1e-15 for future in right(*of)]
+
+
 @around(lambda: require("pybullet"), "getContactPoints")
 def read_of_pybullet_perturbs(right: Any, *, physicsClientId: int, **named: Any) -> Any:  # noqa: N803
     require("pybullet").setGravity(0, 0, -9.80000001, physicsClientId)
@@ -453,6 +465,16 @@ FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
         one_disturbs_the_other,
         ("interface", "turn by turn with another"),
     ),
+    "a thread computes otherwise": (
+        "threads",
+        another_thread_feels_it,
+        ("engine", "a pool of 4 threads"),
+    ),
+    "a pool of the engine computes otherwise": (
+        "pools",
+        pool_of_the_engine_is_cold,
+        ("engine", "mujoco.batch, 2 threads"),
+    ),
 }
 
 
@@ -499,45 +521,6 @@ def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.Monk
     assert {each.into for each in found if not each.holds} == {"each other"}
     engine = conclude([each for each in found if each.layer == "engine"])
     assert "taken apart + targets" not in engine.agree
-
-
-def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
-    @around(MujocoDriver, "advance")
-    def faulty(right: Any, self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
-        if threading.current_thread() is not threading.main_thread():
-            nudge(machine)
-        right(self, machine, nstep)
-
-    def found() -> list[AuditFinding]:
-        driver, runs = _engine()
-        return list(trials.threads(driver, runs))
-
-    assert broken(found()) == set()
-    faulty(monkeypatch)
-    assert broken(found()) == {("engine", "a pool of 4 threads")}
-
-
-def _engine() -> tuple[Driver, tuple[ReferenceRun, ...]]:
-    model = sm.load(SCENE)
-    driver = drivers_of(model, 0)[0]
-    return driver, tuple(
-        driver.run(point, 30) for point in points(model, 0)[0] if point.name == "keyframe"
-    )
-
-
-def test_a_pool_of_the_engine_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
-    driver, runs = _engine()
-    assert broken(trials.pools(driver, runs[0])) == set()
-    right = driver.pools
-
-    def faulty() -> dict[str, Any]:
-        def cold(point: Any, steps: int) -> Any:
-            return [future + 1e-15 for future in right()["mujoco.batch, 2 threads"](point, steps)]
-
-        return {"cold": cold}
-
-    monkeypatch.setattr(driver, "pools", faulty)
-    assert broken(trials.pools(driver, runs[0])) == {("engine", "cold")}
 
 
 @pytest.mark.slow
@@ -627,16 +610,6 @@ def test_the_command_fits_the_terminal(cli: Cli, backend: str) -> None:
     assert max(map(cell_len, lines)) <= 80
     assert "nan" not in done.stdout.lower().split()
     assert backend in lines[2]
-
-
-def test_the_command_speaks_json(cli: Cli) -> None:
-    done = cli("audit", "--steps", "10", "--json", "--seed", "3", code=0)
-    found = json.loads(done.stdout, parse_constant=pytest.fail)["mujoco"]
-    assert found["holds"] is True
-    assert found["provenance"]["seed"] == 3
-    row = found["audited"][0]["findings"][0]
-    assert row.keys() >= {"experiment", "layer", "point", "case", "into", "verdict", "gap"}
-    assert row["gap"].keys() >= {"steps", "first", "angle", "length"}
 
 
 @pytest.mark.slow

@@ -357,6 +357,11 @@ def restore_loses_the_warm_start(right: Any, model: Any, data: Any, *state: Any)
     data.qacc_warmstart[:] = 0
 
 
+def no_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    flag = '<option><flag warmstart="disable"/></option><worldbody>'
+    monkeypatch.setattr(pile, "MJCF", pile.MJCF.replace("<worldbody>", flag))
+
+
 @around(pybullet, "restoreState")
 def file_restores_nothing(right: Any, *state: int, fileName: str = "", **more: Any) -> Any:  # noqa: N803
     return None if fileName else right(*state, **more)
@@ -416,6 +421,11 @@ OTHERWISE: dict[str, tuple[tuple[Patch, ...], str, str, dict[str, str]]] = {
     "a future without the warm start": (
         (restore_loses_the_warm_start,), "future", "mujoco", {"mjSTATE_INTEGRATION": "differs"}
     ),
+    # Then positions and velocities are all that there is.
+    "no warm start at all": (
+        (no_warm_start,), "future", "mujoco",
+        dict.fromkeys(("qpos and qvel copied", "mjSTATE_FULLPHYSICS"), "exact"),
+    ),
     "a file that restores nothing": (
         (file_restores_nothing,), "save", "pybullet",
         {"saveBullet, restoreState": (
@@ -433,13 +443,6 @@ def test_an_engine_that_behaved_otherwise(name: str, monkeypatch: pytest.MonkeyP
     for patch in patches:
         patch(monkeypatch)
     assert answers(question, engine) == FACTS[question][engine] | changed
-
-
-def test_an_engine_without_a_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then positions and velocities are all that there is."""
-    flag = '<option><flag warmstart="disable"/></option><worldbody>'
-    monkeypatch.setattr(pile, "MJCF", pile.MJCF.replace("<worldbody>", flag))
-    assert set(answers("future", "mujoco").values()) == {"exact"}
 
 
 # What is left behind.
@@ -522,16 +525,6 @@ def test_the_page_reads_well_piped(cli: Cli, arguments: tuple[str, ...]) -> None
     assert all(line == line.rstrip() for line in lines)
     assert all(word not in done.stdout for word in ("\x1b", "✗", UNDECIDED))
     assert all(name in done.stdout for name in ENGINES)
-
-
-def test_the_answers_as_json(cli: Cli, engine: str) -> None:
-    done = cli("conventions", "quaternion", "gravity", "--backend", engine, "--json", code=0)
-    found = json.loads(done.stdout)
-    assert list(found["versions"]) == [engine]
-    assert [each["name"] for each in found["questions"]] == ["quaternion", "gravity"]
-    for each in found["questions"]:
-        (finding,) = each["findings"][engine]
-        assert finding["answer"] == FACTS[each["name"]][engine][""]
 
 
 @pytest.mark.parametrize(

@@ -342,13 +342,6 @@ def test_the_robot_of_a_urdf_is_that_of_the_mjcf():
     assert found.unexplained == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_finer_list_has_every_difference(tmp_path):
-    right = ARM.replace('damping="0.1"', 'damping="0.11"').replace('kp="20"', 'kp="21"')
-    found = explained(tmp_path, ARM, right, scenario=HOME, finer=True)
-    assert {"damping of shoulder", "damping of elbow", "gains of shoulder"} <= set(shares(found))
-    assert sum(shares(found).values()) == pytest.approx(1.0, abs=0.02)
-
-
 def test_every_array_of_a_compiled_model_is_compared_or_has_no_effect():
     """A later engine may have more of them: then this fails, and the tables are to grow."""
     mujoco = pytest.importorskip("mujoco")

@@ -56,19 +56,6 @@ def load(pb: Any, client: int, tmp_path: Path) -> Load:
     return run
 
 
-def test_bodies_are_damped_until_told_otherwise(pb: Any, client: int, load: Load) -> None:
-    body = load(BOX_URDF, fixed=False)
-    speeds = []
-    for _ in range(2):
-        pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
-        pb.stepSimulation(client)
-        speeds.append(pb.getBaseVelocity(body, client)[0][0])
-        pb.changeDynamics(body, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
-    # 0.04, and taken off twice in a step.
-    assert speeds[0] == pytest.approx(1 - 2 * 0.04 / 240, abs=1e-9)
-    assert speeds[1] == 1.0
-
-
 @pytest.mark.parametrize("more", [{}, {"maxJointVelocity": 1e9}])
 def test_a_call_that_sets_the_largest_speed_ignores_damping(
     pb: Any, client: int, load: Load, more: dict[str, float]
@@ -81,31 +68,6 @@ def test_a_call_that_sets_the_largest_speed_ignores_damping(
     pb.resetJointState(body, 0, 0, 1.0, client)
     pb.stepSimulation(client)
     assert (pb.getJointState(body, 0, client)[1] == 1.0) is not bool(more)
-
-
-def test_joint_speed_is_clamped_unless_told_otherwise(pb: Any, client: int, load: Load) -> None:
-    body = load(ARM_URDF.format(dynamics=""))
-    pb.setJointMotorControl2(body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
-    pb.changeDynamics(body, 0, linearDamping=0, angularDamping=0, physicsClientId=client)
-    found = []
-    for _ in range(2):
-        pb.resetJointState(body, 0, 0, 500.0, client)
-        pb.stepSimulation(client)
-        found.append(pb.getJointState(body, 0, client)[1])
-        pb.changeDynamics(body, 0, maxJointVelocity=1e9, physicsClientId=client)
-    assert found[0] == pytest.approx(100)
-    assert found[1] == pytest.approx(500)
-
-
-def test_a_base_is_its_inertial_frame(pb: Any, client: int, load: Load) -> None:
-    """Position of the centre of mass, xyzw, velocities in world axes at the centre of mass."""
-    body = load(BOX_URDF, fixed=False)
-    pos, quat = pb.getBasePositionAndOrientation(body, client)
-    assert np.allclose(pos, (0.1, 0, 0), atol=1e-12)
-    assert np.allclose(quat, (0, 0, np.sin(0.15), np.cos(0.15)), atol=1e-12)
-    local = pb.getDynamicsInfo(body, -1, client)[3:5]
-    assert np.allclose(local[0], (0.1, 0, 0), atol=1e-12)
-    assert np.allclose(local[1], quat, atol=1e-12)
 
 
 def test_link_frames_are_single_and_centres_of_mass_double(pb: Any, client: int) -> None:
@@ -131,28 +93,6 @@ def test_link_frames_are_single_and_centres_of_mass_double(pb: Any, client: int)
     world.close()
     assert centre < 1e-14
     assert 1e-10 < frame < 1e-6
-
-
-def test_dynamics_are_mujocos_given_the_same_inertias(pb: Any) -> None:
-    """Mass matrix and bias of the ghost, in a world that nobody steps."""
-    from statemachine.backends._bullet_plan import Plan
-    from statemachine.backends._bullet_world import World
-
-    raw = mujoco.MjModel.from_xml_path(str(resolve("so101")))
-    data, world = mujoco.MjData(raw), World(Plan(raw), "ghost")
-    body, random = world.trees[0].body, np.random.default_rng(1)
-    for _ in range(20):
-        data.qpos[:], data.qvel[:] = random.uniform(*raw.jnt_range.T), random.uniform(-2, 2, 6)
-        mujoco.mj_forward(raw, data)
-        full = np.zeros((6, 6))
-        mujoco.mj_fullM(raw, data, full)
-        mass = pb.calculateMassMatrix(body, data.qpos.tolist(), physicsClientId=world.client)
-        bias = pb.calculateInverseDynamics(
-            body, data.qpos.tolist(), data.qvel.tolist(), [0.0] * 6, physicsClientId=world.client
-        )
-        assert np.abs(mass + np.diag(raw.dof_armature) - full).max() < 1e-14
-        assert np.abs(bias - data.qfrc_bias).max() < 1e-14
-    world.close()
 
 
 def test_inverse_dynamics_turns_gravity_with_a_base_that_has_mass(
@@ -188,19 +128,6 @@ def test_a_box_on_a_plane_is_found_one_corner_at_a_time(pb: Any, client: int, lo
         pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), tilted.tolist(), client)
         pb.performCollisionDetection(client)
     assert len(pb.getContactPoints(physicsClientId=client)) == 4
-
-
-def test_files_are_cached_until_told_otherwise(pb: Any, client: int, load: Load) -> None:
-    masses = []
-    for caching in (1, 0):
-        pb.setPhysicsEngineParameter(enableFileCaching=caching, physicsClientId=client)
-        for mass in ("2", "5"):
-            text = BOX_URDF.replace('mass value="2"', f'mass value="{mass}"')
-            body = load(text, fixed=False, name=f"cached{caching}.urdf")
-            masses.append(pb.getDynamicsInfo(body, -1, client)[0])
-    assert masses[2:] == [2, 5]
-    # What the cache serves is the engine's business; ours is that it is off.
-    assert masses[:2] in ([2, 2], [2, 5])
 
 
 def test_a_body_turns_rightly_up_to_45_degrees_a_step(pb: Any, client: int, load: Load) -> None:

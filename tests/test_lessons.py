@@ -359,16 +359,6 @@ def test_what_cannot_be_told_apart_is_said_so() -> None:
     assert any("123 steps" in b.text for b in page.blocks if isinstance(b, Text))
 
 
-@pytest.mark.slow
-def test_six_questions_are_answered_by_runs(backend: str) -> None:
-    page, _ = _take("questions", backend)
-    asked = [block for block in page.blocks if isinstance(block, Question)]
-    assert len(asked) == 6
-    assert all(question.right is not None for question in asked)
-    assert len([block for block in page.blocks if isinstance(block, Verdict)]) == 6
-    assert page.holds
-
-
 @pytest.mark.parametrize(
     ("part", "change"),
     [
@@ -385,7 +375,8 @@ def test_an_answer_that_its_run_belies_is_none(part: str, change: Change) -> Non
     answers = {**result.answers, part: change(result.answers[part])}
     page = _repage("questions", "mujoco", dataclasses.replace(result, answers=answers))
     assert not page.holds
-    assert len([b for b in page.blocks if isinstance(b, Question) and b.right is None]) == 1
+    asked = [block for block in page.blocks if isinstance(block, Question)]
+    assert sorted(question.right is None for question in asked) == [False] * 5 + [True]
 
 
 @pytest.mark.slow

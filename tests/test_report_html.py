@@ -1002,17 +1002,6 @@ def test_bones_reach_from_body_to_body(hold: Made) -> None:
 # The command.
 
 
-@pytest.mark.usefixtures("bullet")
-@pytest.mark.slow
-def test_the_command_writes_it(cli: Cli, tmp_path: Path) -> None:
-    done = cli("compare", "hold", "--no-why", "--html", "out.html", code=1)
-    assert "wrote out.html" in done.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["out.html"]
-    text = (tmp_path / "out.html").read_text(encoding="utf-8")
-    assert "statemachine compare hold --no-why --html out.html" in text
-    assert str(tmp_path) not in text
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -1039,19 +1028,6 @@ def test_a_folder_that_cannot_be_written_into(tmp_path: Path, monkeypatch: Any) 
         (BadInputError, "cannot be written", lambda: check_target(tmp_path / "x.html")),
         (BadInputError, "is a folder", lambda: check_target(tmp_path / "folder.html")),
     )
-
-
-@pytest.mark.usefixtures("bullet")
-@pytest.mark.slow
-def test_the_cause_is_on_the_page(cli: Cli, tmp_path: Path) -> None:
-    assert cli("compare", "hold", "--html", "out.html").returncode == 1
-    with looking(tmp_path / "out.html") as tab:
-        # The part that goes, as a bar: nearly all of it.
-        row = tab.locator("#why table").first.locator("tr", has_text="Contact")
-        bar, fill = (row.locator(s).first.bounding_box()["width"] for s in (".bar", ".bar i"))
-        assert fill > 0.97 * bar
-        assert tab.locator("#models details").count() == 1
-        assert (tmp_path / "out.html").stat().st_size <= LIMIT
 
 
 def test_any_page_can_be_drawn() -> None:
