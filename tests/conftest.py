@@ -415,19 +415,29 @@ def cli(tmp_path: Path) -> Cli:
 
 
 @pytest.fixture
-def without_pybullet(tmp_path: Path) -> dict[str, str]:
-    """An environment in which PyBullet is not there, whatever this machine has."""
-    hidden = tmp_path / "hidden"
-    hidden.mkdir()
-    (hidden / "sitecustomize.py").write_text(
-        "import sys\n"
-        "class Hide:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'pybullet':\n"
-        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
-        "sys.meta_path.insert(0, Hide())\n"
-    )
-    return {"PYTHONPATH": os.pathsep.join((str(hidden), str(ROOT)))}
+def without(tmp_path: Path) -> Callable[..., dict[str, str]]:
+    """Makes an environment in which modules are not there, or others, whatever this machine has."""
+
+    def without(*names: str, **texts: str) -> dict[str, str]:
+        hide = (
+            "import sys\n"
+            "class Hide:\n"
+            "    def find_spec(self, name, path=None, target=None):\n"
+            f"        if name in {names!r}:\n"
+            "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
+            "sys.meta_path.insert(0, Hide())\n"
+        )
+        modules = {f"{name}.py": text for name, text in texts.items()}
+        folder = written_all(tmp_path / "hidden", {"sitecustomize.py": hide, **modules})
+        return {"PYTHONPATH": os.pathsep.join((str(folder), str(ROOT)))}
+
+    return without
+
+
+@pytest.fixture
+def without_pybullet(without: Callable[..., dict[str, str]]) -> dict[str, str]:
+    """An environment in which PyBullet is not there."""
+    return without("pybullet")
 
 
 # An old one, one that is too old for the arm, and the one that is installed.

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import os
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -441,26 +440,6 @@ def test_what_gradescope_reads(judged: list[str]) -> None:
     assert {each["output"] for each in refused["tests"]} == {"there is no file"}
 
 
-@pytest.mark.slow
-def test_a_folder_from_the_command_line(cli: Cli, folder: Path, tmp_path: Path) -> None:
-    for name in ("cy", "dee"):
-        shutil.rmtree(folder / name)
-    (folder / "hal.py").write_text("def demo_gravity(model, seconds=4):\n    while True: pass\n")
-    table = tmp_path / "grades.csv"
-    command = ("check", str(folder), "--csv", str(table), "--time-limit", "2")
-    cli(*command, code=0)
-    rows = {
-        row["file"]: row
-        for row in csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines())
-    }
-    assert [rows[name]["right"] for name in rows] == ["4", "0", "0", "4", "0"]
-    assert rows["bob"]["demo_gravity"] == "not written"
-    assert rows["fay.py"]["same_as"] == "ann"
-    again = cli(*command, "--json")
-    passed = [sum(f["passed"] for f in e["functions"]) for e in json.loads(again.stdout)]
-    assert passed == [4, 0, 0, 4, 0]
-
-
 @pytest.mark.parametrize("option", ["--csv", "--gradescope"])
 @pytest.mark.parametrize(
     ("target", "says"),
@@ -480,17 +459,6 @@ def test_where_to_write_is_asked_before_anything_is_judged(
     files = [str(SOLUTION)] if option == "--gradescope" else [str(SOLUTION), str(TEMPLATE)]
     one_line(here("check", *files, option, target), says)
     assert judged == []
-
-
-@pytest.mark.slow
-def test_one_file_for_gradescope(cli: Cli, tmp_path: Path) -> None:
-    results = tmp_path / "results.json"
-    cli("check", str(SOLUTION), "--gradescope", str(results), code=0)
-    assert sum(each["score"] for each in json.loads(results.read_text())["tests"]) == 4
-    cli("check", str(tmp_path / "none.py"), "--gradescope", str(results), code=2)
-    assert "there is no file none.py" in results.read_text()
-    cli("check", str(tmp_path), "--gradescope", str(results), code=2)
-    assert "no Python file in it has one of the functions" in results.read_text()
 
 
 @pytest.mark.parametrize(

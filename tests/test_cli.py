@@ -22,7 +22,7 @@ from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
 from .conftest import ROOT, Cli, assert_in, assert_not_in, need_engine, one_line, written
-from .small_models import NAMED_PENDULUM, mjcf
+from .small_models import mjcf
 
 QUICK = {
     "worlds": ("--most", "4"),
@@ -86,15 +86,6 @@ def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
     assert "'pickup'" in inside.stdout
     for lesson in LESSONS:
         cli("lesson", lesson, "--menagerie", str(menagerie), *QUICK.get(lesson, ()), code=0)
-
-
-def test_fingertip_certificate(cli: Cli, pinocchio: None) -> None:
-    found = _json(cli, "fingertip", "--poses", "300", "--seed", "3")["mujoco"]
-    assert (found["poses"], found["provenance"]["seed"]) == (300, 3)
-    assert found["agrees"] is True
-    assert found["position_worst"] <= 1e-12
-    assert found["rotation_worst"] <= 1e-12
-    assert _json(cli, "fingertip", "--poses", "300", "--seed", "3")["mujoco"] == found
 
 
 def test_fingertip_of_other_models_and_frames(cli: Cli, pinocchio: None) -> None:
@@ -197,14 +188,6 @@ def test_every_mistake_is_one_clear_line(cli: Cli, arguments: tuple[str, ...], w
     one_line(cli(*arguments), word)
 
 
-@pytest.mark.parametrize(
-    "content", ["", "<mujoco", "<mujoco><worldbody><geom/></worldbody></mujoco>"]
-)
-def test_malformed_models_are_one_clear_line(cli: Cli, tmp_path: Path, content: str) -> None:
-    file = written(tmp_path / "bad.xml", content)
-    one_line(cli("lesson", "state", "--model", str(file)), "bad.xml")
-
-
 def in_a_shell(command: str) -> subprocess.CompletedProcess[str]:
     """What becomes of a command of ours with something behind it."""
     typed = ["sh", "-c", f"{sys.executable} -m statemachine {command}"]
@@ -263,13 +246,6 @@ def _model(folder: Path, body: str, rest: str = "") -> str:
     return str(written(folder / "robot.xml", mjcf(body, rest)))
 
 
-def test_gravity_says_nothing_of_a_joint_that_still_moves(cli: Cli, tmp_path: Path) -> None:
-    servo = "<actuator><position joint='j' kp='0.1'/></actuator>"
-    file = _model(tmp_path, NAMED_PENDULUM.format(""), servo)
-    page = cli("lesson", "gravity", "--model", file, "--joint", "j", "--seconds", "0.2", code=0)
-    assert "still moves" in page.stdout
-
-
 @pytest.mark.slow
 def test_gravity_at_the_moment_of_the_first_touch(cli: Cli) -> None:
     for seconds in ("0.005", "0.3", "0.535", "0.54", "1"):
@@ -293,11 +269,6 @@ def test_a_body_of_the_scene_is_not_taken_for_the_robot(cli: Cli) -> None:
     assert min(found["touches"].values()) > 0.5
     held = _json(cli, "lesson", "hold", "--model", "so101/scene_box")["mujoco"]
     assert held["first_contact"] > 0.2
-
-
-def test_hold_of_another_robot_reads_no_torque_as_an_angle(cli: Cli, tmp_path: Path) -> None:
-    file = _model(tmp_path, NAMED_PENDULUM.format(""), "<actuator><motor joint='j'/></actuator>")
-    one_line(cli("lesson", "hold", "--model", file), "statemachine compare hold --model")
 
 
 def test_ctrl_c_ends_a_long_run() -> None:

@@ -28,7 +28,7 @@ from statemachine.report import compare as report
 from statemachine.runs import Trace, record, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import ROOT, Cli, assert_in, one_line, refused
+from .conftest import Cli, assert_in, one_line, refused
 from .small_models import NAMELESS_JOINTS, STILL, model_of
 from .test_strange_traces import changed
 from .test_strange_traces import named as by_name
@@ -499,11 +499,6 @@ def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
 def test_a_file_that_is_no_trace_is_taken_for_no_experiment(here: Cli, tmp_path: Path) -> None:
     (tmp_path / "waves.csv").write_text("time\n")
     one_line(here("compare", tmp_path / "waves.csv"), "a trace ends in .npz or .parquet")
-
-
-def test_a_model_without_actuators_holds_nothing(here: Cli) -> None:
-    urdf = ROOT / "models/so101/so101.urdf"
-    one_line(here("lesson", "hold", "--model", urdf), "no position servo drives so101.urdf")
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no /proc")

@@ -11,6 +11,7 @@ import pytest
 
 import statemachine
 from statemachine import conformance
+from statemachine.backends import backend_names
 from statemachine.errors import UnknownNameError, UnsupportedError
 from statemachine.interface import Behaviour
 
@@ -20,11 +21,15 @@ from .hidden_world import load as load_hidden
 
 
 @pytest.fixture
-def lab(backend: str) -> Iterator[conformance.Lab]:
-    with conformance.Lab(backend) as lab:
+def lab(request: pytest.FixtureRequest) -> Iterator[conformance.Lab]:
+    """Each backend, and an engine that hides its world."""
+    if request.param != "hidden":
+        need_engine(request.param)
+    with registered("hidden", "tests.hidden_world:load"), conformance.Lab(request.param) as lab:
         yield lab
 
 
+@pytest.mark.parametrize("lab", [*backend_names(), "hidden"], indirect=True)
 @pytest.mark.parametrize("check", conformance.CHECKS)
 def test_backend_keeps(lab: conformance.Lab, check: str) -> None:
     if "witness" in check:
@@ -39,22 +44,6 @@ def test_run_reports_every_check(backend: str) -> None:
     allowed = {"passed"} if backend == "mujoco" else {"passed", "skipped"}
     assert {outcome.result for outcome in outcomes} <= allowed, outcomes
     assert len(outcomes) > 40
-
-
-@pytest.fixture
-def hidden() -> Iterator[conformance.Lab]:
-    loader = "tests.hidden_world:load"
-    with registered("hidden", loader) as name, conformance.Lab(name) as lab:
-        yield lab
-
-
-@pytest.mark.parametrize("check", conformance.CHECKS)
-def test_an_engine_that_hides_its_world_can_keep_it_too(
-    hidden: conformance.Lab, check: str
-) -> None:
-    if "witness" in check:
-        need_engine("pinocchio")
-    conformance.CHECKS[check](hidden)
 
 
 def test_a_backend_that_refuses_everything_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:

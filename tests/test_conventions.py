@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import gc
 import json
-import subprocess
 import tempfile
 from functools import partial
 from pathlib import Path
@@ -539,25 +538,9 @@ def test_bad_input_is_one_line(cli: Cli, arguments: tuple[str, ...], words: str)
     one_line(cli("conventions", *arguments), words)
 
 
-def _in_a_process(prepare: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    code = f"import sys\n{prepare}\nfrom statemachine.cli import main\nsys.exit(main({arguments}))"
-    return in_its_own_python(code, ROOT)
-
-
-def _without(*names: str) -> str:
-    return (
-        "import importlib.abc\n"
-        "class Gone(importlib.abc.MetaPathFinder):\n"
-        "    def find_spec(self, name, path, target=None):\n"
-        f"        if name in {names!r}: raise ModuleNotFoundError(name=name)\n"
-        "sys.meta_path.insert(0, Gone())"
-    )
-
-
 @pytest.mark.parametrize("more", [(), ("--calls",)])
-def test_a_missing_engine_is_left_out(more: tuple[str, ...]) -> None:
-    done = _in_a_process(_without("pybullet", "pinocchio"), "conventions", *more)
-    assert done.returncode == 0, done.stderr
+def test_a_missing_engine_is_left_out(cli: Cli, without: Any, more: tuple[str, ...]) -> None:
+    done = cli("conventions", *more, code=0, **without("pybullet", "pinocchio"))
     assert [line.split()[1] for line in done.stderr.splitlines()] == ["pybullet", "pinocchio"]
     assert "mujoco 4" in done.stdout
     assert not any(line.startswith(("pybullet", "pinocchio")) for line in done.stdout.splitlines())
@@ -572,17 +555,20 @@ def test_a_missing_engine_is_left_out(more: tuple[str, ...]) -> None:
     ],
 )
 def test_the_only_engine_is_missing(
-    gone: tuple[str, ...], arguments: tuple[str, ...], lines: int
+    cli: Cli, without: Any, gone: tuple[str, ...], arguments: tuple[str, ...], lines: int
 ) -> None:
-    done = _in_a_process(_without(*gone), "conventions", *arguments)
+    done = cli("conventions", *arguments, **without(*gone))
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (3, "", lines), done.stderr
 
 
 def test_a_call_that_fails_is_the_exit_code() -> None:
-    spoilt = "import mujoco\nmujoco.mj_forward = lambda m, d: None"
-    done = _in_a_process(spoilt, "conventions", "--calls", "--backend", "mujoco")
-    assert done.returncode == 1
-    assert done.stderr == ""
+    spoilt = (
+        "import mujoco, sys\nfrom statemachine.cli import main\n"
+        "mujoco.mj_forward = lambda m, d: None\n"
+        "sys.exit(main(('conventions', '--calls', '--backend', 'mujoco')))"
+    )
+    done = in_its_own_python(spoilt, ROOT)
+    assert (done.returncode, done.stderr) == (1, "")
     assert "✗ mujoco, recompute: it ran, and what it should do did not happen" in done.stdout
 
 

@@ -6,31 +6,18 @@ import json
 import re
 from dataclasses import dataclass
 from html import unescape
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from statemachine.compare import Request, Side
 from statemachine.compare import why as instrument
 from statemachine.compare.why import Explanation, explain
 from statemachine.measures.text import capital, percent
 from statemachine.report import why
 
 from . import test_explain as known
-from .conftest import Cli, need_engine
-from .explained import ALONE, ARM, Case, changed, write
-
-SWING = """
-def swing(model, data):
-    ctrl = data.ctrl.copy()
-    early = data.time < 0.25
-    ctrl[model.actuator_id("shoulder")] = 0.8 if early else -0.3
-    ctrl[model.actuator_id("elbow")] = -0.5 if early else 0.6
-    return ctrl
-"""
-# A second cause, so that the shares are not all zero and one.
-OTHER = Case('mass="0.5" pos', 'mass="0.505" pos', "mass of upper")
+from .conftest import need_engine
+from .explained import ALONE, ARM, changed, write
 
 
 def _plain(html: str) -> str:
@@ -46,24 +33,6 @@ def _rows(html: str, title: str) -> list[list[str]]:
     rows = re.findall(r"<tr.*?</tr>", table, re.DOTALL)
     cells = [re.findall(r"<t[dh].*?</t[dh]>", row, re.DOTALL) for row in rows]
     return [[_plain(cell) for cell in row] for row in cells]
-
-
-@pytest.mark.parametrize("name", ["mass", "armature"])
-def test_the_command_finds_what_python_finds(name: str, tmp_path: Path, here: Cli) -> None:
-    left, right = Side(str(write(tmp_path, "left.xml", ARM))), changed(ARM, ALONE[name], OTHER)
-    sides = left, Side(str(write(tmp_path, "right.xml", right)))
-    function = f"{write(tmp_path, 'swing.py', SWING)}:swing"
-    scenario = Request((function,), sides=sides, keyframe="home").scenario()
-    found = explain(sides[0].load(), sides[1].load(), scenario, seconds=0.5)
-    assert found.shares[0].name == ALONE[name].cause
-    words = (function, sides[0].file, sides[1].file, "--keyframe", "home", "--seconds", "0.5")
-    done = here("compare", *words, "--why", "--json")
-    told = json.loads(done.stdout)
-    assert done.returncode == (0 if found.is_explained else 1)
-    assert (told["gap"], told["explained"]) == (found.gap, found.explained)
-    assert [(each["name"], each["share"]) for each in told["shares"]] == [
-        (each.name, each.share) for each in found.shares
-    ]
 
 
 MOVES = """

@@ -159,12 +159,6 @@ def test_the_exercise_begins_with_survivors_and_an_idle_test() -> None:
     assert (found.caught, found.holds) == (2, False)
 
 
-@pytest.mark.slow
-def test_a_test_that_asserts_nothing_catches_nothing(write: Write) -> None:
-    found = examine(write("def test_nothing(): assert True"), only=("no-forward", "gravity-up"))
-    assert (found.failures, found.caught, found.idle) == ((), 0, ("test_nothing",))
-
-
 HANGS_OR_FALLS = """
 import os, time
 import pytest
@@ -257,23 +251,24 @@ def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: 
         examine(write(text), clock=2 if "sleep" in text else 300)
 
 
-@pytest.mark.slow
-def test_a_test_that_looks_for_the_fault_finds_none(write: Write) -> None:
-    text = """import os, sys
+# By the faults that are put in: tests that pass, and nothing in their process tells of a fault.
+CATCH_NOTHING = {
+    "test_nothing": "def test_nothing(): assert True",
+    "words": """import os, sys
 def test_a(request):
     words = [*sys.argv, *os.environ, *request.config.invocation_params.args]
     assert not any(word in ("--fault", "STATEMACHINE_FAULT", "xyzw", "degrees") for word in words)
-"""
-    found = examine(write(text), only=["xyzw", "degrees"])
-    assert (found.failures, found.caught) == ((), 0)
+""",
+    "modules": "import sys\nSEEN = set(sys.modules)\n"
+    "def test_a(): assert 'statemachine.grading.mutants.faults' in SEEN\n",
+}
 
 
 @pytest.mark.slow
-def test_what_is_imported_does_not_tell_of_a_fault(write: Write) -> None:
-    text = "import sys\nSEEN = set(sys.modules)\n"
-    text += "def test_a(): assert 'statemachine.grading.mutants.faults' in SEEN\n"
-    found = examine(write(text), only=["xyzw"])
-    assert (found.failures, found.caught) == ((), 0)
+@pytest.mark.parametrize("what", CATCH_NOTHING)
+def test_what_does_not_look_at_the_arm_catches_nothing(what: str, write: Write) -> None:
+    found = examine(write(CATCH_NOTHING[what]), only=["xyzw", "degrees"])
+    assert (found.failures, found.caught, len(found.idle)) == ((), 0, 1)
 
 
 @pytest.mark.slow

@@ -6,13 +6,14 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import statemachine as sm
 from statemachine.installed import ENGINES, require
 
-from .conftest import REQUIRED, ROOT, in_its_own_python, one_line
+from .conftest import REQUIRED, ROOT, Cli, in_its_own_python, one_line
 
 HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "viser", "xml.etree")
 
@@ -122,22 +123,11 @@ def test_a_clash_of_import_names_is_said_in_one_line(
     ],
 )
 def test_a_missing_or_broken_engine_is_one_line(
-    tmp_path: Path, engine: str, content: str | None, words: str
+    cli: Cli, without: Any, engine: str, content: str | None, words: str
 ) -> None:
-    if content is None:
-        block = (
-            "import importlib.abc\n"
-            "class Gone(importlib.abc.MetaPathFinder):\n"
-            "    def find_spec(self, name, path, target=None):\n"
-            f"        if name == {engine!r}: raise ModuleNotFoundError(name=name)\n"
-            "sys.meta_path.insert(0, Gone())"
-        )
-    else:
-        (tmp_path / f"{engine}.py").write_text(content)
-        block = f"sys.path.insert(0, {str(tmp_path)!r})"
+    environment = without(engine) if content is None else without(**{engine: content})
     command = ["fingertip"] if engine == "pinocchio" else ["lesson", "state"]
-    code = f"import sys\n{block}\nfrom statemachine.cli import main\nsys.exit(main({command}))"
-    one_line(in_its_own_python(code, ROOT), words, 3)
+    one_line(cli(*command, **environment), words, 3)
 
 
 def test_an_interrupt_is_no_engine_that_does_not_load(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -264,17 +265,6 @@ def test_engines_are_silent_and_warn_once(
     assert capfd.readouterr() == ("", "")
 
 
-def test_worlds_that_do_not_fit_are_refused(
-    model: sm.Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(interface_worlds, "free_memory", lambda: 300 << 20)
-    interface_worlds.check_memory(12, 30 << 20, made=4)
-    with pytest.raises(
-        EngineError, match=r"one takes 31 MB, and 0\.3 GB are free: make 13 at most"
-    ):
-        interface_worlds.check_memory(1004, 30 << 20, made=4)
-
-
 @linux
 @pytest.mark.usefixtures("bullet")
 def test_memory_is_measured_and_no_process_is_left_by_a_refusal(
@@ -365,18 +355,31 @@ def test_a_script_without_a_main_and_without_a_close(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+FORK = "\nif not os.fork():\n    time.sleep(60)\n    os._exit(0)\n"
+
+
 @linux
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
-def test_no_process_outlives_one_that_is_killed_in_a_step(number: signal.Signals) -> None:
-    run = script(_SCRIPT + _LONG)
+@pytest.mark.parametrize(
+    ("fork", "number"),
+    [("", signal.SIGKILL), ("", signal.SIGTERM), ("", signal.SIGHUP), (FORK, signal.SIGKILL)],
+)
+def test_no_process_outlives_one_that_is_killed_in_a_step(
+    fork: str, number: signal.Signals
+) -> None:
+    """A forked child, which has their pipes too, does not keep them alive."""
+    run = script(_SCRIPT + fork + _LONG, start_new_session=True)
     numbers = [int(pid) for pid in first_line(run).split()]
     assert first_line(run) == "steps\n"
     time.sleep(0.2)
     assert running(numbers) == numbers
     run.send_signal(number)
     assert run.wait(30) == -number
-    assert all_end(numbers, 4.0)
+    try:
+        assert all_end(numbers, 4.0)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(run.pid, signal.SIGKILL)
     assert rest(run) == (-number, "", "")
 
 
@@ -393,19 +396,3 @@ def test_ctrl_c_while_the_processes_start() -> None:
     assert "KeyboardInterrupt" in rest(run)[2]
     assert children
     assert all_end(children, 5.0)
-
-
-@linux
-@pytest.mark.slow
-def test_a_forked_child_does_not_keep_them_alive() -> None:
-    fork = "\nif not os.fork():\n    time.sleep(60)\n    os._exit(0)\n"
-    run = script(_SCRIPT + fork + _LONG, start_new_session=True)
-    numbers = [int(pid) for pid in first_line(run).split()]
-    assert first_line(run) == "steps\n"
-    run.kill()
-    run.wait(30)
-    try:
-        assert all_end(numbers, 4.0)
-    finally:
-        os.killpg(run.pid, signal.SIGKILL)
-        rest(run)
