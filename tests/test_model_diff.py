@@ -17,7 +17,7 @@ from rich.cells import cell_len
 from statemachine import load
 from statemachine.compare.models import Compared, Difference, compare, read, split
 from statemachine.compare.models.ledger import digits_of
-from statemachine.description.tree import GroupTree
+from statemachine.engines.description.tree import GroupTree
 from statemachine.errors import ModelError, UnknownNameError
 from statemachine.kinematics import Kinematics
 from statemachine.models import models_dir

@@ -1,6 +1,6 @@
 """Which joint, body, site and actuator of one Model is which of another.
 
-By name, then by structure: `description.match` says how, and `names` overrules it.
+By name, then by structure: `engines.description.match` says how, and `names` overrules it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..description.match import Matching, Pair, match, renamed
-from ..description.meshes import one_to_one
-from ..description.records import Robot
-from ..description.tree import GroupTree
 from ..engines import room
+from ..engines.description.match import Matching, Pair, match, renamed
+from ..engines.description.meshes import one_to_one
+from ..engines.description.records import Robot
+from ..engines.description.tree import GroupTree
 from ..engines.records import BodyPair
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT

@@ -24,12 +24,12 @@ from ..errors import BadInputError, MissingEngineError, UnsupportedError
 from ..installed import raise_if_interrupted
 
 if TYPE_CHECKING:
-    from ..description.records import Robot
     from ..drawing.camera import Camera
     from ..drawing.shots import Drawer
     from ..interface import Array, Data, Model
     from .auditing import Driver
     from .call_watch import CallWatch
+    from .description.records import Robot
     from .measured import Phrases
     from .records import (
         Counterparts,

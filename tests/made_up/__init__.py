@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from statemachine import Model
-from statemachine.description.records import Robot
 from statemachine.engines import RawEngine, room
 from statemachine.engines.auditing import Driver
+from statemachine.engines.description.records import Robot
 
 
 class MyEngine(RawEngine):

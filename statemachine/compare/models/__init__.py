@@ -2,8 +2,8 @@
 
 `read` makes a reading of a file, `compare` says where two of them differ, as one list:
 
-- `..description` has the records, the reader of URDF, rigid groups and which joint is which; an
-  engine's own is read by its room
+- `engines.description` has the records, the reader of URDF, rigid groups and which joint is which;
+  an engine's own is read by its room
 - `ledger`: the list. Every figure has a key, element and quantity
 - `compiled`: what the files differ in as compiled models, by key; `..why` explains a gap with that
 - `diff`: walks two readings and enters their figures; by subject in `places`, `parts`, `figures`
@@ -22,11 +22,11 @@ import numpy as np
 
 from ... import __version__
 from ...backends import backend_engine, backend_names, load
-from ...description import urdf
-from ...description.match import renamed
-from ...description.records import Robot
-from ...description.tree import GroupTree
 from ...engines import room, rooms_with
+from ...engines.description import urdf
+from ...engines.description.match import renamed
+from ...engines.description.records import Robot
+from ...engines.description.tree import GroupTree
 from ...errors import StateMachineError, UnsupportedError, unknown_name
 from ...installed import DEFAULT
 from ...models import SUFFIXES, resolve

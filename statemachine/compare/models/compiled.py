@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...description.records import Robot
-from ...description.tree import GroupTree
+from ...engines.description.records import Robot
+from ...engines.description.tree import GroupTree
 from ...engines.records import ModelDifference
 from ...interface import Model
 from ...measures.text import few

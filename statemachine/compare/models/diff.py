@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...description.match import Matching, frame_names, match
-from ...description.tree import Group, GroupTree
+from ...engines.description.match import Matching, frame_names, match
+from ...engines.description.tree import Group, GroupTree
 from ...measures.text import rounded
 from ...rotations import HERE
 from . import figures, parts, places

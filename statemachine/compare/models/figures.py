@@ -12,9 +12,9 @@ from itertools import zip_longest
 
 import numpy as np
 
-from ...description.match import Pair
-from ...description.records import Actuator, RobotJoint, Setting
-from ...description.tree import GroupTree
+from ...engines.description.match import Pair
+from ...engines.description.records import Actuator, RobotJoint, Setting
+from ...engines.description.tree import GroupTree
 from ...measures.text import few, milliseconds, rounded
 from .ledger import Ledger, Telling
 

@@ -9,10 +9,10 @@ from itertools import permutations
 
 import numpy as np
 
-from ...description.match import Pair
-from ...description.meshes import bounds_of, likest
-from ...description.records import CollisionShape, Inertial
-from ...description.tree import Group, GroupTree
+from ...engines.description.match import Pair
+from ...engines.description.meshes import bounds_of, likest
+from ...engines.description.records import CollisionShape, Inertial
+from ...engines.description.tree import Group, GroupTree
 from ...rotations import Placement, rotation
 from .ledger import Key, Ledger, Telling, plain
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...description.match import Matching, Pair
-from ...description.tree import GroupTree
+from ...engines.description.match import Matching, Pair
+from ...engines.description.tree import GroupTree
 from ...interface import Array
 from ...measures.text import few, rounded
 from ...rotations import HERE

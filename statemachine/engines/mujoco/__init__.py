@@ -15,8 +15,8 @@ from ...installed import require
 from .. import RawEngine, function_of
 
 if TYPE_CHECKING:
-    from ...description.records import Robot
     from ...interface import Array, Data, Model
+    from ..description.records import Robot
     from ..measured import Phrases
 
 _OPTIONS = ("disableflags", "enableflags", "timestep", "gravity", "integrator")

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...description.meshes import likest
-from ...description.records import CollisionShape
 from ...measures.text import few
 from ...rotations import HERE
+from ..description.meshes import likest
+from ..description.records import CollisionShape
 from ..records import BodyPair, Edit, ModelDifference
 from . import _shapes as shapes
 from ._sides import NEAR, Pairs, Sides, apart, copies, name_of, same, zeros

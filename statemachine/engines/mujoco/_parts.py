@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...description.records import Inertial, motion
 from ...installed import require
 from ...interface import Array
 from ...rotations import HERE
+from ..description.records import Inertial, motion
 from ..records import BodyPair, Edit, ModelDifference
 from ._sides import (
     HINGE,

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...description.meshes import volume_of
-from ...description.records import CollisionShape
 from ...installed import require
 from ...interface import Array
+from ..description.meshes import volume_of
+from ..description.records import CollisionShape
 from ..records import Edit, ModelDifference
 from ._sides import Sides, copies, name_of, placed, same
 

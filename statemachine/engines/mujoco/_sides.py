@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ...description.records import Inertial
-from ...description.tree import together
 from ...installed import require
 from ...interface import Array
 from ...rotations import HERE, Placement, matrix_from_quat
+from ..description.records import Inertial
+from ..description.tree import together
 from ..records import BodyPair, Counterparts, Edit, ModelDifference
 from . import _fields as fields
 

@@ -15,7 +15,10 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
-from ...description.records import (
+from ...errors import ModelError
+from ...installed import require
+from ...rotations import HERE
+from ..description.records import (
     Actuator,
     CollisionShape,
     Follows,
@@ -26,9 +29,6 @@ from ...description.records import (
     RobotJoint,
     moved,
 )
-from ...errors import ModelError
-from ...installed import require
-from ...rotations import HERE
 from . import _shapes as shapes
 from ._sides import HINGE, inertial_of, name_of, placed
 from .differences import settings_of

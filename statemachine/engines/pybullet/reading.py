@@ -13,11 +13,11 @@ import numpy as np
 from ...backends import load
 from ...backends._bullet_client import joint_infos, load_urdf, pb
 from ...backends._bullet_urdf import UNLIMITED
-from ...description import urdf
-from ...description.records import CollisionShape, Inertial, Link, Robot, RobotJoint, Setting
 from ...installed import engine_version
 from ...interface import make_data
 from ...rotations import HERE, Placement, matrix_from_quat, wxyz_from_xyzw
+from ..description import urdf
+from ..description.records import CollisionShape, Inertial, Link, Robot, RobotJoint, Setting
 from .world import fresh_world
 
 _KINDS = {0: "hinge", 1: "slide", 2: "ball"}  # JOINT_REVOLUTE, JOINT_PRISMATIC, JOINT_SPHERICAL

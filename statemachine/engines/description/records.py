@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..interface import Array
-from ..rotations import HERE, Placement, rotation
+from ...interface import Array
+from ...rotations import HERE, Placement, rotation
 
 Range = tuple[float, float]
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..interface import Array
-from ..models import mesh_file
+from ...interface import Array
+from ...models import mesh_file
 from .records import CollisionShape
 
 _OTHER_KIND = 100.0  # [m] worse than any distance

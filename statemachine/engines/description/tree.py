@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..interface import Array
-from ..rotations import HERE, Placement
+from ...interface import Array
+from ...rotations import HERE, Placement
 from .meshes import with_capsules
 from .records import CollisionShape, Inertial, Link, Robot, RobotJoint, moved
 

@@ -14,10 +14,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from .. import models
-from ..errors import ModelError
-from ..interface import Array
-from ..rotations import HERE, Placement
+from ... import models
+from ...errors import ModelError
+from ...interface import Array
+from ...rotations import HERE, Placement
 from .meshes import read_mesh, volume_of
 from .records import CollisionShape, Follows, Inertial, Link, Robot, RobotJoint
 

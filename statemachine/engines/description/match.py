@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import check_name
-from ..interface import Array
-from ..rotations import HERE, Placement
+from ...errors import check_name
+from ...interface import Array
+from ...rotations import HERE, Placement
 from .records import Robot
 from .tree import Group, GroupTree
 
