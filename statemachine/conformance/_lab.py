@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import cached_property
@@ -78,19 +79,6 @@ class Lab(ExitStack):
         forward(model, data)
         return data
 
-    def rests_on(self, *features: str) -> None:
-        """Say what a check rests on: it skips where the record declares one unsupported.
-
-        Args:
-            features: Names of `BEHAVIOURS` or `OPTIONS`.
-
-        Raises:
-            UnsupportedError: One of them is.
-        """
-        for feature in features:
-            if self.lacks(feature):
-                raise unsupported(self.arm, feature)
-
     def lacks(self, feature: str) -> bool:
         """Whether the capability record says that a behaviour or option is not supported."""
         record = self.arm.capabilities
@@ -101,7 +89,6 @@ class Lab(ExitStack):
 
     def held(self) -> Data:
         """A Data in which the jaws hold the box and squeeze it: mid-contact."""
-        self.rests_on("position servo")
         data = self.data(self.box, keyframe=0)
         data.ctrl[0] += 0.2
         step(self.box, data, 25)
@@ -126,6 +113,48 @@ class Lab(ExitStack):
         ctrl = key.ctrl + 0.3 * (np.arange(self.box.nu) == 0)
         point = SavePoint("held", "", self.box, key.qpos, key.qvel, ctrl, run_in=25)
         return driver, driver.run(point, steps=100)
+
+
+def check(
+    *rests_on: str,
+    on: str = "",
+    keyframe: int | None = None,
+    after: int = 0,
+    **options: Any,
+) -> Callable[[Callable[..., None]], Callable[[Lab], None]]:
+    """Say what a check rests on, and what it starts from.
+
+    It skips where the capability record declares something that it rests on unsupported. With
+    `on` it is given the Lab, a Model and a new Data, without it the Lab alone.
+
+    Args:
+        *rests_on: Names of `BEHAVIOURS` or `OPTIONS`.
+        on: "arm", "scene" or "box" of the Lab, or "held": the box in the jaws.
+        keyframe: Where the Data starts.
+        after: Steps that it has taken, with a forward behind them.
+        **options: Of `Model.replace`.
+    """
+
+    def decorated(function: Callable[..., None]) -> Callable[[Lab], None]:
+        @functools.wraps(function)
+        def checked(lab: Lab) -> None:
+            for feature in rests_on:
+                if lab.lacks(feature):
+                    raise unsupported(lab.arm, feature)
+            if not on:
+                function(lab)
+                return
+            if on == "held":
+                data = lab.held()
+            else:
+                model: Model = getattr(lab, on)
+                model = model.replace(**options) if options else model
+                data = lab.after(model, after) if after else lab.data(model, keyframe)
+            function(lab, data.model, data)
+
+        return checked
+
+    return decorated
 
 
 def require(condition: bool, message: str) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..interface import POSES, JointType, forward, get_state, reset, set_state, step
+from ..interface import POSES, Data, JointType, Model, forward, get_state, reset, set_state, step
 from ..kinematics import Kinematics
 from ..probes.audit import trials
 from ..rotations import matrix_from_quat
 from ._lab import (
     TARGET,
     Lab,
+    check,
     inputs_of,
     require,
     require_close,
@@ -21,10 +22,9 @@ from ._lab import (
 )
 
 
-def check_fresh_and_reset_are_zero(lab: Lab) -> None:
+@check(on="box")
+def check_fresh_and_reset_are_zero(lab: Lab, model: Model, data: Data) -> None:
     """On a fresh Data, and after a reset of either kind, everything derived is zero."""
-    model = lab.box
-    data = lab.data(model)
     for situation in ("fresh", "reset", "keyframe"):
         if situation != "fresh":
             data.ctrl[0] = 0.3
@@ -36,9 +36,9 @@ def check_fresh_and_reset_are_zero(lab: Lab) -> None:
         require(len(data.contacts) == 0, f"a {situation} Data has contacts")
 
 
-def check_shapes(lab: Lab) -> None:
+@check(on="box", keyframe=0)
+def check_shapes(lab: Lab, model: Model, data: Data) -> None:
     """Derived arrays have the documented shapes, before and after a forward."""
-    model, data = lab.box, lab.data(lab.box, keyframe=0)
     for _ in range(3):
         n = len(data.contacts)
         shapes = {
@@ -60,10 +60,9 @@ def check_shapes(lab: Lab) -> None:
     require(len(data.contacts) > 0, "keyframe 0 has no contacts")
 
 
-def check_a_write_marks_nothing_dirty(lab: Lab) -> None:
+@check("position servo", on="held")
+def check_a_write_marks_nothing_dirty(lab: Lab, model: Model, data: Data) -> None:
     """After a write to any input, everything derived still says what it said."""
-    model = lab.box
-    data = lab.held()
     before = snapshot(data)
     data.qpos[0] += 0.3
     data.qpos[6:9] += 0.1
@@ -77,9 +76,9 @@ def check_a_write_marks_nothing_dirty(lab: Lab) -> None:
             require(not np.array_equal(before[name], after[name]), f"forward left {name} alone")
 
 
-def check_a_step_leaves_values_of_the_state_before(lab: Lab) -> None:
+@check("position servo", on="held")
+def check_a_step_leaves_values_of_the_state_before(lab: Lab, model: Model, data: Data) -> None:
     """After a step, poses and contacts are those of the state that it started from."""
-    model, data = lab.box, lab.held()
     data.ctrl[0] += 0.5
     for nstep in (1, 1, 7):
         if nstep > 1:
@@ -102,9 +101,9 @@ def check_a_step_leaves_values_of_the_state_before(lab: Lab) -> None:
     require(bool(gap > 1e-6), "the arm did not move, so the check says nothing")
 
 
-def check_forward_changes_no_input(lab: Lab) -> None:
+@check("position servo", on="held")
+def check_forward_changes_no_input(lab: Lab, model: Model, data: Data) -> None:
     """Forward takes no time, touches no input, and twice is the same as once."""
-    model, data = lab.box, lab.held()
     before = inputs_of(model, data)
     forward(model, data)
     once = snapshot(data)
@@ -118,9 +117,9 @@ def check_forward_perturbs_nothing(lab: Lab) -> None:
     lab.keeps(trials.look)
 
 
-def check_forward_depends_on_the_state_alone(lab: Lab) -> None:
+@check("position servo", on="held")
+def check_forward_depends_on_the_state_alone(lab: Lab, model: Model, data: Data) -> None:
     """Another Data, set to the same State, derives the same bits; `freshness` relies on it."""
-    model, data = lab.box, lab.held()
     data.ctrl[0] += 0.2
     step(model, data, 3)
     other = lab.data(model)
@@ -130,10 +129,10 @@ def check_forward_depends_on_the_state_alone(lab: Lab) -> None:
     same(snapshot(data), snapshot(other), "forward of a restored State")
 
 
-def check_two_data_are_independent(lab: Lab) -> None:
+@check(on="box", keyframe=0)
+def check_two_data_are_independent(lab: Lab, model: Model, idle: Data) -> None:
     """Data of one Model share nothing that a step or a write can reach."""
-    model = lab.box
-    busy, idle = lab.data(model, keyframe=0), lab.data(model, keyframe=0)
+    busy = lab.data(model, keyframe=0)
     forward(model, idle)
     before, derived = inputs_of(model, idle), snapshot(idle)
     run_ctrl(model, busy, 40, seed=1)
@@ -141,9 +140,9 @@ def check_two_data_are_independent(lab: Lab) -> None:
     same(derived, snapshot(idle), "the other Data")
 
 
-def check_xquat_is_wxyz(lab: Lab) -> None:
+@check(on="box")
+def check_xquat_is_wxyz(lab: Lab, model: Model, data: Data) -> None:
     """A free body's xquat is the quaternion of its qpos; its xpos the position."""
-    model, data = lab.box, lab.data(lab.box)
     quat = np.array([0.5, -0.1, 0.7, 0.5])
     quat /= np.linalg.norm(quat)
     start, _, body = lab.box_at
@@ -154,9 +153,9 @@ def check_xquat_is_wxyz(lab: Lab) -> None:
     require_close(data.xquat[body], quat, 1e-12, "xquat of the box, wxyz")
 
 
-def check_site_and_body_agree(lab: Lab) -> None:
+@check(on="arm")
+def check_site_and_body_agree(lab: Lab, model: Model, data: Data) -> None:
     """A site is where its definition puts it in the frame of its body."""
-    model, data = lab.arm, lab.data(lab.arm)
     data.qpos[:] = TARGET
     forward(model, data)
     for site in range(model.nsite):
@@ -168,9 +167,9 @@ def check_site_and_body_agree(lab: Lab) -> None:
         require_close(data.site_xmat[site], mat.ravel(), 1e-12, "site_xmat")
 
 
-def check_the_witness_agrees(lab: Lab) -> None:
+@check(on="arm")
+def check_the_witness_agrees(lab: Lab, model: Model, data: Data) -> None:
     """Every body's pose is the one that Pinocchio computes from the file of the arm."""
-    model, data = lab.arm, lab.data(lab.arm)
     witness = Kinematics("so101", joint_names=model.joint_names)
     random = np.random.default_rng(7)
     low, high = model.jnt_range.T

@@ -17,14 +17,14 @@ from ..errors import (
     StateMachineError,
     UnknownNameError,
 )
-from ..interface import INPUTS, forward, get_state, make_data, reset, set_state, step
+from ..interface import INPUTS, Data, Model, forward, get_state, make_data, reset, set_state, step
 from ..measures.readings import readings
-from ._lab import Lab, inputs_of, require, require_equal, require_raises
+from ._lab import Lab, check, inputs_of, require, require_equal, require_raises
 
 
-def check_inputs_are_the_same_arrays_for_life(lab: Lab) -> None:
+@check(on="box")
+def check_inputs_are_the_same_arrays_for_life(lab: Lab, model: Model, data: Data) -> None:
     """No verb replaces an input array; all are float64, writable, of the right length."""
-    model, data = lab.box, lab.data(lab.box)
     arrays = {name: getattr(data, name) for name in INPUTS}
     for name, size in zip(INPUTS, (model.nq, model.nv, model.nu), strict=True):
         require(arrays[name].shape == (size,), f"{name} has shape {arrays[name].shape}")
@@ -41,27 +41,27 @@ def check_inputs_are_the_same_arrays_for_life(lab: Lab) -> None:
         require(getattr(data, name)[0] == 0.25, f"a write into {name} did not arrive")
 
 
-def check_a_write_reaches_the_engine(lab: Lab) -> None:
+@check(on="arm")
+def check_a_write_reaches_the_engine(lab: Lab, model: Model, data: Data) -> None:
     """What is written in place is where the next step starts from."""
-    model, data = lab.arm, lab.data(lab.arm)
     data.qpos[1] = 0.5
     data.ctrl[1] = 0.5
     step(model, data)
     require(abs(data.qpos[1] - 0.5) < 0.05, f"qpos[1] went to {data.qpos[1]} from 0.5")
 
 
-def check_assignment_copies_in(lab: Lab) -> None:
+@check(on="arm")
+def check_assignment_copies_in(lab: Lab, model: Model, data: Data) -> None:
     """`data.ctrl = x` copies the numbers; x stays the caller's."""
-    data = lab.data(lab.arm)
     mine = np.arange(6.0) / 10
     data.ctrl = mine
     mine[:] = 9.0
     require_equal(data.ctrl, np.arange(6.0) / 10, "ctrl after assignment")
 
 
-def check_bad_assignment_changes_nothing(lab: Lab) -> None:
+@check(on="box", keyframe=0)
+def check_bad_assignment_changes_nothing(lab: Lab, model: Model, data: Data) -> None:
     """Wrong shape, length, kind, NaN, infinity or a zero quaternion: refused, unchanged."""
-    model, data = lab.box, lab.data(lab.box, keyframe=0)
     before = inputs_of(model, data)
     bad: list[tuple[str, Any]] = [
         ("ctrl", [0.0] * 5),
@@ -85,9 +85,9 @@ def check_bad_assignment_changes_nothing(lab: Lab) -> None:
     require_equal(inputs_of(model, data), before, "inputs after refused assignments")
 
 
-def check_derived_is_read_only(lab: Lab) -> None:
+@check(on="arm")
+def check_derived_is_read_only(lab: Lab, model: Model, data: Data) -> None:
     """Derived arrays can neither be written into nor assigned to."""
-    model, data = lab.arm, lab.data(lab.arm)
     forward(model, data)
     held: dict[str, Any] = readings(data)
     parts = vars(held.pop("contacts"))
@@ -98,9 +98,9 @@ def check_derived_is_read_only(lab: Lab) -> None:
     require_raises(ReadOnlyError, *(partial(setattr, *each) for each in facts))
 
 
-def check_nstep_is_a_positive_whole_number(lab: Lab) -> None:
+@check(on="arm")
+def check_nstep_is_a_positive_whole_number(lab: Lab, model: Model, data: Data) -> None:
     """0, -1, 1.5, True, None and text are refused, and no time passes."""
-    model, data = lab.arm, lab.data(lab.arm)
     bad: tuple[Any, ...] = (0, -1, 1.5, 1.0, True, None, "2", 2**40, np.float64(3))
     require_raises(BadInputError, *(partial(step, model, data, nstep) for nstep in bad))
     require(data.time == 0.0, "time passed in a refused step")
@@ -108,9 +108,9 @@ def check_nstep_is_a_positive_whole_number(lab: Lab) -> None:
     require(abs(data.time - 2 * model.timestep) < 1e-12, "a NumPy integer was not taken")
 
 
-def check_not_finite_in_place_is_caught(lab: Lab) -> None:
+@check(on="box", keyframe=0)
+def check_not_finite_in_place_is_caught(lab: Lab, model: Model, data: Data) -> None:
     """NaN or infinity written in place: an error, then only reset and set_state."""
-    model, data = lab.box, lab.data(lab.box, keyframe=0)
     good = get_state(model, data)
     for name, value in (
         ("ctrl", np.nan),
@@ -137,10 +137,10 @@ def check_not_finite_in_place_is_caught(lab: Lab) -> None:
     require(bool(np.isfinite(data.qpos).all()), "not finite after the recovery")
 
 
-def check_infinite_ctrl_is_refused_or_clamped(lab: Lab) -> None:
+@check(on="arm")
+def check_infinite_ctrl_is_refused_or_clamped(lab: Lab, model: Model, data: Data) -> None:
     """An infinite ctrl in place is the end of its range to every verb, or an error of each."""
-    model = lab.arm
-    at_end, data, again = (lab.data(model) for _ in range(3))
+    at_end, again = lab.data(model), lab.data(model)
     at_end.ctrl[1] = model.actuator_ctrlrange[1, 1]
     data.ctrl[1] = np.inf
     try:
@@ -175,9 +175,9 @@ def _refuses_or_is_unchanged(lab: Lab, data: Any, name: str, value: float) -> No
         raise AssertionError("a Data with a bad entry went on as if nothing were wrong")
 
 
-def check_divergence_is_caught_every_time(lab: Lab) -> None:
+@check(on="arm")
+def check_divergence_is_caught_every_time(lab: Lab, model: Model, data: Data) -> None:
     """A second divergence, after a recovery by either way, is told like the first."""
-    model, data = lab.arm, lab.data(lab.arm)
     good = get_state(model, data)
     for recover in (
         lambda: reset(model, data),
@@ -191,9 +191,9 @@ def check_divergence_is_caught_every_time(lab: Lab) -> None:
         require_equal(data.qvel, np.zeros(6), "qvel after the recovery")
 
 
-def check_zero_quaternion_is_refused(lab: Lab) -> None:
+@check(on="box")
+def check_zero_quaternion_is_refused(lab: Lab, model: Model, data: Data) -> None:
     """A quaternion of zeros names no rotation: step and forward refuse, unchanged."""
-    model, data = lab.box, lab.data(lab.box)
     start = lab.box_at[0] + 3
     data.qpos[start : start + 4] = 0.0
     before = data.qpos.copy()
@@ -242,9 +242,9 @@ def check_closed_data_is_refused(lab: Lab) -> None:
     require("closed" in repr(data), "repr does not say that it is closed")
 
 
-def check_unknown_names_are_refused(lab: Lab) -> None:
+@check(on="box")
+def check_unknown_names_are_refused(lab: Lab, model: Model, data: Data) -> None:
     """A mistyped name lists the known ones, and suggests the nearest."""
-    model, data = lab.box, lab.data(lab.box)
     error = require_raises(UnknownNameError, lambda: model.joint_id("elbow_flx"))
     require("Did you mean 'elbow_flex'?" in str(error), f"no suggestion in: {error}")
     require_raises(

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..interface import Array, Model, forward, get_state, set_state, step
-from ._lab import Lab, require, require_close, require_equal, run_commands, run_ctrl
+from ..interface import Array, Data, Model, forward, get_state, set_state, step
+from ._lab import Lab, check, require, require_close, require_equal, run_commands, run_ctrl
 
 _G = 9.81
 
 
+@check("mass", "gravity", "armature", "damping", "frictionloss")
 def check_mass_scales_weight_and_inertia(lab: Lab) -> None:
     """Every mass doubled: weights and the force for an acceleration double, a fall does not."""
-    lab.rests_on("mass", "gravity", "armature", "damping", "frictionloss")
     limp = lab.arm.replace(actuation=False, armature=0, damping=0, frictionloss=0)
     heavy = limp.replace(mass=2 * limp.body_mass)
     require_close(heavy.body_mass, 2 * limp.body_mass, 0.0, "body_mass")
@@ -32,9 +32,9 @@ def check_mass_scales_weight_and_inertia(lab: Lab) -> None:
     require_close(weight, 0.25 * _G, 0.02 * 0.25 * _G, "what the floor carries of a heavier box")
 
 
+@check("friction", "gravity")
 def check_friction_slows_what_slides(lab: Lab) -> None:
     """On a floor of friction μ a box pushed by a = 5 m/s² accelerates by a - μ·g, or not at all."""
-    lab.rests_on("friction", "gravity")
     push, seconds = 5.0, 0.4
     for friction in (0.1, 0.3, 0.8):
         model = lab.box.replace(gravity=[push, 0, -_G], friction=friction)
@@ -49,9 +49,9 @@ def check_friction_slows_what_slides(lab: Lab) -> None:
             require(abs(place - 1.0) < 0.01, f"the box crept {place - 1.0:.3f} m")
 
 
+@check("kp", "kv", "position servo", "gravity")
 def check_gains_are_those_of_the_servo(lab: Lab) -> None:
     """At rest a servo is off by load / kp; moving, kv times its speed is taken off its force."""
-    lab.rests_on("kp", "kv", "position servo", "gravity")
     joint = lab.scene.joint_id("shoulder_lift")
     for kp in (250.0, 998.22, 4000.0):
         model = lab.scene.replace(kp=kp)
@@ -71,12 +71,12 @@ def check_gains_are_those_of_the_servo(lab: Lab) -> None:
     require_close(data.qfrc_actuator, force, 1e-9, "qfrc_actuator with a kv of each")
 
 
+@check("latency", "gravity", "position servo")
 def check_latency_delays_a_command(lab: Lab) -> None:
     """Under a latency of k steps the arm does what it does without, k steps later.
 
     Weightless and at rest nothing else tells the moments apart. A latency is rounded up.
     """
-    lab.rests_on("latency", "gravity", "position servo")
     arm = lab.arm.replace(gravity=[0, 0, 0])
     random = np.random.default_rng(3)
     commands = random.uniform(-0.1, 0.1, (40, arm.nu))
@@ -101,11 +101,10 @@ def check_latency_delays_a_command(lab: Lab) -> None:
     require(bool(np.abs(found[0, [0, 1, 3, 4, 5]]).min() > 1e-6), "all joints were late")
 
 
-def check_a_state_has_the_commands_on_their_way(lab: Lab) -> None:
+@check("latency", "position servo", on="arm", latency=0.04)
+def check_a_state_has_the_commands_on_their_way(lab: Lab, model: Model, data: Data) -> None:
     """With a latency, two restores have one future, whatever was commanded after the State."""
-    lab.rests_on("latency", "position servo")
-    model = lab.arm.replace(latency=0.04)
-    data, other = lab.data(model), lab.data(model)
+    other = lab.data(model)
     run_ctrl(model, data, 20, seed=1)
     state = get_state(model, data)
     futures = []
@@ -126,11 +125,9 @@ def check_a_state_has_the_commands_on_their_way(lab: Lab) -> None:
     require(bool(np.abs(paths[0] - start).max() > 1e-6), "nothing was on its way")
 
 
-def check_a_keyframe_holds_under_latency(lab: Lab) -> None:
+@check("latency", "position servo", on="box", keyframe=0, latency=0.1)
+def check_a_keyframe_holds_under_latency(lab: Lab, model: Model, data: Data) -> None:
     """Before a reset the command was that of the keyframe: the held box stays held."""
-    lab.rests_on("latency", "position servo")
-    model = lab.box.replace(latency=0.1)
-    data = lab.data(model, keyframe=0)
     start, arm = data.qpos.copy(), model.jnt_qposadr[model.actuator_jntid]
     step(model, data, 20)
     require_close(data.qpos[arm], start[arm], 0.01, "the arm in the first 0.1 s")

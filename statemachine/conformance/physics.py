@@ -8,18 +8,19 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..interface import BEHAVIOURS, Array, Model, forward, step
+from ..interface import BEHAVIOURS, Array, Data, Model, forward, step
 from ..models import resolve
 from ..rotations import angle_between, matrix_from_quat
-from ._lab import Lab, force_on, require, require_close, require_raises
+from ._lab import Lab, check, force_on, require, require_close, require_raises
 
 _G = 9.81
+_HEAVY = 1e4  # an armature beside which the links weigh nothing [kg·m²]
+_PUSH = (2.0, -1.0, -_G)  # a slanted gravity [m/s²]
 
 
-def check_untouched_ctrl_is_a_command(lab: Lab) -> None:
+@check("position servo", "gravity", on="scene")
+def check_untouched_ctrl_is_a_command(lab: Lab, model: Model, data: Data) -> None:
     """The servos hold the zero pose from the first step on, with a small droop."""
-    lab.rests_on("position servo", "gravity")
-    model, data = lab.scene, lab.data(lab.scene)
     step(model, data, 200)
     droop = np.degrees(data.qpos[model.jnt_qposadr[model.joint_id("shoulder_lift")]])
     # At rest kp·droop carries the load; 0.5694 N·m is the arm's weight about the joint.
@@ -27,10 +28,9 @@ def check_untouched_ctrl_is_a_command(lab: Lab) -> None:
     require(bool(np.abs(data.qvel).max() < 1e-4), "the arm is still moving after a second")
 
 
-def check_the_servo_law(lab: Lab) -> None:
+@check("position servo", on="arm")
+def check_the_servo_law(lab: Lab, model: Model, data: Data) -> None:
     """qfrc_actuator is clip(kp·(clip(ctrl) - q) - kv·q̇, forcerange), after forward."""
-    lab.rests_on("position servo")
-    model, data = lab.arm, lab.data(lab.arm)
     random = np.random.default_rng(13)
     for scale in (1e-3, 1e-2, 1.0, 5.0):
         data.qpos[:] = random.uniform(-0.3, 0.3, 6)
@@ -64,14 +64,13 @@ def check_ctrl_is_clamped_inside(lab: Lab) -> None:
     require_close(ends[1], ends[0], 1e-12, "qpos under a ctrl beyond its range")
 
 
-def check_forces_balance_at_rest(lab: Lab) -> None:
+@check("position servo", "gravity", on="scene", after=400)
+def check_forces_balance_at_rest(lab: Lab, model: Model, data: Data) -> None:
     """Held by its servos, the arm's forces sum to zero; parts add up to the constraint."""
-    lab.rests_on("position servo", "gravity")
-    model, data = lab.scene, lab.after(lab.scene, 400)
     total = data.qfrc_actuator + data.qfrc_passive + data.qfrc_constraint - data.qfrc_bias
     require_close(total, np.zeros(model.nv), 1e-6, "sum of the forces at rest")
     _parts_add_up(data)
-    fallen = lab.after(lab.scene.replace(actuation=False), 800)
+    fallen = lab.after(model.replace(actuation=False), 800)
     require(not fallen.qfrc_actuator.any(), "servos that are off exert a force")
     require(abs(fallen.qfrc_contact[1]) > 0.3, "no contact carries the fallen arm")
     _parts_add_up(fallen)
@@ -82,9 +81,9 @@ def _parts_add_up(data: object) -> None:
     require_close(parts, getattr(data, "qfrc_constraint"), 1e-9, "parts of qfrc_constraint")  # noqa: B009
 
 
-def check_dry_friction_saturates(lab: Lab) -> None:
+@check(on="arm")
+def check_dry_friction_saturates(lab: Lab, model: Model, data: Data) -> None:
     """A joint in fast motion feels its full dry friction, against the motion."""
-    model, data = lab.arm, lab.data(lab.arm)
     for sign in (1.0, -1.0):
         data.qvel[:] = sign * 3.0
         forward(model, data)
@@ -92,9 +91,9 @@ def check_dry_friction_saturates(lab: Lab) -> None:
         require_close(data.qfrc_passive, -model.dof_damping * data.qvel, 1e-9, "qfrc_passive")
 
 
+@check("gravity")
 def check_limits_stop_a_joint(lab: Lab) -> None:
     """Pushed by gravity, a joint stops at its limit; with limits off it goes on."""
-    lab.rests_on("gravity")
     limp = lab.arm.replace(actuation=False)
     free = limp.replace(limits=False)
     joint = limp.joint_id("shoulder_lift")
@@ -106,10 +105,9 @@ def check_limits_stop_a_joint(lab: Lab) -> None:
         require((data.qfrc_limit[joint] < -0.05) == stops, "no limit force at the limit")
 
 
-def check_free_fall(lab: Lab) -> None:
+@check("gravity", on="box")
+def check_free_fall(lab: Lab, model: Model, data: Data) -> None:
     """A free body falls g·t²/2, within the g·t·h of one timestep; sideways not at all."""
-    lab.rests_on("gravity")
-    model, data = lab.box, lab.data(lab.box)
     start, dof, _ = lab.box_at
     data.qpos[start : start + 3] = (1.0, 1.0, 2.0)
     step(model, data, 60)
@@ -120,13 +118,12 @@ def check_free_fall(lab: Lab) -> None:
     require_close(data.qpos[start : start + 2], (1.0, 1.0), 1e-9, "horizontal position")
 
 
-def check_free_body_velocity_conventions(lab: Lab) -> None:
+@check(on="box", gravity=[0, 0, 0])
+def check_free_body_velocity_conventions(lab: Lab, model: Model, data: Data) -> None:
     """Linear velocity is in world axes; angular velocity in the body's own axes."""
-    model = lab.box.replace(gravity=[0, 0, 0])
     start, dof, _ = lab.box_at
     quat = np.array([np.cos(0.6), np.sin(0.6), 0.0, 0.0])  # turned about x by 1.2 rad
     rate, velocity = 0.8, np.array([0.3, -0.2, 0.1])
-    data = lab.data(model)
     data.qpos[start : start + 7] = (1.0, 1.0, 1.0, *quat)
     data.qvel[dof : dof + 6] = (*velocity, 0, 0, rate)  # about z, a principal axis: constant
     step(model, data, 100)
@@ -138,10 +135,10 @@ def check_free_body_velocity_conventions(lab: Lab) -> None:
     require(float(angle_between(got, expected)) < 1e-4, "the spin is not about the body's z axis")
 
 
-def check_contact_carries_the_weight(lab: Lab) -> None:
+@check("gravity", on="box", after=300)
+def check_contact_carries_the_weight(lab: Lab, model: Model, data: Data) -> None:
     """Under a resting box: four or more contacts, normals up, forces that sum to m·g."""
-    lab.rests_on("gravity")
-    model, data, (_, dof, body) = lab.box, lab.after(lab.box, 300), lab.box_at
+    _, dof, body = lab.box_at
     total, touching, normals = force_on(model, data, body)
     require(len(touching) >= 3, f"the box rests on {len(touching)} points")
     require(bool((normals[:, 2] > 0.99).all()), "the normal does not point up")
@@ -151,22 +148,24 @@ def check_contact_carries_the_weight(lab: Lab) -> None:
     require(bool((np.abs(data.contacts.dist) < 0.002).all()), "surfaces are not together")
 
 
-def check_contact_forces_lean_against_a_push(lab: Lab) -> None:
+@check(on="box", after=300, gravity=_PUSH)
+def check_contact_forces_lean_against_a_push(lab: Lab, model: Model, data: Data) -> None:
     """Under slanted gravity the floor's force on a box is -m·g, its tangent part too."""
-    push = np.array([2.0, -1.0, -_G])
-    model, (_, _, body) = lab.box.replace(gravity=push), lab.box_at
-    data = lab.after(model, 300)
+    _, _, body = lab.box_at
     total, touching, _ = force_on(model, data, body)
     place = data.contacts.pos[touching].mean(axis=0)
-    require_close(total, -0.096 * push, 0.03 * 0.096 * _G, "force of the floor on a pushed box")
+    require_close(
+        total, -0.096 * np.array(_PUSH), 0.03 * 0.096 * _G, "force of the floor on a pushed box"
+    )
     off = np.abs(place[:2] - data.xpos[body, :2]).max()
     require(bool(off < 0.02), "contacts are not below the box")
     require(abs(place[2]) < 0.002, f"contacts are {place[2]:.4f} m above the floor")
 
 
-def check_depth_of_a_contact(lab: Lab) -> None:
+@check(on="box")
+def check_depth_of_a_contact(lab: Lab, model: Model, data: Data) -> None:
     """Of a box one millimetre in the floor, every contact's distance is minus that."""
-    model, data, (start, _, body) = lab.box, lab.data(lab.box), lab.box_at
+    start, _, body = lab.box_at
     data.qpos[start + 2] = 0.029
     forward(model, data)
     _, touching, _ = force_on(model, data, body)
@@ -175,32 +174,29 @@ def check_depth_of_a_contact(lab: Lab) -> None:
     require_close(depths, np.full(len(touching), -0.001), 2e-4, "contacts.dist")
 
 
-def check_acceleration_is_the_rate_of_velocity(lab: Lab) -> None:
+@check(on="arm", timestep=1e-6)
+def check_acceleration_is_the_rate_of_velocity(lab: Lab, model: Model, data: Data) -> None:
     """Qacc is what a very short step does to qvel, in the air and under servo force."""
-    base = lab.arm.replace(timestep=1e-6)
-    data, random = lab.data(base), np.random.default_rng(21)
+    random = np.random.default_rng(21)
     for _ in range(4):
         data.qpos[:] = random.uniform(-0.5, 0.5, 6)
         data.qvel[:] = random.uniform(-1, 1, 6)
         data.ctrl[:] = data.qpos + random.uniform(-0.002, 0.002, 6)
-        forward(base, data)
+        forward(model, data)
         expected, before = data.qacc.copy(), data.qvel.copy()
-        step(base, data)
-        rate = (data.qvel - before) / base.timestep
+        step(model, data)
+        rate = (data.qvel - before) / model.timestep
         require_close(rate, expected, 0.02 * np.abs(expected).max(), "change of qvel over h")
 
 
-def check_a_force_accelerates_by_the_armature(lab: Lab) -> None:
+@check("position servo", on="arm", armature=_HEAVY, gravity=[0, 0, 0], frictionloss=0.0)
+def check_a_force_accelerates_by_the_armature(lab: Lab, model: Model, data: Data) -> None:
     """With an armature far beyond the links' inertia, qacc is force over armature."""
-    lab.rests_on("position servo")
-    heavy = 1e4
-    model = lab.arm.replace(armature=heavy, gravity=[0, 0, 0], frictionloss=0.0)
-    data = lab.data(model)
     data.ctrl[:] = 0.001
     forward(model, data)
-    expected = servo(model, data.qpos, data.qvel, data.ctrl) / heavy
+    expected = servo(model, data.qpos, data.qvel, data.ctrl) / _HEAVY
     require_close(data.qacc, expected, 1e-4 * np.abs(expected).max(), "qacc")
-    require_close(model.dof_armature, np.full(6, heavy), 0.0, "dof_armature")
+    require_close(model.dof_armature, np.full(6, _HEAVY), 0.0, "dof_armature")
 
 
 def check_facts_are_the_files(lab: Lab) -> None:
@@ -226,10 +222,9 @@ def check_facts_are_the_files(lab: Lab) -> None:
             require_close(getattr(model, name), value, 0.0, name)
 
 
-def check_the_box_is_held(lab: Lab) -> None:
+@check("position servo", on="box", keyframe=0)
+def check_the_box_is_held(lab: Lab, model: Model, data: Data) -> None:
     """From keyframe 0, under a command that moves the arm, both jaws keep the box."""
-    lab.rests_on("position servo")
-    model, data = lab.box, lab.data(lab.box, keyframe=0)
     box, jaws = model.body_id("box"), {model.body_id(n) for n in ("gripper", "moving_jaw_so101_v1")}
     data.ctrl[:2] += (0.4, -0.2)
     start = data.qpos.copy()
@@ -242,9 +237,9 @@ def check_the_box_is_held(lab: Lab) -> None:
     require(bool(np.abs(data.qpos[:2] - start[:2]).min() > 0.1), "the arm did not move")
 
 
+@check("gravity")
 def check_options_do_what_they_say(lab: Lab) -> None:
     """Each option that the capability record lists has its effect, and no other Model's."""
-    lab.rests_on("gravity")
     base, options = lab.scene, lab.scene.capabilities.options
     limp = base.replace(actuation=False)
 

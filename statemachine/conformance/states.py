@@ -9,10 +9,11 @@ from functools import partial
 import numpy as np
 
 from ..errors import BadInputError, ForeignStateError
-from ..interface import forward, get_state, reset, set_state, step
+from ..interface import Data, Model, forward, get_state, reset, set_state, step
 from ..probes.audit import trials
 from ._lab import (
     Lab,
+    check,
     inputs_of,
     require,
     require_close,
@@ -22,9 +23,9 @@ from ._lab import (
 )
 
 
-def check_time_passes_only_in_step(lab: Lab) -> None:
+@check(on="arm")
+def check_time_passes_only_in_step(lab: Lab, model: Model, data: Data) -> None:
     """`time` grows by timestep × nstep in a step, by nothing elsewhere; it can be set."""
-    model, data = lab.arm, lab.data(lab.arm)
     require(data.time == 0.0, "a fresh Data is not at time 0")
     step(model, data)
     step(model, data, 9)
@@ -42,9 +43,9 @@ def check_steps_add_up(lab: Lab) -> None:
     lab.keeps(trials.pieces)
 
 
-def check_replay_is_bit_identical(lab: Lab) -> None:
+@check(on="box")
+def check_replay_is_bit_identical(lab: Lab, model: Model, used: Data) -> None:
     """Same keyframe, same commands: same bits, in a used Data and in a new one."""
-    model, used = lab.box, lab.data(lab.box)
     run_ctrl(model, used, 30, seed=3)
     runs = []
     for data in (used, used, lab.data(model)):
@@ -53,9 +54,9 @@ def check_replay_is_bit_identical(lab: Lab) -> None:
     require_equal(runs[1:], [runs[0]] * 2, "qpos along a replay")
 
 
+@check("position servo")
 def check_a_different_command_is_noticed(lab: Lab) -> None:
     """The replay check is not blind: one late command gives other bits."""
-    lab.rests_on("position servo")
     model = lab.box
     ends = []
     for late in (False, True):
@@ -70,9 +71,9 @@ def check_a_different_command_is_noticed(lab: Lab) -> None:
     require(not np.array_equal(*ends), "a late command left no trace")
 
 
-def check_keyframes_are_taken_whole(lab: Lab) -> None:
+@check(on="box")
+def check_keyframes_are_taken_whole(lab: Lab, model: Model, data: Data) -> None:
     """reset(keyframe) sets time, qpos, qvel and ctrl to the file's, by number or name."""
-    model, data = lab.box, lab.data(lab.box)
     require(len(model.keyframes) == 2, "scene_box has two keyframes")
     for number, frame in enumerate(model.keyframes):
         for key in (number, frame.name):
@@ -87,9 +88,9 @@ def check_keyframes_are_taken_whole(lab: Lab) -> None:
     require_equal(inputs_of(model, data), inputs_of(model, fresh), "a reset Data")
 
 
-def check_a_state_restores_the_inputs(lab: Lab) -> None:
+@check("position servo", on="held")
+def check_a_state_restores_the_inputs(lab: Lab, model: Model, data: Data) -> None:
     """set_state gives back time, qpos, qvel and ctrl, in any Data, and of a pickled State."""
-    model, data = lab.box, lab.held()
     state = get_state(model, data)
     expected = inputs_of(model, data)
     other = lab.data(model)
@@ -106,9 +107,9 @@ def check_restored_futures_agree(lab: Lab) -> None:
     lab.keeps(trials.restored)
 
 
-def check_a_state_is_a_copy(lab: Lab) -> None:
+@check(on="arm")
+def check_a_state_is_a_copy(lab: Lab, model: Model, data: Data) -> None:
     """A State does not change with its Data, and cannot be written into."""
-    model, data = lab.arm, lab.data(lab.arm)
     state = get_state(model, data)
     before = state.vector.copy()
     run_ctrl(model, data, 5, seed=10)
@@ -117,10 +118,9 @@ def check_a_state_is_a_copy(lab: Lab) -> None:
     require_equal(state["qpos"], np.zeros(model.nq), "State['qpos']")
 
 
-def check_a_state_moves_between_variants(lab: Lab) -> None:
+@check(on="scene")
+def check_a_state_moves_between_variants(lab: Lab, model: Model, data: Data) -> None:
     """A State fits every variant that `replace` makes of a Model."""
-    model = lab.scene
-    data = lab.data(model)
     run_ctrl(model, data, 20, seed=11)
     state = get_state(model, data)
     variant = model.replace(gravity=[0.0, 0.0, -1.6])
@@ -130,9 +130,9 @@ def check_a_state_moves_between_variants(lab: Lab) -> None:
     step(variant, other, 5)
 
 
-def check_foreign_states_are_refused(lab: Lab) -> None:
+@check(on="arm")
+def check_foreign_states_are_refused(lab: Lab, model: Model, data: Data) -> None:
     """Another layout, another backend, a cut or a bad State: refused, Data unchanged."""
-    model, data = lab.arm, lab.data(lab.arm)
     run_ctrl(model, data, 5, seed=12)
     good = get_state(model, data)
     boxed = get_state(lab.box, lab.data(lab.box))
