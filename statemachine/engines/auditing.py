@@ -220,10 +220,6 @@ class Driver(ABC):
         """Positions and velocities, in one new array."""
         return np.concatenate((machine.qpos, machine.qvel))
 
-    def time(self, machine: Machine) -> float:
-        """Simulated time [s]."""
-        return machine.time
-
     @abstractmethod
     def touching(self, machine: Machine) -> tuple[int, int | None]:
         """How many contacts there are now, and joints at a limit; None where that is not told."""
@@ -243,7 +239,7 @@ class Driver(ABC):
             return Measured(
                 point.name,
                 point.how,
-                float(self.time(machine)),
+                float(machine.time),
                 *self.touching(machine),
                 float(np.abs(speeds).max(initial=0.0)),
             )
@@ -313,7 +309,7 @@ class Driver(ABC):
         trace = [self.read(machine)]
         for _ in range(steps):
             if point.swings:
-                self.command(machine, point.commanded(self.time(machine)))
+                self.command(machine, point.commanded(machine.time))
             if look:
                 look.act(machine)
             if look is None or not look.instead:

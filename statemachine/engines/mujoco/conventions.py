@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import setitem
 from typing import Any
 
 import numpy as np
@@ -100,54 +101,49 @@ def damping(seconds: float, fast: float) -> tuple[float, float]:
     return float(data.qvel[0]), float(turning.qvel[0])
 
 
-def _depth(data: Any) -> float:
-    """How deep the deepest contact is that the engine tells of; 0 where there is none [m]."""
-    return max((-float(contact.dist) for contact in data.contact), default=0.0)
-
-
-def _tip(data: Any) -> Array:
-    """Where the pendulum's tip is (3,) [m]."""
-    return np.array(data.site("tip").xpos)
-
-
-def _twice(
-    what: str,
-    read: Callable[[Any], Any],
-    loaded: tuple[Any, Any, Any],
-    true: float | tuple[float, float, float],
-) -> ReadTwice:
-    """What is read as it is, and after mj_forward."""
-    mj, model, data = loaded
-    first = read(data)
+def _tip_read(act: Callable[[Any, Any, Any], object]) -> ReadTwice:
+    """Where the pendulum's tip is, after something was done to its joint."""
+    mj, model, data = engine = _loaded(samples.PENDULUM_MJCF % "")
     mj.mj_forward(model, data)
-    return what, first, read(data), true
+    act(*engine)
+    tip = np.array(data.site("tip").xpos)
+    mj.mj_forward(model, data)
+    return "the tip", tip, np.array(data.site("tip").xpos), samples.tip_at(data.qpos[0])
+
+
+def _contact_read(height: float, act: Callable[[Any, Any, Any], object]) -> ReadTwice:
+    """How deep a ball is in the floor, after something was done to it at a height [m]."""
+    mj, model, data = engine = _loaded(samples.BALL)
+    data.qpos[2] = height
+    mj.mj_forward(model, data)
+    act(*engine)
+    depths = []
+    for _ in range(2):
+        depths.append(max((-float(contact.dist) for contact in data.contact), default=0.0))
+        mj.mj_forward(model, data)
+    return "the contact", *depths, max(samples.RADIUS - float(data.qpos[2]), 0.0)
 
 
 def write(angle: float, deep: float) -> list[ReadTwice]:
-    """Write qpos of a pendulum, then of a ball that is put into the samples."""
-    mj, model, data = loaded = _loaded(samples.PENDULUM_MJCF % "")
-    mj.mj_forward(model, data)
-    data.qpos[0] = angle
-    tip = _twice("the tip", _tip, loaded, samples.tip_at(angle))
-
-    mj, model, data = loaded = _loaded(samples.BALL)
-    mj.mj_forward(model, data)
-    data.qpos[2] = samples.RADIUS - deep
-    return [tip, _twice("the contact", _depth, loaded, deep)]
+    """Write qpos of a pendulum, then of a ball that is put into the floor."""
+    down = samples.RADIUS - deep
+    return [
+        _tip_read(lambda _mj, _model, data: setitem(data.qpos, 0, angle)),
+        _contact_read(1.0, lambda _mj, _model, data: setitem(data.qpos, 2, down)),
+    ]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
-    """A pendulum on its way, and a ball on its way out of the samples."""
-    mj, model, data = loaded = _loaded(samples.PENDULUM_MJCF % "")
-    data.qvel[0] = speed
-    mj.mj_step(model, data)
-    tip = _twice("the tip", _tip, loaded, samples.tip_at(data.qpos[0]))
+    """A pendulum on its way, and a ball on its way out of the floor."""
 
-    mj, model, data = loaded = _loaded(samples.BALL)
-    data.qpos[2], data.qvel[2] = samples.RADIUS - deep, speed
-    mj.mj_step(model, data)
-    now = max(samples.RADIUS - float(data.qpos[2]), 0.0)
-    return [tip, _twice("the contact", _depth, loaded, now)]
+    def step_at(mj: Any, model: Any, data: Any, dof: int) -> None:
+        data.qvel[dof] = speed
+        mj.mj_step(model, data)
+
+    return [
+        _tip_read(partial(step_at, dof=0)),
+        _contact_read(samples.RADIUS - deep, partial(step_at, dof=2)),
+    ]
 
 
 def joints() -> dict[str, list[str]]:

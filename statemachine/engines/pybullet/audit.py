@@ -152,44 +152,34 @@ class PybulletDriver(Driver):
     def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         """The engine's ways with and without what its user must add: targets and time."""
         return (
-            SaveMethod("written", self._way(written, known=False)),
-            SaveMethod(_BEST, self._way(written)),
-            SaveMethod("saveState + targets", self._way(saved_in_memory), travels=False),
-            SaveMethod("saveBullet + targets", self._way(saved_in_a_file)),
-            SaveMethod("taken apart + targets", self._way(partial(put_back, how="place"))),
+            SaveMethod("written", written),
+            SaveMethod(_BEST, self._with_targets(written)),
+            SaveMethod("saveState + targets", self._with_targets(saved_in_memory), travels=False),
+            SaveMethod("saveBullet + targets", self._with_targets(saved_in_a_file)),
+            SaveMethod("taken apart + targets", self._with_targets(partial(put_back, how="place"))),
         )
 
-    def _way(self, save: Save, known: bool = True) -> Save:
-        """A way to save; `known`: with what the user knows and the engine does not tell."""
+    def _with_targets(self, save: Save) -> Save:
+        """A way to save, and beside it what the user knows and the engine does not tell."""
 
         @contextmanager
-        def whole(machine: Client) -> Iterator[Restore]:
-            time = machine.time
-            targets = None if machine.targets is None else machine.targets.copy()
+        def save_both(machine: Client) -> Iterator[Restore]:
+            time, targets = machine.time, machine.targets
             with save(machine) as restore:
 
                 def back(other: Client) -> None:
                     restore(other)
-                    if known:
-                        other.time = time
-                        if targets is not None:
-                            self.command(other, targets)
+                    other.time = time
+                    if targets is not None:
+                        self.command(other, targets)
 
                 yield back
 
-        return whole
+        return save_both
 
     def hidden_state(self, point: SavePoint) -> HiddenState:
         """What the engine's ways forget, each way without what its user must add."""
-        ways = {
-            "written": self._way(written, known=False),
-            "saveState": self._way(saved_in_memory, known=False),
-            "saveBullet": self._way(saved_in_a_file, known=False),
-        }
-        best = SaveMethod(_BEST, self._way(written))
-        return HiddenState(ways, self._changes(point), let_pass, best)
 
-    def _changes(self, point: SavePoint) -> dict[str, Callable[[Client], None]]:
         def motor_targets(machine: Client) -> None:
             self.command(machine, point.ctrl - _RETARGET)
 
@@ -206,17 +196,19 @@ class PybulletDriver(Driver):
 
         def friction(machine: Client) -> None:
             for body, link in machine.solids:
-                pb.changeDynamics(
-                    body, link, lateralFriction=_SLIPPERY, physicsClientId=machine.client
-                )
+                machine.world.change(body, link, lateralFriction=_SLIPPERY)
 
-        motors = {"motor targets": motor_targets} if point.powered and self._servos else {}
-        return {
-            **motors,
+        changes: dict[str, Callable[[Client], None]] = {
+            "motor targets": motor_targets,
             "a waiting force": waiting_force,
             "collision masks": let_pass,
             "frictions": friction,
         }
+        if not (point.powered and self._servos):
+            del changes["motor targets"]
+        ways = {"written": written, "saveState": saved_in_memory, "saveBullet": saved_in_a_file}
+        best = SaveMethod(_BEST, self._with_targets(written))
+        return HiddenState(ways, changes, let_pass, best)
 
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         def links(machine: Client) -> None:

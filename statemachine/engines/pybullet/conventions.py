@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 
@@ -46,9 +46,9 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
         for four in fours:
             pb.resetBasePositionAndOrientation(body, (0, 0, 0), four, client)
             marks = _marks(client, body)
-            told = np.array(pb.getBasePositionAndOrientation(body, client)[1])
             # Which point was put at 0 0 0 is another question.
-            turned.append((marks - marks[0], told))
+            read = np.array(pb.getBasePositionAndOrientation(body, client)[1])
+            turned.append((marks - marks[0], read))
     return turned
 
 
@@ -78,13 +78,15 @@ def timestep() -> OneStep:
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
         start = pb.getBasePositionAndOrientation(body, client)[0][0]
         pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
-        told = pb.getPhysicsEngineParameters(client)
+        before = pb.getPhysicsEngineParameters(client)
         pb.stepSimulation(client)
         moved = pb.getBasePositionAndOrientation(body, client)[0][0] - start
         after = pb.getPhysicsEngineParameters(client)
-        changed = {name: after[name] - told[name] for name in told if after[name] != told[name]}
-        name, ticked = next(iter(changed.items()), ("", 0.0))
-        return (told["fixedTimeStep"], moved, name, ticked)
+        clocks = [
+            (name, after[name] - before[name]) for name in before if after[name] != before[name]
+        ]
+        name, ticked = (*clocks, ("", 0.0))[0]
+        return (before["fixedTimeStep"], moved, name, ticked)
 
 
 def actuation(seconds: float) -> list[LetGo]:
@@ -137,62 +139,57 @@ def damping(seconds: float, fast: float) -> tuple[float, float]:
         return end, pb.getJointState(body, 0, client)[1]
 
 
-def _tip(client: int, body: int, compute: bool = False) -> Array:
-    """Where the pendulum's tip is (3,) [m]."""
-    link = pb.getLinkState(body, 1, computeForwardKinematics=compute, physicsClientId=client)
-    return np.array(link[4])
+def _tip_read(act: Callable[[int, int], object]) -> ReadTwice:
+    """Where the pendulum's tip is, after something was done to its joint."""
+    with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
+        tip = partial(pb.getLinkState, body, 1, physicsClientId=client)
+        tip(computeForwardKinematics=1)
+        act(client, body)
+        true = samples.tip_at(pb.getJointState(body, 0, client)[0])
+        return "the tip", np.array(tip()[4]), np.array(tip(computeForwardKinematics=1)[4]), true
 
 
-def _put_ball(client: int, height: float) -> int:
-    """The floor, and the ball at a height [m]; its number."""
-    put_floor(client)
-    return put(client, pb.GEOM_SPHERE, (0, 0, height), radius=samples.RADIUS)
-
-
-def _depth(client: int) -> float:
-    """How deep the deepest contact is that the engine tells of; 0 where there is none [m]."""
-    return max((-point[8] for point in pb.getContactPoints(physicsClientId=client)), default=0.0)
-
-
-def _tip_twice(client: int, body: int) -> ReadTwice:
-    tip = partial(_tip, client, body)
-    true = samples.tip_at(pb.getJointState(body, 0, client)[0])
-    return "the tip", tip(), tip(compute=True), true
-
-
-def _contact_twice(client: int, true: float) -> ReadTwice:
-    depth = _depth(client)
-    pb.performCollisionDetection(client)
-    return "the contact", depth, _depth(client), true
+def _contact_read(height: float, act: Callable[[int, int], object]) -> ReadTwice:
+    """How deep a ball is in the floor, after something was done to it at a height [m]."""
+    with fresh_world() as client:
+        put_floor(client)
+        ball = put(client, pb.GEOM_SPHERE, (0, 0, height), radius=samples.RADIUS)
+        pb.performCollisionDetection(client)
+        act(client, ball)
+        depths = []
+        for _ in range(2):
+            points = pb.getContactPoints(physicsClientId=client)
+            depths.append(max((-point[8] for point in points), default=0.0))
+            pb.performCollisionDetection(client)
+        height = pb.getBasePositionAndOrientation(ball, client)[0][2]
+        return "the contact", *depths, max(samples.RADIUS - height, 0.0)
 
 
 def write(angle: float, deep: float) -> list[ReadTwice]:
-    """Write by resetJointState to a pendulum, then a ball that is put into the samples."""
-    with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
-        _tip(client, body, compute=True)
-        pb.resetJointState(body, 0, angle, 0, client)
-        tip = _tip_twice(client, body)
-    with fresh_world() as client:
-        ball = _put_ball(client, 1)
-        pb.performCollisionDetection(client)
-        at = (0, 0, samples.RADIUS - deep)
-        pb.resetBasePositionAndOrientation(ball, at, (0, 0, 0, 1), client)
-        return [tip, _contact_twice(client, deep)]
+    """Write by resetJointState to a pendulum, then a ball that is put into the floor."""
+    turn, down = (0, 0, 0, 1), (0, 0, samples.RADIUS - deep)
+    return [
+        _tip_read(lambda client, body: pb.resetJointState(body, 0, angle, 0, client)),
+        _contact_read(
+            1,
+            lambda client, ball: pb.resetBasePositionAndOrientation(ball, down, turn, client),
+        ),
+    ]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
-    """A limp pendulum on its way, and a ball on its way out of the samples."""
-    with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
+    """A limp pendulum on its way, and a ball on its way out of the floor."""
+
+    def swing(client: int, body: int) -> None:
         limp(body, client)
         pb.resetJointState(body, 0, 0, speed, client)
         pb.stepSimulation(client)
-        tip = _tip_twice(client, body)
-    with fresh_world() as client:
-        ball = _put_ball(client, samples.RADIUS - deep)
+
+    def rise(client: int, ball: int) -> None:
         pb.resetBaseVelocity(ball, (0, 0, speed), (0, 0, 0), client)
         pb.stepSimulation(client)
-        height = pb.getBasePositionAndOrientation(ball, client)[0][2]
-        return [tip, _contact_twice(client, max(samples.RADIUS - height, 0.0))]
+
+    return [_tip_read(swing), _contact_read(samples.RADIUS - deep, rise)]
 
 
 def joints() -> dict[str, list[str]]:
@@ -202,7 +199,7 @@ def joints() -> dict[str, list[str]]:
 
 
 def friction() -> dict[str, Sliding]:
-    """A block on a samples."""
+    """A block on a floor."""
 
     def speed(block: float, ground: float, lean: float) -> float:
         with fresh_world() as client:

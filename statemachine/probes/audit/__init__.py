@@ -109,10 +109,9 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
                 *trials.smallest(driver, runs[driver], findings[driver]),
                 *trials.forgets(driver, runs[driver]),
                 *trials.threads(driver, runs[driver]),
-                *elsewhere.findings(child.result(), driver, runs[driver]),
+                *elsewhere.findings(child.result(), driver, runs[driver], states),
                 *(trials.falls(driver) if driver.layer == "engine" else ()),
             ]
-        findings[interface] += elsewhere.pickled(child.result(), interface, runs[interface], states)
     audited = tuple(
         Audited(
             driver.layer,

@@ -87,7 +87,15 @@ def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
 
     tried, among, left_out = by_case(RESTORE), by_case(RESTORE, among=True), by_case(WITHOUT)
     alone = tried.pop(ONLY, None)
-    missing = [_missing(name, of_name) for name, of_name in left_out.items()]
+    missing = [
+        Missing(
+            field=name,
+            points=_differing(of_name),
+            itself=_differing(finding for finding in of_name if finding.into == ITSELF),
+            gap=_worst(of_name),
+        )
+        for name, of_name in left_out.items()
+    ]
     forgets = [f for f in findings if f.experiment == FORGETS and f.into != NOT_RESTORED]
     restores = {(f.case, f.into, f.point): f.gap for f in findings if f.experiment == RESTORE}
     without_contacts = [finding for finding in findings if finding.experiment == NO_CONTACTS]
@@ -95,8 +103,8 @@ def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
         suffice=tuple(case for case in tried if not _differing(tried[case])),
         fail={case: _worst(tried[case]) for case in tried if _differing(tried[case])},
         agree=tuple(case for case in among if case in tried and not _differing(among[case])),
-        missing=tuple(each for each in missing if each.points),
-        idle=tuple(each.field for each in missing if not each.points),
+        missing=tuple(component for component in missing if component.points),
+        idle=tuple(component.field for component in missing if not component.points),
         smallest=None if alone is None else not _differing(alone),
         forgotten={
             way: tuple(f.case for f in forgets if f.into == way and not f.gap.exact)
@@ -121,12 +129,3 @@ def _differing(findings: Iterable[AuditFinding]) -> tuple[str, ...]:
 
 def _worst(findings: Sequence[AuditFinding]) -> FutureGap:
     return worst([finding.gap for finding in findings])
-
-
-def _missing(name: str, findings: Sequence[AuditFinding]) -> Missing:
-    return Missing(
-        field=name,
-        points=_differing(findings),
-        itself=_differing(finding for finding in findings if finding.into == ITSELF),
-        gap=_worst(findings),
-    )

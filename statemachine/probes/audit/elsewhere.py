@@ -6,7 +6,7 @@ import os
 import pickle
 import subprocess
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ...engines.auditing import Driver, ReferenceRun
@@ -53,30 +53,21 @@ def run(
         except subprocess.TimeoutExpired:
             raise EngineError(f"a fresh process did not end in {_PATIENCE:g} s") from None
         if done.returncode:
-            said = last_line(done.stderr, done.returncode)
-            raise EngineError(f"a fresh process failed: {said}")
+            raise EngineError(f"a fresh process failed: {last_line(done.stderr, done.returncode)}")
         return pickle.loads(answered.read_bytes())
 
 
 def findings(
-    answer: Answer, driver: Driver, runs: Sequence[ReferenceRun]
+    answer: Answer, driver: Driver, runs: Sequence[ReferenceRun], states: Mapping[str, State]
 ) -> Iterator[AuditFinding]:
-    """The other process's runs against those of this one."""
+    """The other process's runs, and the futures of States that were pickled to it, against ours."""
+    traces, futures = answer
     for run in runs:
-        there = answer[0][driver.layer, run.point.name]
+        there = traces[driver.layer, run.point.name]
         yield against_run(driver, PROCESS, run, "a fresh process", "this process", there)
-
-
-def pickled(
-    answer: Answer,
-    driver: InterfaceDriver,
-    runs: Sequence[ReferenceRun],
-    states: dict[str, State],
-) -> Iterator[AuditFinding]:
-    """The future of a State that was pickled to another process, against its future here."""
-    for run in runs:
-        here = driver.future(run.point, states[run.point.name], run.steps)
-        off = gap(here, answer[1][run.point.name], driver.coordinates)
-        yield finding_of(
-            driver, PICKLED, run, "a pickled State, in a fresh one", "in this process", off
-        )
+    if isinstance(driver, InterfaceDriver):
+        for run in runs:
+            here = driver.future(run.point, states[run.point.name], run.steps)
+            off = gap(here, futures[run.point.name], driver.coordinates)
+            case = "a pickled State, in a fresh one"
+            yield finding_of(driver, PICKLED, run, case, "in this process", off)

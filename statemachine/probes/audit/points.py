@@ -28,30 +28,8 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
         model: The model.
         seed: Of the command in motion.
     """
-    found: list[SavePoint] = []
-    without: list[str] = []
-
-    def add(
-        name: str, how: str, qpos: Array, qvel: Array, ctrl: Array, seconds: float,
-        lacks: str = "", limp: bool = False, **special: bool,
-    ) -> None:  # fmt: skip
-        variant = model
-        try:
-            variant = model.replace(actuation=False) if limp and model.nu else model
-        except UnsupportedError as error:
-            lacks = lacks or str(error)
-        if lacks:
-            without.append(f"{name}: {lacks}")
-            return
-        steps, ctrl = min(max(round(seconds / model.timestep), 1), _LONGEST), within(model, ctrl)
-        found.append(
-            SavePoint(name, how, variant, qpos, qvel, ctrl, steps, powered=not limp, **special)
-        )
-
     with make_data(model) as data:
         zero, still, none = data.qpos.copy(), np.zeros(model.nv), np.zeros(model.nu)
-    add("default", "default pose, no command, and time to settle", zero, still, none, _SETTLE)
-
     air, thrown = zero.copy(), still.copy()
     free = np.flatnonzero(model.jnt_type == int(JointType.FREE))
     for place, dof in zip(model.jnt_qposadr[free], model.jnt_dofadr[free], strict=True):
@@ -60,24 +38,12 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
     ways = ["free bodies thrown"] if len(free) else []
     ways += ["each servo on its way"] if model.nu else []
     stir = np.random.default_rng(seed).uniform(-STIR, STIR, model.nu)
-    add("motion", ", ".join(ways) or "default pose, let go", air, thrown, stir, _WAY)
 
-    lacks = "" if model.keyframes else "the model has no keyframe"
     key = model.keyframes[0] if model.keyframes else Keyframe("", 0.0, zero, still, none)
-    start = "default pose" if lacks else f"keyframe {key.name!r}" if key.name else "keyframe 0"
+    start = f"keyframe {key.name!r}" if key.name else "keyframe 0"
+    start = start if model.keyframes else "default pose"
     moved = key.ctrl.copy()
     moved[: len(_MOVE)] += _MOVE[: model.nu]
-    add(
-        *("keyframe", f"{start}, command moved away from it"),
-        *(key.qpos, key.qvel, moved, 2 * _WAY, lacks),
-    )
-
-    lacks = "" if model.nu else "the model has no servo to switch off"
-    add(
-        *("limp", "default pose, servos off, and time to fall"),
-        *(zero, still, none, _FALL, lacks),
-        limp=True,
-    )
 
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     limited = np.flatnonzero(model.jnt_limited & scalar)
@@ -86,18 +52,66 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
     near, towards = air.copy(), thrown.copy()
     near[model.jnt_qposadr[limited]] = upper - reach
     towards[model.jnt_dofadr[limited]] = reach / (_ARRIVAL * model.timestep)
-    lacks = "" if len(limited) else "no joint of the model has a limit"
-    add(
-        *("limit", "servos off, each joint run into its upper limit"),
-        *(near, towards, none, (_ARRIVAL + 3) * model.timestep, lacks),
-        limp=True,
-        at_limit=True,
-    )
 
-    lacks = "" if model.nu else "the model has no actuator"
-    add(
-        *("clock", f"{start}, a controller that reads the time before each step"),
-        *(key.qpos, key.qvel, key.ctrl, 2 * _WAY, lacks),
-        swings=True,
+    # Name, how to get there, (qpos, qvel, ctrl), seconds before the save, what the model lacks for
+    # it, and what is special about it.
+    candidates: tuple[
+        tuple[str, str, tuple[Array, Array, Array], float, str, dict[str, bool]], ...
+    ] = (
+        (
+            "default",
+            "default pose, no command, and time to settle",
+            (zero, still, none),
+            _SETTLE,
+            "",
+            {},
+        ),
+        ("motion", ", ".join(ways) or "default pose, let go", (air, thrown, stir), _WAY, "", {}),
+        (
+            "keyframe",
+            f"{start}, command moved away from it",
+            (key.qpos, key.qvel, moved),
+            2 * _WAY,
+            "" if model.keyframes else "the model has no keyframe",
+            {},
+        ),
+        (
+            "limp",
+            "default pose, servos off, and time to fall",
+            (zero, still, none),
+            _FALL,
+            "" if model.nu else "the model has no servo to switch off",
+            {"powered": False},
+        ),
+        (
+            "limit",
+            "servos off, each joint run into its upper limit",
+            (near, towards, none),
+            (_ARRIVAL + 3) * model.timestep,
+            "" if len(limited) else "no joint of the model has a limit",
+            {"powered": False, "at_limit": True},
+        ),
+        (
+            "clock",
+            f"{start}, a controller that reads the time before each step",
+            (key.qpos, key.qvel, key.ctrl),
+            2 * _WAY,
+            "" if model.nu else "the model has no actuator",
+            {"swings": True},
+        ),
     )
-    return tuple(found), tuple(without)
+    save_points: list[SavePoint] = []
+    without: list[str] = []
+    for name, how, (qpos, qvel, ctrl), seconds, lacks, special in candidates:
+        variant, reason = model, lacks
+        if model.nu and not special.get("powered", True):
+            try:
+                variant = model.replace(actuation=False)
+            except UnsupportedError as error:
+                reason = lacks or str(error)
+        if reason:
+            without.append(f"{name}: {reason}")
+            continue
+        steps, command = min(max(round(seconds / model.timestep), 1), _LONGEST), within(model, ctrl)
+        save_points.append(SavePoint(name, how, variant, qpos, qvel, command, steps, **special))
+    return tuple(save_points), tuple(without)

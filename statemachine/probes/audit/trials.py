@@ -36,7 +36,7 @@ NOT_RESTORED = "not restored"
 EACH_OTHER = "each other"  # the futures of several restores, instead of one and the reference
 _PIECES = (7, 1, 22)  # steps a call, over and over
 _THREADS = 4
-_EACH = 2  # runs of each point
+_RUNS = 2  # of each point
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,7 @@ def against_run(
 
 def again(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """From another new machine."""
-    with driver.at(run.point) as machine:
-        future = driver.drive(machine, run.point, run.steps)
+    future = driver.run(run.point, run.steps).future
     yield against_run(driver, AGAIN, run, "in a new one", "the first run", future)
 
 
@@ -161,16 +160,13 @@ def beside(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
 
 def threads(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFinding]:
     """All points at once, twice each, on a pool of threads; one machine a run."""
-
-    def once(point: SavePoint, steps: int) -> Array:
-        with driver.at(point) as machine:
-            return driver.drive(machine, point, steps)
-
+    case = f"a pool of {_THREADS} threads"
     with ThreadPoolExecutor(_THREADS) as pool:
-        jobs = [[pool.submit(once, run.point, run.steps) for _ in range(_EACH)] for run in runs]
-        for run, of in zip(runs, jobs, strict=True):
-            futures = (job.result() for job in of)
-            case = f"a pool of {_THREADS} threads"
+        jobs = [
+            [pool.submit(driver.run, run.point, run.steps) for _ in range(_RUNS)] for run in runs
+        ]
+        for run, of_run in zip(runs, jobs, strict=True):
+            futures = (job.result().future for job in of_run)
             yield against_run(driver, THREADS, run, case, "alone", *futures)
 
 
@@ -196,12 +192,8 @@ def smallest(
     driver: Driver, runs: Sequence[ReferenceRun], findings: Sequence[AuditFinding]
 ) -> Iterator[AuditFinding]:
     """Only the components without which something differed, tried at each point."""
-    broke = [
-        finding.case
-        for finding in findings
-        if finding.experiment == WITHOUT and not finding.gap.exact
-    ]
-    way = driver.only(tuple(dict.fromkeys(broke)))
+    needed = [f.case for f in findings if f.experiment == WITHOUT and not f.gap.exact]
+    way = driver.only(tuple(dict.fromkeys(needed)))
     if way is not None:
         for run in runs:
             yield from tried(driver, run, way)
