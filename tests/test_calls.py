@@ -20,12 +20,11 @@ import pytest
 from statemachine import backends, installed
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
+from statemachine.engines.call_watch import CLOSED, NEW
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.page import Page, Table
 from statemachine.probes import calls
 from statemachine.probes.calls import (
-    CLOSED,
-    NEW,
     CallRecorder,
     CallRecording,
     Statement,

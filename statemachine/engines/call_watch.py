@@ -21,6 +21,8 @@ from ..interface import Model
 
 _FUNCTIONS = (types.BuiltinFunctionType, types.FunctionType)
 Contents = dict[str, bytes]  # all that is in something, by name
+# What stands in a list of what changed for something that was not there before, or is no more.
+NEW, CLOSED = "new", "closed"
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,11 @@ class WatchedObject(ABC):
         kind: What it is, for one that has no label.
         label: How it is called for a reader; empty until a variable leads to it.
         named: Whether a variable of the code leads to it.
-        seen: What was in it when it was last looked at.
     """
 
     def __init__(self, kind: str, thing: Any) -> None:
         self.kind, self.label, self.named = kind, "", False
-        self.seen: Contents | None = None
+        self._seen: Contents | None = None
         self._thing = weakref.ref(thing)
 
     @property
@@ -79,9 +80,16 @@ class WatchedObject(ABC):
         """Its label, or what there is to say of one that no variable ever led to."""
         return self.label or f"{self.kind} {'for a moment' if self.gone else 'without a name'}"
 
-    def look(self, thoroughly: bool = False) -> Contents | None:
-        """All that is in it, as bytes by name; None if it is gone."""
-        return None if self.gone else self.contents(thoroughly)
+    def look_again(self, thoroughly: bool = False) -> dict[str, str]:
+        """What differs from the last look: fields, and which of their entries; `CLOSED` if gone."""
+        if self.gone:
+            return {CLOSED: CLOSED}
+        before, now = self._seen, self.contents(thoroughly)
+        self._seen = {**(before or {}), **now}
+        changed = [] if before is None else self.differing(before, now)
+        return {
+            name: self.entry(name, (before or {}).get(name, b""), now[name]) for name in changed
+        }
 
     @abstractmethod
     def contents(self, thoroughly: bool) -> Contents:

@@ -13,18 +13,15 @@ import io
 import linecache
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import redirect_stdout
+from contextlib import ExitStack, contextmanager, redirect_stdout
 from dataclasses import dataclass
 from typing import Any
 
 from ..engines import room, rooms_with
-from ..engines.call_watch import CallWatch, WatchedObject
+from ..engines.call_watch import NEW, CallWatch, WatchedObject
 from ..errors import BadInputError, StateMachineError, check_name
 from ..installed import engine_version, require
 from ..interface import Model
-
-# What stands in `Call.changed` for something that was not there before, or is no more.
-NEW, CLOSED = "new", "closed"
 
 
 @dataclass(frozen=True)
@@ -95,40 +92,34 @@ class CallRecording:
 
 
 class CallRecorder:
-    """Functions of engines replaced while it is entered; one at a time in a process."""
+    """Looks at the functions of engines while they are `replaced`; one in a process."""
 
     _active = False
 
     def __init__(self, watches: Sequence[CallWatch]) -> None:
         self._watches = watches
-        self._replaced: list[tuple[Any, str, Any]] = []
         self.begin()
         self._listening = False  # only while a statement runs, and not within a call
 
-    def __enter__(self) -> CallRecorder:
+    @contextmanager
+    def replaced(self) -> Iterator[None]:
+        """Until the end of the block the functions tell this recorder that they are called."""
         if CallRecorder._active:
             raise BadInputError("a run that is recorded cannot record another")
-        CallRecorder._active = True
-        try:
+        with ExitStack() as restore:
+            restore.callback(setattr, CallRecorder, "_active", False)
+            restore.callback(setattr, self, "_listening", False)
+            CallRecorder._active = True
             for watch in self._watches:
                 for owner, attribute, function in watch.functions():
-                    self._replace(watch, owner, attribute, function)
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
+                    original = vars(owner)[attribute]  # as it lies there: of a class, a descriptor
+                    counted = self._counted(watch, function, getattr(owner, attribute))
+                    static = isinstance(original, staticmethod)
+                    restore.callback(setattr, owner, attribute, original)
+                    setattr(owner, attribute, staticmethod(counted) if static else counted)
+            yield
 
-    def __exit__(self, *exc: object) -> None:
-        self._listening = False
-        while self._replaced:
-            setattr(*self._replaced[-1])
-            self._replaced.pop()  # after it, so that no interrupt leaves one out
-        CallRecorder._active = False
-
-    def _replace(self, watch: CallWatch, owner: Any, attribute: str, function: str) -> None:
-        original = vars(owner)[attribute]  # as it lies there: of a class, a descriptor
-        bare = getattr(owner, attribute)
-
+    def _counted(self, watch: CallWatch, function: str, bare: Any) -> Callable[..., Any]:
         @functools.wraps(bare)
         def counted(*args: Any, **kwargs: Any) -> Any:
             # A Data keeps the function that it was made with: it may outlive the recording.
@@ -136,9 +127,7 @@ class CallRecorder:
                 return bare(*args, **kwargs)
             return self._call(watch, function, bare, args, kwargs)
 
-        static = isinstance(original, staticmethod)
-        self._replaced.append((owner, attribute, original))
-        setattr(owner, attribute, staticmethod(counted) if static else counted)
+        return counted
 
     def begin(self) -> None:
         """A statement is about to run."""
@@ -199,33 +188,19 @@ class CallRecorder:
                 called = watch.engine, function, made or next(iter(objects), None)
                 self._counts[called] += 1
                 if made:
-                    made.seen = made.look()
+                    made.look_again()
                     self._changed[called][made, NEW] = None
                 for watched in objects:
-                    for field in _changed(watched):
+                    for field in watched.look_again():
                         self._changed[called][watched, field] = None
         finally:
             self._listening = True
 
     def _note_writes(self, watched: WatchedObject, thoroughly: bool = False) -> None:
         """Whatever differs from the last look was changed by no call."""
-        before, now = watched.seen, watched.look(thoroughly)
-        if now is None:
-            return
-        if before is not None:
-            for field in watched.differing(before, now):
-                entry = watched.entry(field, before.get(field, b""), now[field])
+        if not watched.gone:
+            for field, entry in watched.look_again(thoroughly).items():
                 self._written[watched, field].add(entry)
-        watched.seen = {**(before or {}), **now}
-
-
-def _changed(watched: WatchedObject) -> list[str]:
-    """What differs from the look before a call."""
-    before, now = watched.seen, watched.look()
-    if now is None or before is None:
-        return [CLOSED] if now is None else []
-    watched.seen = {**before, **now}
-    return watched.differing(before, now)
 
 
 def recorded_engines() -> list[str]:
@@ -258,7 +233,8 @@ def record(code: str, engine: str) -> CallRecording:
     namespace: dict[str, Any] = {"__name__": "__main__"}
     done: list[Statement] = []
     error = None
-    with CallRecorder(watches) as recorder:
+    recorder = CallRecorder(watches)
+    with recorder.replaced():
         for source, line, run in statements(code):
             out = io.StringIO()
             recorder.begin()

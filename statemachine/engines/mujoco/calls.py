@@ -39,20 +39,16 @@ class _MjData(_Object):
 
     def contents(self, thoroughly: bool) -> Contents:
         data = self.thing
-        if not _MjData._fields:
-            _MjData._fields = _fields(data)
-        contents = {}
-        for name in _MjData._fields:
-            value = getattr(data, name)
-            contents[name] = value.tobytes() if isinstance(value, np.ndarray) else _bytes(value)
-        contact = data.contact
-        contents["contact"] = b"".join(getattr(contact, part).tobytes() for part in _CONTACT)
+        _MjData._fields = _MjData._fields or _fields(data)
+        contents = {name: _bytes(getattr(data, name)) for name in _MjData._fields}
+        contacts = data.contact
+        contents["contact"] = b"".join(getattr(contacts, part).tobytes() for part in _CONTACT)
         return contents
 
     def entry(self, field: str, before: bytes, after: bytes) -> str:
         value = getattr(self.thing, field)
-        whole = not isinstance(value, np.ndarray) or value.ndim != 1
-        return field if whole else entries(field, before, after, value.itemsize)
+        flat = isinstance(value, np.ndarray) and value.ndim == 1
+        return entries(field, before, after, value.itemsize) if flat else field
 
 
 class _MjModel(_Object):
@@ -66,11 +62,11 @@ class _MjModel(_Object):
         self._options = [name for name in dir(thing.opt) if not name.startswith("_")]
 
     def contents(self, thoroughly: bool) -> Contents:
-        model = self.thing
-        options = model.opt
-        contents = {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options}
+        model, options = self.thing, self.thing.opt
         names = [name for name, size in self._sizes.items() if thoroughly or size <= _LARGE]
-        return contents | {name: getattr(model, name).tobytes() for name in names}
+        return {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options} | {
+            name: getattr(model, name).tobytes() for name in names
+        }
 
 
 def _bytes(value: Any) -> bytes:
