@@ -32,7 +32,6 @@ from ..interface import (
     make_data,
     set_state,
 )
-from ..measures import Gap
 from ..measures.readings import Readings, readings
 from ..measures.text import count, few, listed, milliseconds
 from ..rotations import times
@@ -100,27 +99,28 @@ class Scratch:
         self._data.close()
 
 
-def row(model: Model, name: str, held: Array | Contacts, now: Array | Contacts, age: Age) -> Row:
-    """What is to be told of one array."""
-    if same(held, now):
+def row(
+    model: Model, name: str, age: Age, held: Array | Contacts, now: Array | Contacts | None
+) -> Row:
+    """What is to be told of one array.
+
+    Args:
+        model: Of the Data.
+        name: Of `DERIVED`, or "contacts".
+        age: How old it is, if it is not of now.
+        held: What the Data says.
+        now: What `forward` would compute; None where the present state is no state.
+    """
+    if now is not None and same(held, now):
         return Row(name, True, 0, 0, "now", ())
-    return stale_row(model, name, age, gaps(model, name, held, now))
-
-
-def stale_row(model: Model, name: str, age: Age, found: tuple[Gap, ...]) -> Row:
-    """What is to be told of an array that is not of now, and off by `found`."""
+    off = () if now is None else gaps(model, name, held, now)
     if age.never:
-        return Row(name, False, None, None, "never computed", found)
-    writes = None
-    if age.writes is not None:
-        writes = sum(age.writes[each] for each in DEPEND[name])
-    words = []
-    if age.steps:
-        words.append(count(age.steps, "substep" if model.substeps > 1 else "step"))
-    if writes:
-        words.append(count(writes, "write"))
+        return Row(name, False, None, None, "never computed", off)
+    writes = None if age.writes is None else sum(age.writes[part] for part in DEPEND[name])
+    words = [count(age.steps, "substep" if model.substeps > 1 else "step")] if age.steps else []
+    words += [count(writes, "write")] if writes else []
     of = f"{listed(words)} ago" if words else "an earlier state"
-    return Row(name, False, age.steps, writes, of, found)
+    return Row(name, False, age.steps, writes, of, off)
 
 
 def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Age:
@@ -165,26 +165,26 @@ def back(model: Model, qpos: Array, qvel: Array, seconds: float) -> Array:
 
     The inverse of `mj_integratePos`: a quaternion turns about an axis of the body.
     """
-    found = np.array(qpos)
+    earlier = np.array(qpos)
     for joint, kind in enumerate(model.jnt_type.tolist()):
         place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
         if kind in (JointType.HINGE, JointType.SLIDE):
-            found[place] -= seconds * qvel[dof]
+            earlier[place] -= seconds * qvel[dof]
             continue
         if kind == JointType.FREE:
-            found[place : place + 3] -= seconds * qvel[dof : dof + 3]
+            earlier[place : place + 3] -= seconds * qvel[dof : dof + 3]
             place, dof = place + 3, dof + 3
         spin = qvel[dof : dof + 3]
         speed = float(np.linalg.norm(spin))
         if speed:
             half = -seconds * speed / 2
             turn = np.array([math.cos(half), *(math.sin(half) * spin / speed)])
-            found[place : place + 4] = times(qpos[place : place + 4], turn)
-    return found
+            earlier[place : place + 4] = times(qpos[place : place + 4], turn)
+    return earlier
 
 
-def _poses(found: Mapping[str, Any]) -> Array:
-    return np.hstack([found["xpos"], found["xquat"]])
+def _poses(values: Mapping[str, Any]) -> Array:
+    return np.hstack([values["xpos"], values["xquat"]])
 
 
 def engine_step(model: Model) -> float:
@@ -222,8 +222,8 @@ def freshness(model: Model, data: Data) -> Freshness:
     else:
         with closing(Scratch(model)) as scratch:
             now, age = scratch.now(state), age_of(model, state, held, scratch)
-    touching = any(len(cast("Contacts", found["contacts"])) for found in (held, now))
-    rows = tuple(row(model, name, held[name], now[name], age) for name in held)
+    touching = any(len(cast("Contacts", values["contacts"])) for values in (held, now))
+    rows = tuple(row(model, name, age, held[name], now[name]) for name in held)
     return Freshness(
         backend=model.backend,
         engine_version=model.engine_version,
@@ -237,8 +237,8 @@ def freshness(model: Model, data: Data) -> Freshness:
 
 def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> Iterator[str]:
     behaviours = model.capabilities.behaviours
-    stale = [each.name for each in rows if not each.now]
-    untold = [name for name in DERIVED if name not in {each.name for each in rows}]
+    stale = [row.name for row in rows if not row.now]
+    untold = [name for name in DERIVED if name not in {row.name for row in rows}]
     if untold:
         yield f"This backend does not tell: {', '.join(untold)}."
     if not stale:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -124,14 +125,14 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     return lines
 
 
-def told(found: Sequence[Gap]) -> str:
+def told(off: Sequence[Gap]) -> str:
     """Gaps in words; what is nothing but rounding is left out beside what is more."""
-    worth = [gap for gap in found if gap.shown >= TINY]
-    return "; ".join(str(gap) for gap in worth or found[:1])
+    worth = [gap for gap in off if gap.shown >= TINY]
+    return "; ".join(str(gap) for gap in worth or off[:1])
 
 
 def gaps(model: Model, name: str, held: Array | Contacts, now: Array | Contacts) -> tuple[Gap, ...]:
-    """How far a derived array is from what it would be now; nothing if it is the same.
+    """How far a derived array is from what it would be now, which is not the same.
 
     Args:
         model: Whose bodies, sites and joints they are.
@@ -139,12 +140,9 @@ def gaps(model: Model, name: str, held: Array | Contacts, now: Array | Contacts)
         held: What the Data says.
         now: What `forward` would compute.
     """
-    if same(held, now):
-        return ()
     if isinstance(held, Contacts):
-        assert isinstance(now, Contacts)
-        return tuple(_between_contacts(model, held, now))
-    assert isinstance(now, np.ndarray)
+        return tuple(_between_contacts(model, held, cast("Contacts", now)))
+    now = cast("Array", now)
     owners = model.site_names if name.startswith("site") else model.body_names
     if name in ("xpos", "site_xpos"):
         return (Gap.of(np.linalg.norm(now - held, axis=1), "m", owners),)
@@ -163,11 +161,8 @@ def same(held: Array | Contacts, now: Array | Contacts) -> bool:
 def _rotated(name: str, held: Array, now: Array, owners: Sequence[str]) -> Gap:
     if not np.abs(held).max(axis=1).all():  # never computed
         return Gap(None, "rad", "")
-    if name == "xquat":
-        one, two = matrix_from_quat(held), matrix_from_quat(now)
-    else:
-        one, two = held.reshape(-1, 3, 3), now.reshape(-1, 3, 3)
-    return Gap.of(angle_between(one, two), "rad", owners)
+    turns = matrix_from_quat if name == "xquat" else lambda matrices: matrices.reshape(-1, 3, 3)
+    return Gap.of(angle_between(turns(held), turns(now)), "rad", owners)
 
 
 def _by_unit(model: Model, name: str, change: Array) -> Iterator[Gap]:
@@ -175,50 +170,49 @@ def _by_unit(model: Model, name: str, change: Array) -> Iterator[Gap]:
 
     The three entries of a free or a ball joint that belong together are one vector.
     """
-    vectors = _vectors(model)
-    sizes = np.hypot.reduceat(np.abs(change), [start for _, _, start in vectors])
-    owners = [owner for owner, _, _ in vectors]
-    linear = np.array([each for _, each, _ in vectors])
+    joints = zip(model.joint_names, model.jnt_type.tolist(), model.jnt_dofadr.tolist(), strict=True)
+    vectors = [
+        (name, in_metres, start + 3 * k)
+        for name, kind, start in joints
+        for k, in_metres in enumerate(_VECTORS[JointType(kind)])
+    ]
+    owners, units_of, starts = zip(*vectors, strict=True)
+    sizes, linear = np.hypot.reduceat(np.abs(change), starts), np.array(units_of)
     units = ("m/s²", "rad/s²") if name == "qacc" else ("N", "N·m")
     for unit, chosen in zip(units, (linear, ~linear), strict=True):
         if sizes[chosen].any():
             yield Gap.of(np.where(chosen, sizes, -1.0), unit, owners)
 
 
-def _vectors(model: Model) -> list[tuple[str, bool, int]]:
-    """Of what belongs together among the degrees of freedom: its joint, in metres or not, start."""
-    found = []
-    joints = zip(model.joint_names, model.jnt_type.tolist(), model.jnt_dofadr.tolist(), strict=True)
-    for name, kind, start in joints:
-        if kind == JointType.FREE:
-            found += [(name, True, start), (name, False, start + 3)]
-        else:
-            found.append((name, kind == JointType.SLIDE, start))
-    return found
+# What belongs together among a joint's degrees of freedom, in this order: in metres or in radians.
+_VECTORS = {
+    JointType.FREE: (True, False),
+    JointType.BALL: (False,),
+    JointType.SLIDE: (True,),
+    JointType.HINGE: (False,),
+}
 
 
 def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[Gap]:
-    pairs = [tuple(pair) for pair in held.geom.tolist()], [tuple(p) for p in now.geom.tolist()]
-    called = ContactNames.of(model)
-    names = {pair: called.geoms(*pair) for pair in (*pairs[0], *pairs[1])}
-    kept: list[tuple[int, int]] = []
+    pairs = [[tuple(pair) for pair in contacts.geom.tolist()] for contacts in (held, now)]
+    called, matched = ContactNames.of(model), list[tuple[int, int]]()
     gone, come = [], []
     for pair in dict.fromkeys((*pairs[0], *pairs[1])):
-        ours = [i for i, other in enumerate(pairs[0]) if other == pair]
-        theirs = [j for j, other in enumerate(pairs[1]) if other == pair]
+        ours, theirs = ([i for i, other in enumerate(side) if other == pair] for side in pairs)
         while ours and theirs:  # the nearest to each other are one contact
             apart = np.linalg.norm(held.pos[ours][:, None] - now.pos[theirs][None], axis=2)
             i, j = np.unravel_index(int(np.argmin(apart)), apart.shape)
-            kept.append((ours.pop(int(i)), theirs.pop(int(j))))
+            matched.append((ours.pop(int(i)), theirs.pop(int(j))))
         gone += [pair] * len(ours)
         come += [pair] * len(theirs)
     for unit, changed in (("appears", come), ("vanishes", gone)):
         if changed:
-            yield Gap(float(len(changed)), unit, names[max(changed, key=changed.count)])
-    if not kept:
+            most = max(changed, key=changed.count)
+            yield Gap(float(len(changed)), unit, called.geoms(*most))
+    if not matched:
         return
-    ours, theirs = (list(column) for column in zip(*kept, strict=True))
-    owners = [names[pairs[0][i]] for i in ours]
+    ours, theirs = (list(column) for column in zip(*matched, strict=True))
+    owners = [called.geoms(*pairs[0][i]) for i in ours]
     moved = np.linalg.norm(held.pos[ours] - now.pos[theirs], axis=1)
     sizes = {
         "m": np.maximum(moved, np.abs(held.dist[ours] - now.dist[theirs])),
@@ -226,9 +220,10 @@ def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[G
     }
     for unit, part in (("N", "force"), ("N·m", "torque")):  # along the world's axes
         before, after = (
-            np.einsum("nij,ni->nj", one.frame, getattr(one, part)) for one in (held, now)
+            np.einsum("nij,ni->nj", contacts.frame, getattr(contacts, part))
+            for contacts in (held, now)
         )
         sizes[unit] = np.linalg.norm(before[ours] - after[theirs], axis=1)
-    for unit, each in sizes.items():
-        if each.any():
-            yield Gap.of(each, unit, owners)
+    for unit, apart in sizes.items():
+        if apart.any():
+            yield Gap.of(apart, unit, owners)

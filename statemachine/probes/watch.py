@@ -21,7 +21,7 @@ from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from ..measures import Gap
 from ..measures.readings import readings
 from ..measures.text import few
-from .freshness import DEPEND, Age, Scratch, age_of, row, stale_row
+from .freshness import DEPEND, Age, Scratch, age_of, row
 from .stale_rows import Row, StaleRead, table, told
 
 _PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
@@ -66,13 +66,13 @@ class Watch:
         get_state(model, data)  # what is wrong with them is said here
         self._model, self._data, self._raise = model, data, raise_on_stale
         self.reads = 0
-        self._found: dict[tuple[str, str, str], StaleRead] = {}
+        self._stale: dict[tuple[str, str, str], StaleRead] = {}
         self._aside = False
 
     @property
     def stale_reads(self) -> tuple[StaleRead, ...]:
         """What was read while it was stale: by array, line and moment, in order of appearance."""
-        return tuple(self._found.values())
+        return tuple(self._stale.values())
 
     def __str__(self) -> str:
         stale = sum(read.count for read in self.stale_reads)
@@ -136,24 +136,19 @@ class Watch:
             return
         self.reads += 1
         with self.aside():
-            found = self._row(name, held)
-        if found is None or found.now:
+            age, state = self.age(), self._state()
+            if state is not None and state == self._fresh:
+                return
+            now = None if state is None else self.scratch.now(state)[name]
+            stale = row(self._model, name, age, held, now)
+        if stale.now:
             return
         if self._raise:
-            raise _stale_read(found, [e for e in self._entries() if e.startswith(DEPEND[name])])
-        key = name, _place(), found.of
-        known = self._found.get(key, StaleRead(name, key[1], 0, found.of, ()))
-        worst = _worst(known.gaps, found.gaps)
-        self._found[key] = replace(known, count=known.count + 1, gaps=worst)
-
-    def _row(self, name: str, held: Array | Contacts) -> Row | None:
-        age = self.age()
-        state = self._state()
-        if state is None:
-            return stale_row(self._model, name, age, ())
-        if self._fresh == state:
-            return None
-        return row(self._model, name, held, self.scratch.now(state)[name], age)
+            raise _stale_read(stale, [e for e in self._entries() if e.startswith(DEPEND[name])])
+        key = name, _place(), stale.of
+        known = self._stale.get(key, StaleRead(name, key[1], 0, stale.of, ()))
+        worst = _worst(known.gaps, stale.gaps)
+        self._stale[key] = replace(known, count=known.count + 1, gaps=worst)
 
     def _state(self) -> State | None:
         """The present state; None where what was written is no number: there is no now."""
@@ -224,26 +219,25 @@ def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
     return cast("Any", type(kind))(kind.__name__, (kind,), members)
 
 
-def _stale_read(found: Row, entries: list[str]) -> StaleReadError:
-    never = found.of == "never computed"
-    facts = [told(found.gaps)] if found.gaps else []
-    if entries and not never:
-        facts.append(f"written since: {few(entries)}")
-    said = f"{found.name} {'was' if never else 'is of'} {found.of}"
+def _stale_read(stale: Row, entries: list[str]) -> StaleReadError:
+    never = stale.of == "never computed"
+    facts = [told(stale.gaps)] if stale.gaps else []
+    facts += [f"written since: {few(entries)}"] if entries and not never else []
+    said = f"{stale.name} {'was' if never else 'is of'} {stale.of}"
     said += f" ({'; '.join(facts)})" if facts else ""
     return StaleReadError(
         f"{said}: call sm.forward(model, data) before reading it",
-        name=found.name,
-        steps=found.steps,
-        writes=found.writes,
-        gaps=found.gaps,
+        name=stale.name,
+        steps=stale.steps,
+        writes=stale.writes,
+        gaps=stale.gaps,
     )
 
 
-def _worst(one: tuple[Gap, ...], two: tuple[Gap, ...]) -> tuple[Gap, ...]:
+def _worst(before: tuple[Gap, ...], now: tuple[Gap, ...]) -> tuple[Gap, ...]:
     """Of each kind the larger gap."""
-    by_unit = {gap.unit: gap for gap in sorted((*two, *one), key=lambda gap: gap.shown)}
-    return tuple(by_unit[unit] for unit in dict.fromkeys(gap.unit for gap in (*one, *two)))
+    by_unit = {gap.unit: gap for gap in sorted((*now, *before), key=lambda gap: gap.shown)}
+    return tuple(by_unit[unit] for unit in dict.fromkeys(gap.unit for gap in (*before, *now)))
 
 
 def _place() -> str:

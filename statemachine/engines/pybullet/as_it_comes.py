@@ -44,11 +44,12 @@ def _raw(model: Model, gravity: bool = True, damping: bool = True) -> closing[Wo
 def terms(model: Model) -> tuple[Term, ...]:
     """What the interface's names are on this engine, by looking at a loaded model."""
     with _raw(model) as world:
-        joints = [term for tree in world.trees for term in _joint_terms(world, tree, model)]
-        free = [tree for tree in world.trees if tree.free]
-        turned = [term for tree in free for term in _free_terms(world, tree, model)]
-        frames = [term for tree in world.trees for term in _frame_terms(world, tree, model)]
-    return (*joints, *turned, *frames)
+        return tuple(
+            term
+            for terms_of in (_joint_terms, _free_terms, _frame_terms)
+            for tree in world.trees
+            for term in terms_of(world, tree, model)
+        )
 
 
 def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
@@ -63,7 +64,9 @@ def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
 
 
 def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
-    """A quarter turn about z, and a spin about the body's own x."""
+    """Of a free body: a quarter turn about z, and a spin about the body's own x."""
+    if not tree.free:
+        return
     qpos, qvel = np.zeros(model.nq), np.zeros(model.nv)
     for _, start in model._quaternions:
         qpos[start : start + 4] = (np.sqrt(0.5), 0, 0, np.sqrt(0.5))
@@ -154,8 +157,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
 
 def _explicit(world: World, tree: Tree) -> float:
     """The largest eigenvalue of h·D/M where the tree stands."""
-    states = pb.getJointStates(tree.body, tree.joints, world.client)
-    places = [state[0] for state in states]
+    places = [state[0] for state in pb.getJointStates(tree.body, tree.joints, world.client)]
     mass = np.array(pb.calculateMassMatrix(tree.body, places, physicsClientId=world.client))
     damping = [pb.getJointInfo(tree.body, i, world.client)[6] for i in tree.joints]
     return float(

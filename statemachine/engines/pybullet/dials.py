@@ -72,12 +72,11 @@ class PybulletDials:
         Raises:
             UnsupportedError: The backend cannot run it.
         """
-        build = self._with_law if "servo" in dials else self._with_motors
-        return build(dials, values)
+        return (self._with_law if "servo" in dials else self._with_motors)(dials, values)
 
     def _with_motors(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         raw = self.model.compiled
-        model = self.model.replace(**_world_options(dials, values))
+        model = cast("PybulletModel", self.model.replace(**_world_options(dials, values)))
         joint = values["damping"] if dials.get("damping") == "model" else np.zeros(raw.nv)
         acts: dict[str, Act] = {
             "inertia": partial(_set_inertias, inertias=raw.body_inertia),
@@ -134,11 +133,16 @@ class PybulletDials:
         return np.array(told)
 
 
-def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
+def _dialled(model: PybulletModel, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
     """A Model whose worlds are given some settings; what `forward` computes knows nothing of it."""
-    own = cast("PybulletModel", model)
-    every = (*own.acts, *acts)
-    return PybulletModel(plan or own.plan, own.path, own.substeps, own.defaults, own._asked, every)
+    return PybulletModel(
+        plan or model.plan,
+        model.path,
+        model.substeps,
+        model.defaults,
+        model._asked,
+        (*model.acts, *acts),
+    )
 
 
 def _world_options(dials: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -151,8 +155,7 @@ def _world_options(dials: Mapping[str, Setting], values: Mapping[str, Any]) -> d
 
 
 def _has(model: Model, name: str, value: Any) -> bool:
-    known = getattr(model, f"dof_{name}", None)
-    known = getattr(model, name, None) if known is None else known
+    known = getattr(model, f"dof_{name}", getattr(model, name, None))
     return known is not None and np.array_equal(known, value)
 
 
