@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,23 +24,15 @@ import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
 from statemachine.measures import Gap
 from statemachine.runs import record, write
-from statemachine.view import frames, words
-from statemachine.view.frames import (
-    Command,
-    Pause,
-    Play,
-    ResetTo,
-    Seek,
-    SetCtrl,
-    SetSpeed,
+from statemachine.view.live import Command, Live, Tempo
+from statemachine.view.session import (
+    EnginePose,
+    LiveSession,
     Snapshot,
-    Step,
+    TraceSession,
     controls_of,
 )
-from statemachine.view.live import Live, Tempo
-from statemachine.view.pace import Pacer
-from statemachine.view.recording import TraceSession
-from statemachine.view.session import LiveSession
+from statemachine.view.viser_front import readout, warning
 
 from .conftest import ROOT, Cli, assert_in, in_its_own_python, one_line, opened, refused
 from .small_models import ODD_DRIVES, model_of
@@ -71,7 +64,7 @@ def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -
         for k in range(150):
             if k == 50:
                 plain.ctrl[0] = 0.3
-                session.apply(SetCtrl(0, 0.3))
+                session.set_ctrl(0, 0.3)
             sm.step(model, plain)
             session.advance()
             frame = session.frame()
@@ -89,7 +82,7 @@ def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -
 def test_a_frame_is_a_copy(session: LiveSession) -> None:
     frame = session.frame()
     before = frame.poses[0].xpos.copy(), frame.ctrl.copy()
-    session.apply(SetCtrl(0, 1.0))
+    session.set_ctrl(0, 1.0)
     session.advance(20)
     session.frame()
     np.testing.assert_array_equal(frame.poses[0].xpos, before[0])
@@ -101,43 +94,46 @@ def test_commands_do_what_they_say(session: LiveSession) -> None:
     assert not start.running
     assert session.places == ("held", "pickup")
     assert start.time == 6
-    session.apply(Play())
+    session.play()
     assert session.frame().running
-    session.apply(Step(7))
+    session.step(7)
     frame = session.frame()
     assert (frame.running, frame.steps) == (False, 7)
     assert frame.time == pytest.approx(6 + 7 * session.timestep)
-    session.apply(Play())
-    session.apply(Pause())
+    session.play()
+    session.pause()
     assert not session.running
-    session.apply(ResetTo(1))
+    session.reset(1)
     frame = session.frame()
     assert (frame.time, frame.steps) == (59.522, 0)
-    session.apply(ResetTo())
+    session.reset()
     frame = session.frame()
     assert (frame.time, frame.resets) == (0, start.resets + 2)
     np.testing.assert_array_equal(frame.ctrl, 0)
 
 
 @pytest.mark.parametrize(
-    "command",
+    ("call", "value"),
     [
-        SetCtrl(0, math.nan),
-        SetCtrl(6, 0.0),
-        SetCtrl(-1, 0.0),
-        Step(0),
-        Step(10**9),
-        ResetTo(2),
-        ResetTo(-1),
-        Seek(1.0),
+        ("set_ctrl", (0, math.nan)),
+        ("set_ctrl", (6, 0.0)),
+        ("set_ctrl", (-1, 0.0)),
+        ("step", (0,)),
+        ("step", (10**9,)),
+        ("reset", (2,)),
+        ("reset", (-1,)),
+        ("seek", (1.0,)),
+        *(("set_speed", (speed,)) for speed in (0, -1, math.nan, math.inf, 1e9)),
     ],
 )
-def test_what_cannot_be_done_is_refused_and_changes_nothing(command: Command) -> None:
+def test_what_cannot_be_done_is_refused_and_changes_nothing(
+    call: str, value: tuple[float, ...]
+) -> None:
     with LiveSession([sm.load(SCENE)], "held") as session:
-        session.apply(Play())
+        session.play()
         before = session.frame()
         with pytest.raises((BadInputError, UnknownNameError)):
-            session.apply(command)
+            getattr(session, call)(*value)
         after = session.frame()
         assert (after.time, after.running, after.resets) == (before.time, True, before.resets)
         np.testing.assert_array_equal(after.ctrl, before.ctrl)
@@ -147,8 +143,8 @@ def test_what_cannot_be_done_is_refused_and_changes_nothing(command: Command) ->
 def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
     models = [sm.load(SCENE, backend=name) for name in ("mujoco", "pybullet")]
     with LiveSession(models) as session:
-        session.apply(SetCtrl(1, -0.6))
-        session.apply(SetCtrl(2, 1.2))
+        session.set_ctrl(1, -0.6)
+        session.set_ctrl(2, 1.2)
         session.advance(300)
         frame = session.frame()
         assert [pose.name for pose in frame.poses] == ["mujoco", "pybullet"] == list(session.names)
@@ -156,30 +152,29 @@ def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
         np.testing.assert_array_equal(one.ctrl, two.ctrl)
         assert one.time == pytest.approx(two.time)
         assert one.qpos[2] > 1.0  # it went there, on both
-        gap: Any = frame.gap
         tips: Any = [pose.tip for pose in frame.poses]
-        assert gap.tip == pytest.approx(math.dist(tips[0], tips[1]))
+        assert frame.tips_apart == pytest.approx(math.dist(tips[0], tips[1]))
         apart = np.abs(one.qpos - two.qpos)[:6]  # what follows is the box
         name = models[0].joint_names[int(apart.argmax())]
-        assert gap.joint == Gap(apart.max(), "rad", name)
+        assert frame.joint_apart == Gap(apart.max(), "rad", name)
         assert apart.max() < math.radians(1)
 
 
 def test_a_ghost_that_falls_is_far_away(mujoco_scene: sm.Model) -> None:
     with LiveSession([mujoco_scene, mujoco_scene.replace(actuation=False)]) as session:
         session.advance(200)
-        gap: Any = session.frame().gap
-        assert gap.joint.where == "shoulder_lift"
-        assert 20 < gap.joint.shown < 30  # 23.9°, as the lesson has it
-        assert gap.tip > 0.1
+        frame: Any = session.frame()
+        assert frame.joint_apart.where == "shoulder_lift"
+        assert 20 < frame.joint_apart.shown < 30  # 23.9°, as the lesson has it
+        assert frame.tips_apart > 0.1
 
 
 def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
     with LiveSession([odd, odd]) as session:
         session.advance(3)
         good = session.frame()
-        session.apply(Play())
-        session.apply(SetCtrl(2, 1e150))
+        session.play()
+        session.set_ctrl(2, 1e150)
         session.advance(5)
         bad = session.frame()
         assert not bad.running
@@ -187,11 +182,11 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
         assert bad.time == good.time  # the last moment that was good
         assert bad.steps == good.steps
         np.testing.assert_array_equal(bad.poses[0].xpos, good.poses[0].xpos)
-        session.apply(Play())
+        session.play()
         assert not session.running
-        session.apply(Step(3))
+        session.step(3)
         assert session.frame().trouble == bad.trouble
-        session.apply(ResetTo())
+        session.reset()
         session.advance(3)
         again = session.frame()
         assert again.trouble == ""
@@ -204,11 +199,11 @@ def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
     models = [sm.load("so101/scene", backend=name) for name in ("mujoco", "pybullet")]
     with LiveSession(models) as session:
         session._arms[1][1].qvel[0] = math.nan
-        session.apply(Play())
+        session.play()
         session.advance()
         assert not session.running
         assert session.frame().trouble.startswith("pybullet: ")
-        session.apply(ResetTo())
+        session.reset()
         session.advance(10)
         assert session.frame().trouble == ""
 
@@ -253,25 +248,6 @@ def test_the_fingertip_is_the_usual_site_or_the_one_that_was_named(
 
 
 # The clock
-
-
-def test_the_pacer_counts_the_steps_of_the_clock() -> None:
-    pacer = Pacer(0.005, 1.0, now=100.0)
-    for now, due in ((100.0, 0), (100.0049, 0), (100.005, 1), (101.0, 200)):
-        assert pacer.due(now) == due
-    pacer.took(200, 101.0)
-    assert pacer.due(101.0) == 0
-    assert pacer.factor(101.0) == pytest.approx(1)
-    pacer.set_speed(0.1, 101.0)
-    assert pacer.due(102.0) == 20
-    assert pacer.lag(102.0) == pytest.approx(1)
-    assert pacer.factor(101.1) is None  # too soon to tell
-    pacer.give_up(102.0)
-    assert pacer.due(102.0) == 0
-    for wrong in (0, -1, math.nan, math.inf, 1e9):
-        with pytest.raises(BadInputError):
-            pacer.set_speed(wrong, 103.0)
-    assert pacer.speed == 0.1
 
 
 class Clock:
@@ -330,13 +306,14 @@ def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Sna
 def live(cost: float = 0.0, speed: float = 1.0) -> Iterator[tuple[Slow, Live, Hand, Clock]]:
     clock, hand = Clock(), Hand()
     with Slow(clock, cost) as session:
-        yield session, Live(session, hand, speed, clock, clock.sleep), hand, clock
+        session.set_speed(speed)
+        yield session, Live(session, hand, clock, clock.sleep), hand, clock
 
 
 @pytest.mark.parametrize("speed", [0.1, 1.0, 3.0])
 def test_time_follows_the_clock(speed: float) -> None:
     with live(cost=0.0001, speed=speed) as (session, loop, hand, clock):
-        hand.asked.append(Play())
+        hand.asked.append(session.play)
         began = clock.now
         loop.run(seconds=2.0)
         frame, pace, _ = hand.shown[-1]
@@ -349,7 +326,7 @@ def test_time_follows_the_clock(speed: float) -> None:
 
 def test_an_engine_that_is_too_slow_is_said_and_does_not_lag_ever_more() -> None:
     with live(cost=0.010) as (session, loop, hand, _clock):
-        hand.asked.append(Play())
+        hand.asked.append(session.play)
         loop.run(seconds=3.0)
         _, pace, _ = hand.shown[-1]
         assert pace.reached == pytest.approx(0.5, abs=0.05)  # 5 ms of it in 10 ms
@@ -366,43 +343,45 @@ def test_an_engine_that_is_too_slow_is_said_and_does_not_lag_ever_more() -> None
 
 
 def test_time_that_stood_is_not_owed() -> None:
-    with live() as (_, loop, hand, _clock):
+    with live() as (session, loop, hand, _clock):
         loop.run(seconds=5.0)
         assert hand.shown[-1][0].time == 0
         assert hand.shown[-1][1].reached is None
-        assert turned(loop, hand, Play(), turns=2)[0].time <= 0.051
-        standing = turned(loop, hand, Step(1))[0].time
+        assert turned(loop, hand, session.play, turns=2)[0].time <= 0.051
+        standing = turned(loop, hand, session.step)[0].time
         loop.run(seconds=2.0)
         assert hand.shown[-1][0].time == standing
-        assert turned(loop, hand, Play(), turns=2)[0].time <= standing + 0.051
+        assert turned(loop, hand, session.play, turns=2)[0].time <= standing + 0.051
 
 
 def test_a_bad_command_is_a_note_until_the_next_one() -> None:
-    with live() as (_, loop, hand, _clock):
-        _, pace, note = turned(loop, hand, SetSpeed(2.0), SetSpeed(-1.0))
+    with live() as (session, loop, hand, _clock):
+        _, pace, note = turned(
+            loop, hand, partial(session.set_speed, 2.0), partial(session.set_speed, -1.0)
+        )
         assert "speed" in note
         assert pace.asked == 2.0
-        frame, _, note = turned(loop, hand, SetCtrl(0, 0.1))
+        frame, _, note = turned(loop, hand, partial(session.set_ctrl, 0, 0.1))
         assert (frame.ctrl[0], note) == (0.1, "")
 
 
 def test_commands_are_obeyed_in_their_order() -> None:
-    with live() as (_, loop, hand, _clock):
-        commands = SetCtrl(0, 0.5), ResetTo(), SetCtrl(0, 0.2), SetCtrl(0, 0.3)
-        assert turned(loop, hand, *commands)[0].ctrl[0] == 0.3
+    with live() as (session, loop, hand, _clock):
+        first, *rest = (partial(session.set_ctrl, 0, value) for value in (0.5, 0.2, 0.3))
+        assert turned(loop, hand, first, session.reset, *rest)[0].ctrl[0] == 0.3
 
 
 # The words
 
 
 def test_the_readout_says_what_the_frame_says() -> None:
-    pose = frames.EnginePose(
+    pose = EnginePose(
         "mujoco", np.zeros((1, 3)), np.zeros((1, 4)), np.array([0.1, -0.02, 0.3]), np.zeros(1)
     )
     ghost = dataclasses.replace(pose, name="pybullet", tip=np.array([0.1, -0.02, 0.3015]))
-    gap = frames.Separation(0.0015, Gap(math.radians(2.5), "rad", "elbow"))
-    frame = Snapshot(1.25, 250, True, np.zeros(1), 1, (pose, ghost), gap, "")
-    assert dict(words.rows(frame, Tempo(1.0, 0.997, False), "tip")).items() >= {
+    joint = Gap(math.radians(2.5), "rad", "elbow")
+    frame = Snapshot(1.25, 250, True, np.zeros(1), 1, (pose, ghost), 0.0015, joint)
+    assert dict(readout(frame, Tempo(1.0, 0.997, False), "tip")).items() >= {
         ("time", "1.250 s"),
         ("steps", "250"),
         ("pace", "1.00 × real time"),
@@ -410,11 +389,11 @@ def test_the_readout_says_what_the_frame_says() -> None:
         ("tips apart", "1.500 mm"),
         ("joints apart", "2.500°, elbow"),
     }
-    assert "0.50 ×" in dict(words.rows(frame, Tempo(2.0, 0.5, True), "tip"))["pace"]
-    assert words.warning(frame, "a note") == "a note"
-    stopped = Snapshot(1.25, 250, False, np.zeros(1), 1, (pose,), None, "mujoco: it blew up")
-    assert dict(words.rows(stopped, Tempo(1, None, False), ""))["pace"] == "paused"
-    assert words.warning(stopped, "") == "mujoco: it blew up. Reset to go on."
+    assert "0.50 ×" in dict(readout(frame, Tempo(2.0, 0.5, True), "tip"))["pace"]
+    assert warning(frame, "a note") == "a note"
+    stopped = Snapshot(1.25, 250, False, np.zeros(1), 1, (pose,), trouble="mujoco: it blew up")
+    assert dict(readout(stopped, Tempo(1, None, False), ""))["pace"] == "paused"
+    assert warning(stopped, "") == "mujoco: it blew up. Reset to go on."
 
 
 # Recordings
@@ -425,24 +404,24 @@ def test_a_recording_is_played_and_sought(mujoco_scene: sm.Model) -> None:
     fallen = record(mujoco_scene.replace(actuation=False), seconds=0.5)
     recording = TraceSession([held, fallen])
     assert recording.length == pytest.approx(0.5)  # of the shorter
-    recording.apply(Play())
+    recording.play()
     recording.advance(30)
     frame: Any = recording.frame()
     assert frame.time == pytest.approx(30 * mujoco_scene.timestep)
     np.testing.assert_array_equal(frame.poses[0].xpos, held["xpos"][30])
     np.testing.assert_array_equal(frame.poses[1].xpos, fallen["xpos"][30])
-    assert frame.gap.joint.size == np.abs(held.qpos[30] - fallen.qpos[30]).max()
+    assert frame.joint_apart.size == np.abs(held.qpos[30] - fallen.qpos[30]).max()
     recording.advance(10_000)
     end = recording.frame()
     assert (end.steps, end.running) == (100, False)
-    for command, steps in ((Seek(0.2), 40), (Step(2), 42), (Seek(-5), 0)):
-        recording.apply(command)
+    for call, value, steps in (("seek", 0.2, 40), ("step", 2, 42), ("seek", -5, 0)):
+        getattr(recording, call)(value)
         assert recording.frame().steps == steps
-    recording.apply(Seek(1e9))
-    recording.apply(Play())  # from the end, again from the start
+    recording.seek(1e9)
+    recording.play()  # from the end, again from the start
     assert (recording.frame().steps, recording.running) == (0, True)
     with pytest.raises(BadInputError):
-        recording.apply(SetCtrl(0, 1.0))
+        recording.set_ctrl(0, 1.0)
 
 
 def test_recordings_that_do_not_fit_are_refused(odd: sm.Model) -> None:
@@ -461,10 +440,10 @@ def test_moments_that_are_not_the_same_are_not_compared(mujoco_scene: sm.Model) 
     one = record(mujoco_scene, seconds=0.1)
     two = record(mujoco_scene.replace(timestep=1 / 240), seconds=0.1)
     recording = TraceSession([one, two])
-    assert recording.frame().gap is not None  # both at 0
+    assert recording.frame().joint_apart is not None  # both at 0
     recording.advance(1)
     frame = recording.frame()
-    assert frame.gap is None
+    assert (frame.joint_apart, frame.tips_apart) == (None, None)
     np.testing.assert_array_equal(frame.poses[1].xpos, two["xpos"][1])
 
 
@@ -641,12 +620,11 @@ def test_nobody_opens_a_tunnel_from_here(monkeypatch: pytest.MonkeyPatch) -> Non
     from viser import _messages, _viser
 
     from statemachine.view import server as serving
-    from statemachine.view.door import Door
 
     opened: list[object] = []
     monkeypatch.setattr(_viser, "ViserTunnel", lambda *words: opened.append(words))
     port = serving.free_port("127.0.0.1", 0)
-    server = serving.serve("127.0.0.1", port, "t", Door("127.0.0.1"))
+    server = serving.serve("127.0.0.1", port, "t", serving.Door("127.0.0.1"))
     try:
         assert isinstance(server, viser.ViserServer)
         handlers = server._websock_server._incoming_handlers[_messages.ShareUrlRequest]

@@ -11,7 +11,7 @@ import pytest
 
 from statemachine.errors import MissingEngineError
 from statemachine.view import server as serving
-from statemachine.view.door import Door
+from statemachine.view.server import Door
 
 from .conftest import assert_in
 

@@ -17,11 +17,9 @@ import statemachine as sm
 from statemachine.drawing import drawing_of
 from statemachine.runs import record
 from statemachine.view import server as serving
-from statemachine.view.door import Door
-from statemachine.view.frames import Pause, Play, ResetTo, SetCtrl
 from statemachine.view.live import Live, Tempo
-from statemachine.view.recording import TraceSession
-from statemachine.view.session import LiveSession
+from statemachine.view.server import Door
+from statemachine.view.session import LiveSession, TraceSession
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
 from .browser import Tab, browser, tabs
@@ -73,7 +71,7 @@ class Stage:
         """Everything to the start, and the time standing."""
         self.press("Reset")
         self.until(lambda: self.session.frame().time == 0)
-        self.session.apply(Pause())
+        self.session.pause()
 
     def press(self, name: str) -> None:
         """A button, by what stands on it."""
@@ -155,7 +153,7 @@ def test_a_slider_moves_the_command_and_the_arm(stage: Stage) -> None:
 
 def test_run_pause_step_and_reset(stage: Stage) -> None:
     session = stage.session
-    session.apply(SetCtrl(0, 0.5))
+    session.set_ctrl(0, 0.5)
     stage.reset()
     stage.until(lambda: stage.slider(0) == 0)  # the slider follows
     stage.press("Run")
@@ -173,7 +171,7 @@ def test_run_pause_step_and_reset(stage: Stage) -> None:
     speed = stage.tab.locator("input[inputmode=decimal]").nth(1)
     for factor in ("0.5", "1"):
         speed.fill(factor)
-        stage.until(lambda wanted=float(factor): stage.live._pacer.speed == wanted)
+        stage.until(lambda wanted=float(factor): stage.session.speed == wanted)
     stage.press("Reset")
     stage.until(lambda: session.frame().steps == 0)
     stage.tab.nothing_wrong(*KNOWN)
@@ -190,8 +188,8 @@ def test_both_arms_are_seen_and_the_ghost_can_be_put_away(stage: Stage) -> None:
     yellow, blue = _colours(stage.tab)
     assert blue < yellow / 20
     session.advance(200)
-    gap: Any = session.frame().gap
-    stage.says(f"{1000 * gap.tip:.3f} mm")
+    gap: Any = session.frame()
+    stage.says(f"{1000 * gap.tips_apart:.3f} mm")
     stage.until(lambda: _colours(stage.tab)[1] > 2000)
     assert _colours(stage.tab)[0] > 3000
     stage.tab.get_by_label("ghost: mujoco").click()
@@ -241,11 +239,11 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
     models = [sm.load("so101/scene_box", backend=name) for name in ("mujoco", "pybullet")]
     drawing = drawing_of(models[0])
     with LiveSession(models, "held") as session:
-        session.apply(SetCtrl(0, 0.7))
+        session.set_ctrl(0, 0.7)
         session.advance(100)
         server = _serve(Door("127.0.0.1"))
         try:
-            front = ViserFront(server, session, drawing, 1.0, 0)
+            front = ViserFront(server, session, drawing, 0)
             front.show(session.frame(), Tempo(1.0, None, False), "")
             placed = 0
             for root, (_, data) in zip(("/mujoco", "/pybullet ghost"), session._arms, strict=True):
@@ -274,12 +272,12 @@ def test_the_slider_of_a_recording_follows_it(mujoco_scene: sm.Model) -> None:
     try:
         front = ViserFront(server, recording, drawing_of(mujoco_scene))
         assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))
-        recording.apply(Play())
+        recording.play()
         for _ in range(40):
             recording.advance()
             front.show(recording.frame(), Tempo(1.0, None, False), "")
         assert front._seek.value == pytest.approx(40 * mujoco_scene.timestep)
-        recording.apply(ResetTo())
+        recording.reset()
         front.show(recording.frame(), Tempo(1.0, None, False), "")
         assert front._seek.value == 0
         time.sleep(0.2)

@@ -65,8 +65,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
-    from ..view.pace import checked_speed
     from ..view.server import free_port, require_viser
+    from ..view.session import checked_speed
 
     require_viser()
     checked_speed(options.speed)
@@ -109,7 +109,7 @@ def _play(options: argparse.Namespace, port: int) -> int:
     from ..backends import load
     from ..drawing import drawing_of
     from ..runs import model_file, read
-    from ..view.recording import TraceSession
+    from ..view.session import TraceSession
 
     refuse((len(options.traces) > 2, f"view shows one trace or two; got {len(options.traces)}"))
     recording = TraceSession([read(path) for path in options.traces])
@@ -148,19 +148,18 @@ def _serve(
 ) -> None:
     """Show a session until it is interrupted: the ordinary end of a server, no failure."""
     from ..view import server as serving
-    from ..view.door import Door
-    from ..view.frames import Play
     from ..view.live import Live
     from ..view.viser_front import ViserFront
 
-    server, door = None, Door(options.host)
+    server, door = None, serving.Door(options.host)
+    session.set_speed(options.speed)
     try:
         server = serving.serve(options.host, port, f"{PROGRAM} view", door)
-        front = ViserFront(server, session, drawing, options.speed, keyframe)
+        front = ViserFront(server, session, drawing, keyframe)
         _announce(options, server.get_port(), door.token, what, drawing)
         if not options.paused:
-            session.apply(Play())
-        Live(session, front, options.speed).run(options.seconds, _interrupts())
+            session.play()
+        Live(session, front).run(options.seconds, _interrupts())
     except KeyboardInterrupt:
         if sys.stdout.isatty():
             print()  # after the terminal's ^C

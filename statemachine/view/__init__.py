@@ -1,14 +1,21 @@
 """A running simulation to look at and to touch, in a browser.
 
-`session` is the simulation: commands in, frames out, without a clock and without a screen;
-`recording` is the same of traces. `pace` is the clock, `live` the loop over all of them, and
-`viser_front` the page, the only module that knows viser.
+`session` is what is shown, a simulation or recorded traces: without a clock and without a screen.
+`live` is the loop that lets it follow the clock, `viser_front` the page, the only module that
+knows viser, and `server` says who may look at it.
 """
 
 from __future__ import annotations
 
-from .frames import Control, EnginePose, Separation, Snapshot
-from .pace import Pacer
-from .session import LiveSession
+from .live import Live
+from .session import Control, EnginePose, LiveSession, Session, Snapshot, TraceSession
 
-__all__ = ["Control", "EnginePose", "LiveSession", "Pacer", "Separation", "Snapshot"]
+__all__ = [
+    "Control",
+    "EnginePose",
+    "Live",
+    "LiveSession",
+    "Session",
+    "Snapshot",
+    "TraceSession",
+]

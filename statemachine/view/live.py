@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from ..errors import StateMachineError
-from .frames import Command, Play, ResetTo, Seek, SetSpeed, Snapshot, Step
-from .pace import Pacer
-from .recording import TraceSession
-from .session import LiveSession
+from .session import Session, Snapshot
 
 RATE = 40.0  # frames in a second of the clock
 _MOST_LAG = 0.25  # seconds behind the clock that may still be caught up
+_WINDOW = 1.0  # seconds over which the speed is measured
+# A hair more than a whole number of steps may come out a hair less.
+_HAIR = 1e-6  # of a step
 
-
-Show = LiveSession | TraceSession  # what can be shown
+Command = Callable[[], object]  # a call of a session's method, with its arguments
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,8 @@ class Live:
 
     def __init__(
         self,
-        session: Show,
+        session: Session,
         front: Front,
-        speed: float = 1.0,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
         rate: float = RATE,
@@ -63,16 +62,15 @@ class Live:
         Args:
             session: What is shown.
             front: Where.
-            speed: Simulated seconds in a second of the clock.
             clock: Gives the seconds of the clock.
             sleep: Waits for so many of them.
             rate: Frames in a second.
         """
         self._session, self._front = session, front
         self._clock, self._sleep, self._span = clock, sleep, 1 / rate
-        self._pacer = Pacer(session.timestep, speed, clock())
         self._note = ""
         self._late = 0.0  # until when it counts as late
+        self._restart()
 
     def run(self, seconds: float | None = None, stop: Sequence[object] = ()) -> None:
         """Turn until interrupted, until `stop` has an entry, or for some seconds of the clock."""
@@ -82,42 +80,59 @@ class Live:
 
     def turn(self) -> None:
         """Do what was asked, take the steps that are due, show, and wait for the next frame."""
-        began = self._clock()
+        session, began = self._session, self._clock()
         for command in self._front.commands():
             self._obey(command)
-        if self._session.running:
+        if session.running:
             self._catch_up(began + self._span)
         now = self._clock()
-        running = self._session.running
-        pace = Tempo(
-            self._pacer.speed, self._pacer.factor(now) if running else None, now < self._late
+        reached = self._reached(now) if session.running else None
+        self._front.show(
+            session.frame(), Tempo(session.speed, reached, now < self._late), self._note
         )
-        self._front.show(self._session.frame(), pace, self._note)
         left = began + self._span - self._clock()
         if left > 0:
             self._sleep(left)
 
     def _obey(self, command: Command) -> None:
-        self._note = ""
+        session, self._note = self._session, ""
+        before = session.running, session.steps, session.speed
         try:
-            if isinstance(command, SetSpeed):
-                self._pacer.set_speed(command.factor, self._clock())
-            else:
-                self._session.apply(command)
+            command()
         except StateMachineError as error:
             self._note = str(error)
-        # What passed while it stood, or before it jumped, is not owed.
-        if isinstance(command, Play | Step | ResetTo | Seek):
-            self._pacer.restart(self._clock())
+        if before != (session.running, session.steps, session.speed):
+            self._restart()
+
+    def _restart(self) -> None:
+        """From now on; what passed while time stood, or before it jumped, is not owed."""
+        self._start, self._taken = self._clock(), 0
+        self._marks = deque([(self._start, 0)])  # when how many steps had been taken
 
     def _catch_up(self, deadline: float) -> None:
         """Take what is due, as far as there is time for it before the next frame."""
-        now = self._clock()
-        while self._session.running and self._pacer.due(now) and now < deadline:
-            self._session.advance()
+        session, now = self._session, self._clock()
+        span = session.timestep / session.speed  # of a step, by the clock
+        while (
+            session.running
+            and now < deadline
+            and now - self._start >= (self._taken + 1 - _HAIR) * span
+        ):
+            session.advance()
+            self._taken += 1
             now = self._clock()
-            self._pacer.took(1, now)
-        if self._pacer.lag(now) > _MOST_LAG:
+        lag = now - self._start - self._taken * span
+        if lag > _MOST_LAG:
             # No engine can be hurried: the rest is let go, or it would lag ever more.
-            self._pacer.give_up(now)
+            self._start += lag
             self._late = now + 1
+        self._marks.append((now, self._taken))
+        while len(self._marks) > 2 and self._marks[1][0] <= now - _WINDOW:
+            self._marks.popleft()
+
+    def _reached(self, now: float) -> float | None:
+        """Simulated seconds in a second of the clock, of late; None before it can be told."""
+        began, taken = self._marks[0]
+        if now - began < _WINDOW / 4:
+            return None
+        return (self._taken - taken) * self._session.timestep / (now - began)

@@ -1,23 +1,111 @@
-"""A quiet viser server that listens where it is told to and asks nobody for anything."""
+"""A quiet viser server, which listens where it is told to, and who may look at it.
+
+It asks nobody for anything; each request is asked for the token of the address that was printed.
+"""
 
 from __future__ import annotations
 
 import errno
+import http
+import ipaddress
 import logging
 import os
+import secrets
 import socket
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout, suppress
+from http.cookies import CookieError, SimpleCookie
 from io import StringIO
 from types import ModuleType
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 from ..errors import BadInputError, MissingEngineError
 from ..installed import require_extra
-from .door import Door
 
-LOOPBACK = "127.0.0.1"
 _PORTS = 100  # tried one after another
+_SAY = "open the address that `statemachine view` printed, with its token\n"
+
+
+class Door:
+    """Lets in who knows the token, under a name of this machine, and from its own page.
+
+    A page of another site can make a browser connect to this machine, and can give its own
+    name this machine's address; neither knows the token. The address that is printed holds it,
+    and the page that is opened there keeps it as a cookie, which its websocket sends along.
+
+    Attributes:
+        token: What the address must say; drawn anew for each viewer.
+    """
+
+    def __init__(self, host: str) -> None:
+        """For a server that listens on this host, by name or by address."""
+        self.token = secrets.token_urlsafe(16)
+        machine = socket.gethostname().lower()
+        self._names = {host.lower().strip("[]"), "localhost", machine, f"{machine}.local"}
+
+    def refusal(self, path: str, headers: Any, port: int) -> str:
+        """Why a request is refused, or "".
+
+        Args:
+            path: Its path and query.
+            headers: Its headers, with `get_all`.
+            port: On which it came in.
+        """
+        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
+        if len(hosts) != 1 or not self._is_ours(hosts[0]):
+            return "not under this name\n"
+        # A tunnel may give the port another number: the page's own host is what it must be.
+        own = (f"http://{hosts[0]}", f"https://{hosts[0]}")
+        if len(origins) > 1 or (origins and origins[0].lower() not in map(str.lower, own)):
+            return "not from a page of another site\n"
+        tokens = [*parse_qs(urlsplit(path).query).get("token", ()), *self._cookies(headers, port)]
+        known = self.token.encode()
+        if not any(secrets.compare_digest(token.encode(), known) for token in tokens):
+            return _SAY
+        return ""
+
+    def cookie(self, port: int) -> str:
+        """The header Set-Cookie with which a page that was opened keeps the token."""
+        return f"{_name(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+
+    def _is_ours(self, host: str) -> bool:
+        """Whether a header Host names this machine: no name that a stranger may point to it."""
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+            if name not in self._names:
+                ipaddress.ip_address(name)  # in numbers, which nobody can point elsewhere
+        except ValueError:
+            return False
+        return True
+
+    def _cookies(self, headers: Any, port: int) -> list[str]:
+        tokens = []
+        for header in headers.get_all("Cookie"):
+            with suppress(CookieError, KeyError):  # it is none, or has not ours
+                tokens.append(SimpleCookie(header)[_name(port)].value)
+        return tokens
+
+    def guard(self, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        """A `process_request` of websockets that asks here first, then the one that is given."""
+
+        def process(connection: Any, request: Any) -> Any:
+            port = connection.local_address[1]
+            refusal = self.refusal(request.path, request.headers, port)
+            if refusal:
+                return connection.respond(http.HTTPStatus.FORBIDDEN, refusal)
+            response = answer(connection, request)
+            if response is not None:
+                response.headers["Set-Cookie"] = self.cookie(port)
+                response.headers["Referrer-Policy"] = "no-referrer"
+            return response
+
+        return process
+
+
+def _name(port: int) -> str:
+    # Cookies do not keep ports apart, and two viewers may run.
+    return f"statemachine-view-{port}"
 
 
 def require_viser() -> ModuleType:
@@ -42,25 +130,23 @@ def free_port(host: str, port: int) -> int:
     if not host.strip():  # which would mean everywhere
         raise BadInputError("host must be an address; 127.0.0.1 is this machine alone")
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(
+        family, _, _, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
     except (OSError, UnicodeError) as error:
         raise BadInputError(f"host {host!r} is no address: {error}") from None
     last: OSError | None = None
     for candidate in range(port, min(port + _PORTS, 65536)):
-        with socket.socket(family, kind, protocol) as trial:
-            if os.name == "posix":  # elsewhere this would take a port from its owner
-                trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                trial.bind((address[0], candidate, *address[2:]))
-            except OSError as error:
-                last = error
-                # Windows says WSAEADDRINUSE.
-                if error.errno not in (errno.EADDRINUSE, 10048):
-                    break
-            else:
+        try:
+            with socket.create_server(
+                (address[0], candidate, *address[2:]), family=family
+            ) as trial:
                 return int(trial.getsockname()[1])
+        except OSError as error:
+            last = error
+            # Windows says WSAEADDRINUSE.
+            if error.errno not in (errno.EADDRINUSE, 10048):
+                break
     raise BadInputError(f"cannot listen on {host}, port {port}: {last}")
 
 

@@ -1,43 +1,116 @@
-"""The simulation behind a viewer: commands in, frames out; no clock, no thread, no screen."""
+"""What a viewer shows, a simulation or a recording: asked by calls, told in frames.
+
+A session has no clock, no thread and no screen.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import BadInputError, StateMachineError
-from ..interface import Array, Data, Ints, Model, forward, make_data, reset, step, usual_site
-from ..measures import distances, joint_gap
-from .frames import (
-    Command,
-    Control,
-    EnginePose,
-    Pause,
-    Play,
-    ResetTo,
-    Separation,
-    SetCtrl,
-    Snapshot,
-    Step,
-    controls_of,
+from ..errors import BadInputError, StateMachineError, TraceError
+from ..interface import (
+    Array,
+    Data,
+    Ints,
+    JointType,
+    Model,
+    forward,
+    make_data,
+    reset,
+    step,
+    usual_site,
 )
+from ..measures import Gap, distances, joint_gap
+from ..runs import Header, Trace
 
+SLOWEST, FASTEST = 0.001, 1000.0
 _STEPS_MOST = 100_000  # of one press of a button
+_EQUAL = 1e-6  # seconds between moments that count as the same
 
 
-class Session:
+@dataclass(frozen=True)
+class Control:
+    """A slider.
+
+    Attributes:
+        name: Of the actuator.
+        low: Least value, in `unit`; high: the greatest.
+        unit: ° for the aim of a hinge's servo, mm for a slide's, else nothing.
+        scale: What one `unit` is in the actuator's own unit [rad, m, N·m …].
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str
+    scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class EnginePose:
+    """Where one engine has everything.
+
+    Attributes:
+        name: Of the engine.
+        xpos: (nbody, 3) [m]; xquat: (nbody, 4) wxyz.
+        tip: (3,) the fingertip [m]; None if the model has no site.
+        qpos: (nq,) in MuJoCo's layout.
+    """
+
+    name: str
+    xpos: Array
+    xquat: Array
+    tip: Array | None
+    qpos: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One moment.
+
+    Attributes:
+        time: Simulated time [s].
+        steps: Steps taken since the start or the last reset.
+        running: Whether time goes on by itself.
+        ctrl: (nu,) the commands [unit of the actuator].
+        resets: How often the commands were replaced by others than the sliders'.
+        poses: Of each engine; what is drawn solid comes first.
+        tips_apart: Between the fingertips of two engines [m]; None without two, or without a site.
+        joint_apart: Of the hinge or slide that differs most, among hinges if there are any; None
+            without two engines, or without such a joint.
+        trouble: Why it cannot go on, in a sentence; or "".
+    """
+
+    time: float
+    steps: int
+    running: bool
+    ctrl: Array
+    resets: int
+    poses: tuple[EnginePose, ...]
+    tips_apart: float | None = None
+    joint_apart: Gap | None = None
+    trouble: str = ""
+
+
+class Session(ABC):
     """What is shown, paused at first: where every frame of a viewer comes from.
 
     Attributes:
         names: Of the engines.
         controls: A slider for each actuator.
-        places: Where `ResetTo` can go: names of the keyframes, by number.
+        places: Where `reset` can go: names of the keyframes, by number.
         timestep: Simulated time of a step [s].
         tip: The site that stands for the fingertip, or "".
         length: Simulated time from first to last [s]; None: a simulation has no end.
         running: Whether time is to go on by itself.
+        speed: Simulated seconds that are wanted in a second of the clock.
+        steps: Steps taken since the start or the last reset.
     """
 
     controls: tuple[Control, ...] = ()
@@ -63,21 +136,80 @@ class Session:
         """
         self.names, self.timestep, self._joints, self._site = names, timestep, joints, site
         self.tip = "" if site is None else sites[site]
-        self.running, self._trouble, self._steps, self._resets = False, "", 0, 0
+        self.running, self.speed, self.steps = False, 1.0, 0
+        self._trouble, self._resets = "", 1
+
+    def set_speed(self, speed: float) -> None:
+        """Let time go at another speed.
+
+        Raises:
+            BadInputError: It is not between `SLOWEST` and `FASTEST`.
+        """
+        self.speed = checked_speed(speed)
+
+    def play(self) -> None:
+        """Let time go on, unless there is trouble."""
+        self.running = not self._trouble
+
+    def pause(self) -> None:
+        """Stop the time."""
+        self.running = False
+
+    def step(self, count: int = 1) -> None:
+        """Stop, and take so many steps.
+
+        Raises:
+            BadInputError: There are less than one, or too many; nothing is changed then.
+        """
+        if not 1 <= count <= _STEPS_MOST:
+            raise BadInputError(f"steps must be from 1 to {_STEPS_MOST}; got {count}")
+        self.running = False
+        self.advance(count)
+
+    def set_ctrl(self, index: int, value: float) -> None:
+        """Set an actuator, by number, to a value [its own unit].
+
+        Raises:
+            BadInputError: There is no such slider, or the value is no number.
+        """
+        raise BadInputError("a recording has no sliders: nothing runs here")
+
+    def seek(self, time: float) -> None:
+        """Go to a time [s].
+
+        Raises:
+            BadInputError: It is no number, or this is no recording.
+        """
+        raise BadInputError("only a recording can go to a time")
+
+    @abstractmethod
+    def advance(self, count: int = 1) -> None:
+        """Take steps, whether or not time goes on by itself."""
+
+    @abstractmethod
+    def reset(self, keyframe: int | str | None = None) -> None:
+        """Go to a keyframe, or to the default state.
+
+        Raises:
+            UnknownNameError: There is no such keyframe; nothing is changed then.
+        """
+
+    @abstractmethod
+    def frame(self) -> Snapshot:
+        """This moment."""
 
     def _snapshot(
         self, time: float, ctrl: Array, poses: tuple[EnginePose, ...], same: bool = True
     ) -> Snapshot:
         """A frame; how far two engines are apart is known if their moments are the same."""
-        gap = None
+        tips, joint = None, None
         if same and len(poses) > 1:
-            one, two = poses[:2]
-            tip = None if one.tip is None or two.tip is None else distances(one.tip, two.tip)
-            gap = Separation(
-                None if tip is None else float(tip), joint_gap(*self._joints, one.qpos, two.qpos)
-            )
+            left, right = poses[:2]
+            if left.tip is not None and right.tip is not None:
+                tips = float(distances(left.tip, right.tip))
+            joint = joint_gap(*self._joints, left.qpos, right.qpos)
         return Snapshot(
-            time, self._steps, self.running, ctrl, self._resets, poses, gap, self._trouble
+            time, self.steps, self.running, ctrl, self._resets, poses, tips, joint, self._trouble
         )
 
 
@@ -85,7 +217,7 @@ class LiveSession(Session, ExitStack):
     """One or two engines under the same commands, at the same steps.
 
     Whoever makes it is the only one to touch its Data: what other threads want comes as
-    commands through a queue of theirs.
+    calls through a queue of theirs.
     """
 
     def __init__(
@@ -112,13 +244,12 @@ class LiveSession(Session, ExitStack):
                     f"the timesteps differ: {first.timestep:g} s on {first.backend}, "
                     f"{other.timestep:g} s on {other.backend}"
                 )
-        chosen = usual_site(first.site_names) if site is None else first.site_id(site)
         super().__init__(
             tuple(model.backend for model in models),
             first.timestep,
             (first.joint_names, first.jnt_type, first.jnt_qposadr),
             first.site_names,
-            chosen,
+            usual_site(first.site_names) if site is None else first.site_id(site),
         )
         self.controls = controls_of(first)
         self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
@@ -128,79 +259,156 @@ class LiveSession(Session, ExitStack):
         try:
             for model in models:
                 self._arms.append((model, self.enter_context(make_data(model))))
-            self._reset(keyframe)
+            self.reset(keyframe)
         except BaseException:
             self.close()
             raise
 
-    def apply(self, command: Command) -> None:
-        """Do what was asked for.
-
-        Raises:
-            BadInputError: A value is no number, or out of bounds; nothing is changed then.
-            UnknownNameError: There is no such keyframe; nothing is changed then.
-        """
-        match command:
-            case SetCtrl(index, value):
-                if not 0 <= index < len(self.controls) or not np.isfinite(value):
-                    raise BadInputError(f"actuator {index} cannot be set to {value}")
-                for _, data in self._arms:
-                    data.ctrl[index] = value
-            case Play():
-                self.running = not self._trouble
-            case Pause():
-                self.running = False
-            case Step(count):
-                if not 1 <= count <= _STEPS_MOST:
-                    raise BadInputError(f"steps must be from 1 to {_STEPS_MOST}; got {count}")
-                self.running = False
-                self.advance(count)
-            case ResetTo(keyframe):
-                self._reset(keyframe)
-            case _:
-                raise BadInputError(f"a simulation cannot do {command!r}")
+    def set_ctrl(self, index: int, value: float) -> None:
+        if not 0 <= index < len(self.controls) or not np.isfinite(value):
+            raise BadInputError(f"actuator {index} cannot be set to {value}")
+        for _, data in self._arms:
+            data.ctrl[index] = value
 
     def advance(self, count: int = 1) -> None:
         """Take steps on every engine; one that fails stops them all until a reset."""
-        if self._trouble:
-            return
+        if self._all_do(lambda model, data: step(model, data, count)):
+            self.steps += count
+
+    def reset(self, keyframe: int | str | None = None) -> None:
         for model, data in self._arms:
-            try:
-                step(model, data, count)
-            except StateMachineError as error:
-                self._stop(model, error)
-        if not self._trouble:
-            self._steps += count
+            reset(model, data, keyframe)
+        self._trouble, self.steps = "", 0
+        self._resets += 1
 
     def frame(self) -> Snapshot:
         """This moment; after an engine failed, the last one that was good.
 
         Looking changes nothing: the run goes on as if nobody had looked.
         """
-        if not self._trouble:
-            self._look()
+        if self._all_do(forward):
+            poses = tuple(self._pose(model, data) for model, data in self._arms)
+            self._good = self._arms[0][1].time, poses
         time, poses = self._good
         return self._snapshot(time, np.array(self._arms[0][1].ctrl), poses)
 
-    def _look(self) -> None:
-        poses = []
-        for model, data in self._arms:
+    def _pose(self, model: Model, data: Data) -> EnginePose:
+        tip = None if self._site is None else np.array(data.site_xpos[self._site])
+        where = np.array(data.xpos), np.array(data.xquat), tip, np.array(data.qpos)
+        return EnginePose(model.backend, *where)
+
+    def _all_do(self, verb: Callable[[Model, Data], None]) -> bool:
+        """Call a verb on every engine; whether there is no trouble, now or before."""
+        for model, data in () if self._trouble else self._arms:
             try:
-                forward(model, data)
+                verb(model, data)
             except StateMachineError as error:
-                self._stop(model, error)
-                return
-            tip = None if self._site is None else np.array(data.site_xpos[self._site])
-            where = np.array(data.xpos), np.array(data.xquat), tip, np.array(data.qpos)
-            poses.append(EnginePose(model.backend, *where))
-        self._good = self._arms[0][1].time, tuple(poses)
+                self.running = False
+                self._trouble = self._trouble or f"{model.backend}: {error}"
+        return not self._trouble
 
-    def _reset(self, keyframe: int | str | None) -> None:
-        for model, data in self._arms:
-            reset(model, data, keyframe)
-        self._trouble, self._steps = "", 0
-        self._resets += 1
 
-    def _stop(self, model: Model, error: StateMachineError) -> None:
-        self.running = False
-        self._trouble = self._trouble or f"{model.backend}: {error}"
+class TraceSession(Session):
+    """One or two recorded traces of one model, row by row; no engine runs.
+
+    It has no sliders, and the only place is its start.
+    """
+
+    def __init__(self, traces: Sequence[Trace]) -> None:
+        """Put them to their start; paused.
+
+        Args:
+            traces: One, or two of the same model: the second is the ghost.
+
+        Raises:
+            TraceError: A trace has no poses, or the two do not fit.
+        """
+        first = traces[0]
+        for trace in traces:
+            for column in ("xpos", "xquat"):
+                if column not in trace or not np.isfinite(trace[column]).all():
+                    raise TraceError(f"{trace!r} has no {column}: it cannot be drawn")
+            if (trace.header.bodies, trace.header.nq) != (first.header.bodies, first.header.nq):
+                raise TraceError(f"{trace!r} is of another model than {first!r}")
+        header = first.header
+        sites = header.sites if all("site_xpos" in trace for trace in traces) else ()
+        names = tuple(_engine_of(trace.header) for trace in traces)
+        joints = header.joints, header.jnt_type, header.jnt_qposadr
+        super().__init__(names, header.timestep, joints, sites, usual_site(sites))
+        self.header, self._traces = header, traces
+        self._times = [trace.time - trace.time[0] for trace in traces]
+        self.length = min(float(time[-1]) for time in self._times)
+        self._last = int(np.searchsorted(self._times[0], self.length + _EQUAL)) - 1
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What made each of them."""
+        return tuple(trace.header.label.removesuffix(", recorded") for trace in self._traces)
+
+    def play(self) -> None:
+        """Let time go on; from the start, if it is at the end."""
+        self.steps = 0 if self.steps == self._last else self.steps
+        self.running = self._last > 0
+
+    def seek(self, time: float) -> None:
+        if not math.isfinite(time):
+            raise BadInputError(f"there is no row at {time} s")
+        self.steps = min(max(0, round(time / self.timestep)), self._last)
+
+    def advance(self, count: int = 1) -> None:
+        """Go on by so many rows; it stops at the last."""
+        self.steps = min(self.steps + count, self._last)
+        self.running = self.running and self.steps < self._last
+
+    def reset(self, keyframe: int | str | None = None) -> None:
+        """To the start."""
+        self.steps = 0
+
+    def frame(self) -> Snapshot:
+        """This row of the first trace, and what the other has nearest to its time."""
+        now = self._times[0][self.steps]
+        rows = [int(np.abs(time - now).argmin()) for time in self._times]
+        poses = []
+        for trace, name, row in zip(self._traces, self.names, rows, strict=True):
+            tip = None if self._site is None else trace["site_xpos"][row, self._site]
+            where = trace["xpos"][row], trace["xquat"][row], tip, trace.qpos[row]
+            poses.append(EnginePose(name, *where))
+        first = self._traces[0]
+        # Moments that are not the same say nothing about the engines.
+        same = abs(self._times[-1][rows[-1]] - now) < _EQUAL
+        return self._snapshot(
+            float(first.time[self.steps]), first.ctrl[self.steps], tuple(poses), bool(same)
+        )
+
+
+def _engine_of(header: Header) -> str:
+    return header.backend + (", engine defaults" if header.defaults == "engine" else "")
+
+
+def checked_speed(speed: float) -> float:
+    """Simulated seconds in a second of the clock; BadInputError if nothing can go at that."""
+    if not SLOWEST <= speed <= FASTEST:  # not a number fails this too
+        raise BadInputError(f"speed must be from {SLOWEST:g} to {FASTEST:g}; got {speed:g}")
+    return float(speed)
+
+
+def controls_of(model: Model) -> tuple[Control, ...]:
+    """A slider for each actuator, over its range; over its joint's where it has none."""
+    controls = []
+    for index, name in enumerate(model.actuator_names):
+        low, high = model.actuator_ctrlrange[index].tolist()
+        joint = int(model.actuator_jntid[index])
+        kind = int(model.jnt_type[joint]) if joint >= 0 else -1
+        unit, scale, spare = "", 1.0, 1.0
+        if np.isfinite(model.actuator_kp[index]):  # a servo
+            if kind == JointType.HINGE:
+                unit, scale, spare = "°", math.pi / 180, math.pi
+            elif kind == JointType.SLIDE:
+                unit, scale = "mm", 1e-3
+            if kind >= 0 and model.jnt_limited[joint] and not math.isfinite(high - low):
+                low, high = model.jnt_range[joint].tolist()
+        if not math.isfinite(high - low):
+            low, high = -spare, spare
+        label = name or f"actuator {index}"
+        controls.append(Control(label, low / scale, high / scale, unit, scale))
+    return tuple(controls)

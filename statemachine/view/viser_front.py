@@ -6,16 +6,16 @@ import html
 import queue
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import Drawing, Part
-from . import words
-from .frames import Command, Pause, Play, ResetTo, Seek, SetCtrl, SetSpeed, Snapshot, Step
-from .live import Show, Tempo
-from .pace import FASTEST, SLOWEST
+from ..measures.text import millimetres, position, short_time
+from .live import Command, Tempo
+from .session import FASTEST, SLOWEST, Session, Snapshot
 
 _GHOST = (0.20, 0.45, 0.95)  # the second engine, seen through
 _OPACITY = 0.45
@@ -34,9 +34,8 @@ class ViserFront:
     def __init__(
         self,
         server: Any,
-        session: Show,
+        session: Session,
         drawing: Drawing,
-        speed: float = 1.0,
         keyframe: int | None = None,
     ) -> None:
         """Build the scene and the controls.
@@ -45,18 +44,16 @@ class ViserFront:
             server: From `server.serve`.
             session: What will be shown.
             drawing: What its model looks like.
-            speed: What the speed control starts with.
             keyframe: Where the session began, by number.
         """
         self._server, self._session = server, session
         # Callbacks come from viser's own thread: all they do is put a command in here.
         self._asked: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self._frames: list[dict[int, Any]] = []
-        self._moved: dict[str, Any] = {}
-        self._resets, self._said, self._when, self._dragged = 0, "", 0.0, 0.0
+        self._resets, self._when, self._dragged = 0, 0.0, 0.0
         with server.atomic():
             self._build_scene(drawing)
-            self._build_panel(speed, keyframe)
+            self._build_panel(keyframe)
 
     def commands(self) -> Sequence[Command]:
         """What was asked for since the last time."""
@@ -67,19 +64,15 @@ class ViserFront:
         with self._server.atomic():
             for bodies, pose in zip(self._frames, frame.poses, strict=True):
                 for body, handle in bodies.items():
-                    self._place(handle, pose.xpos[body], pose.xquat[body])
+                    handle.position, handle.wxyz = pose.xpos[body], pose.xquat[body]
             if frame.resets != self._resets:
                 self._resets = frame.resets
                 self._follow(frame)
-            self._switch(frame)
+            # Not out of the hand of someone who drags it.
+            if self._seek is not None and time.monotonic() - self._dragged > _HELD:
+                self._seek.value = min(frame.steps * self._session.timestep, self._seek.max)
+            self._switch.label = "Pause" if frame.running else "Run"
             self._say(frame, pace, note)
-
-    def _place(self, handle: Any, position: Any, turn: Any) -> None:
-        """Tell the tabs where a body is, if it moved."""
-        where = (position.tobytes(), turn.tobytes())
-        if self._moved.get(handle.name) != where:
-            self._moved[handle.name] = where
-            handle.position, handle.wxyz = position, turn
 
     # The scene
 
@@ -141,27 +134,34 @@ class ViserFront:
 
     # What stands beside it
 
-    def _build_panel(self, speed: float, keyframe: int | None) -> None:
+    def _build_panel(self, keyframe: int | None) -> None:
         gui, session = self._server.gui, self._session
         gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="medium", dark_mode=False
         )
         self._readout = gui.add_html("")
-        self._switch_button = gui.add_button("Run", color="blue")
-        self._on(self._switch_button.on_click, self._toggle)
-        self._count = gui.add_number("steps", 1, min=1, max=100_000, step=1)
-        self._on(gui.add_button("Step").on_click, lambda: Step(int(self._count.value)))
+        self._switch = gui.add_button("Run", color="blue")
+        self._on(
+            self._switch.on_click,
+            lambda: session.pause if self._switch.label == "Pause" else session.play,
+        )
+        count = gui.add_number("steps", 1, min=1, max=100_000, step=1)
+        self._on(gui.add_button("Step").on_click, lambda: partial(session.step, int(count.value)))
         start = _DEFAULT if keyframe is None else session.places[keyframe]
         places = (*session.places, _DEFAULT) if session.length is None else ("start",)
-        start = start if start in places else places[0]
-        self._places = gui.add_dropdown("to", places, initial_value=start)
-        self._on(gui.add_button("Reset").on_click, self._reset)
-        self._speed = gui.add_number("speed ×", float(speed), min=SLOWEST, max=FASTEST, step=0.05)
-        self._on(self._speed.on_update, lambda: SetSpeed(float(self._speed.value)))
-        self._ghost: Any = None
+        place = gui.add_dropdown(
+            "to", places, initial_value=start if start in places else places[0]
+        )
+        numbers = {name: number for number, name in enumerate(session.places)}
+        self._on(
+            gui.add_button("Reset").on_click,
+            lambda: partial(session.reset, numbers.get(place.value)),
+        )
+        speed = gui.add_number("speed ×", session.speed, min=SLOWEST, max=FASTEST, step=0.05)
+        self._on(speed.on_update, lambda: partial(session.set_speed, float(speed.value)))
         if len(session.names) > 1:
-            self._ghost = gui.add_checkbox(f"ghost: {session.names[1]}", True)
-            self._on(self._ghost.on_update, self._show_ghost)
+            ghost = gui.add_checkbox(f"ghost: {session.names[1]}", True)
+            self._on(ghost.on_update, lambda: partial(self._show_ghost, ghost.value))
         self._sliders: list[Any] = []
         self._seek: Any = None
         if session.length:
@@ -185,7 +185,7 @@ class ViserFront:
 
         def asked() -> Command:
             value = min(max(float(slider.value), control.low), control.high)
-            return SetCtrl(index, value * control.scale)
+            return partial(self._session.set_ctrl, index, value * control.scale)
 
         self._on(slider.on_update, asked)
         self._sliders.append(slider)
@@ -196,57 +196,74 @@ class ViserFront:
             scale = self._session.controls[index].scale
             shown = _round(float(frame.ctrl[index]) / scale, slider.step)
             slider.value = min(max(shown, slider.min), slider.max)
-        self._follow_time(frame)
-
-    def _follow_time(self, frame: Snapshot) -> None:
-        # Not out of the hand of someone who drags it.
-        if self._seek is not None and time.monotonic() - self._dragged > _HELD:
-            self._seek.value = min(frame.steps * self._session.timestep, self._seek.max)
-
-    def _switch(self, frame: Snapshot) -> None:
-        label = "Pause" if frame.running else "Run"
-        if self._switch_button.label != label:
-            self._switch_button.label = label
-        if frame.running:
-            self._follow_time(frame)
 
     def _say(self, frame: Snapshot, pace: Tempo, note: str) -> None:
         now = time.monotonic()
         if frame.running and now - self._when < _SPAN:
             return  # nobody reads faster
-        text = _page(words.rows(frame, pace, self._session.tip), words.warning(frame, note))
-        if text != self._said:
-            self._said, self._when = text, now
-            self._readout.content = text
+        self._when = now
+        rows = readout(frame, pace, self._session.tip)
+        self._readout.content = _page(rows, warning(frame, note))
 
     # What comes back
 
-    def _toggle(self) -> Command:
-        return Pause() if self._switch_button.label == "Pause" else Play()
-
-    def _reset(self) -> Command:
-        place = self._places.value
-        places = self._session.places
-        return ResetTo(places.index(place) if place in places else None)
-
     def _sought(self) -> Command:
         self._dragged = time.monotonic()
-        return Seek(float(self._seek.value))
+        return partial(self._session.seek, float(self._seek.value))
 
-    def _show_ghost(self) -> None:
+    def _show_ghost(self, visible: bool) -> None:
         for handle in self._frames[1].values():
-            handle.visible = bool(self._ghost.value)
+            handle.visible = visible
 
-    def _on(self, listen: Callable[[Any], Any], command: Callable[[], Command | None]) -> None:
+    def _on(self, listen: Callable[[Any], Any], command: Callable[[], Command]) -> None:
         """Ask for something at each event of a control that comes from a tab."""
 
         # As coroutines they run one after another, in the order in which they came.
         async def put(event: Any) -> None:
-            asked = None if event.client_id is None else command()  # None: by `_follow`
-            if asked is not None:
-                self._asked.put(asked)
+            if event.client_id is not None:  # else by `show`
+                self._asked.put(command())
 
         listen(put)
+
+
+def readout(frame: Snapshot, pace: Tempo, tip: str) -> list[tuple[str, str]]:
+    """Rows of a name and a value that stand beside the picture of one moment.
+
+    Args:
+        frame: The moment.
+        pace: How fast it goes.
+        tip: Name of the site that stands for the fingertip, or "".
+    """
+    tips, joint = frame.tips_apart, frame.joint_apart
+    far = "" if joint is None else position(joint.size or 0.0, joint.unit == "m", 3)
+    rows = [
+        ("time", short_time(frame.time)),
+        ("steps", f"{frame.steps:,}"),
+        ("pace", _pace(frame, pace)),
+        ("tip", tip),
+        *(
+            (f"on {pose.name}", "  ".join(f"{1000 * value:.1f}" for value in pose.tip) + " mm")
+            for pose in frame.poses
+            if pose.tip is not None
+        ),
+        ("tips apart", "" if tips is None else millimetres(tips, 3)),
+        ("joints apart", "" if joint is None else f"{far}, {joint.where}"),
+    ]
+    return [(name, text) for name, text in rows if text]
+
+
+def _pace(frame: Snapshot, pace: Tempo) -> str:
+    if not frame.running:
+        return "paused"
+    if pace.reached is None:
+        return "…"
+    late = f"; {pace.asked:g} × is more than this machine gives" if pace.late else ""
+    return f"{pace.reached:.2f} × real time{late}"
+
+
+def warning(frame: Snapshot, note: str) -> str:
+    """What is wrong, or ""."""
+    return f"{frame.trouble}. Reset to go on." if frame.trouble else note
 
 
 def _page(rows: Sequence[tuple[str, str]], warning: str) -> str:
