@@ -12,6 +12,7 @@ import pytest
 import statemachine as sm
 from statemachine import rotations
 from statemachine.drawing import Drawing, Part, Surface, _shapes, drawing_of
+from statemachine.drawing.camera import Camera
 
 from .conftest import written
 from .small_models import CLOTH, EVERY_SHAPE, TOUCHING_ONLY, model_of
@@ -202,7 +203,9 @@ def test_the_eye_is_where_the_engines_camera_is() -> None:
     everything = mujoco.mjtCatBit.mjCAT_ALL.value
     mujoco.mjv_updateScene(model.raw, data, option, None, camera, everything, scene)
     eye = (scene.camera[0].pos + scene.camera[1].pos) / 2  # of the two eyes
-    np.testing.assert_allclose(drawing.eye(0.7), eye, atol=1e-6)
+    np.testing.assert_allclose(
+        Camera(drawing.center, 0.7, drawing.azimuth, drawing.elevation).eye, eye, atol=1e-6
+    )
 
 
 def test_what_only_touches_is_drawn_where_nothing_else_is(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from gymnasium.vector import AutoresetMode
 
 import statemachine as sm
 import statemachine.gym  # registers the tasks
+from statemachine.engines.pictures import renderer_here
 from statemachine.errors import (
     BadInputError,
     ClosedDataError,
@@ -26,7 +27,6 @@ from statemachine.gym.policies import play, random_policy, scripted_policy
 from statemachine.gym.render import CAMERA, SIZE
 from statemachine.gym.tasks import TASKS, HeldBox, Reach
 from statemachine.gym.vector import ArmVectorEnv
-from statemachine.rendering import renderer_here
 
 from .conftest import ROOT, refused, runs_in_silence
 

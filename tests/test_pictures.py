@@ -20,14 +20,18 @@ import pytest
 import statemachine as sm
 from statemachine.compare import compare, series
 from statemachine.drawing.camera import Camera, framed
-from statemachine.drawing.shots import Shot
+from statemachine.drawing.shots import Shot, compose, smaller
+from statemachine.engines import pictures as probe
 from statemachine.engines import pybullet as pybullet_room
 from statemachine.engines.mujoco import _opengl
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
-from statemachine.rendering import Timing, frames, motion_of, probe, timing_of
-from statemachine.rendering.compose import compose, halved
-from statemachine.rendering.motion import corners
-from statemachine.report.film import Film, write_film
+from statemachine.report.film import (
+    Film,
+    Timing,
+    frames,
+    motion_of,
+    write_film,
+)
 from statemachine.report.film_overlay import STRIP, Overlay
 from statemachine.report.over_time import charts_of
 from statemachine.report.plot import (
@@ -161,7 +165,7 @@ def test_a_ghost_is_seen_where_it_is_nearer_by_more_than_the_bias() -> None:
 def test_smaller_pictures_are_means() -> None:
     picture = np.random.default_rng(0).integers(0, 256, (6, 8, 3)).astype(np.uint8)
     mean = picture.reshape(3, 2, 4, 2, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(halved(picture, 2), mean, atol=1)
+    np.testing.assert_allclose(smaller(picture, 2), mean, atol=1)
 
 
 @pytest.mark.parametrize(
@@ -170,17 +174,17 @@ def test_smaller_pictures_are_means() -> None:
         ({"fps": 0.5}, "--fps"),
         ({"fps": float("nan")}, "--fps"),
         ({"slow": 0}, "--slow"),
-        ({"slow": 100, "fps": 60, "long": 4.0}, "pictures"),
+        ({"slow": 100, "fps": 60}, "pictures"),
         ({"size": (641, 480)}, "even"),
         ({"size": (4000, 480)}, "width"),
     ],
 )
+@pytest.mark.usefixtures("matplotlib")
 def test_a_film_that_cannot_be_is_refused(how: dict[str, Any], says: str, ball: Path) -> None:
-    model = sm.load(ball)
-    trace = record(model, seconds=how.pop("long", 0.1), derive=False)
-    size = how.pop("size", SIZE)
+    model, film = sm.load(ball), ball.with_name("a.webp")
+    trace = record(model, seconds=4.0, derive=False)
     with pytest.raises(BadInputError, match=says):
-        next(frames(trace, size=size, timing=timing_of(trace, **how), models=(model,)))
+        write_film(film, [trace], [model], probe.Renderer("mujoco"), **how)
 
 
 # Pictures that are drawn.
@@ -190,8 +194,8 @@ def test_a_film_that_cannot_be_is_refused(how: dict[str, Any], says: str, ball: 
 def test_pictures_change_as_the_arm_moves(
     sides: tuple[sm.Model, Trace, Trace], renderer: probe.Renderer
 ) -> None:
-    _, one, _ = sides
-    pictures = list(frames(one, size=SIZE, timing=Timing(0.5, 6), renderer=renderer))
+    model, one, _ = sides
+    pictures = list(frames([one], [model], SIZE, Timing(0.5, 6), renderer))
     assert [picture.shape for picture in pictures] == [(240, 320, 3)] * 3
     assert _differ(pictures[0], pictures[1]).mean() > 0.02
     assert _differ(pictures[0], pictures[2]).mean() > 0.02
@@ -205,8 +209,10 @@ def test_the_ghost_is_the_second_side_in_its_own_pose(
     model, one, two = sides
     timing = Timing(0.5, 2.5)  # pictures at 0 and 0.4 s
     camera = _camera(model, one, two)
-    how: Any = {"size": SIZE, "timing": timing, "renderer": renderer, "camera": camera}
-    alone, together = list(frames(one, **how)), list(frames(one, two, **how))
+    alone, together = (
+        list(frames(traces, [model] * len(traces), SIZE, timing, renderer, camera))
+        for traces in ([one], [one, two])
+    )
     row = int(np.argmin(np.abs(one.time - 0.4)))
     first, second = silhouettes(
         model.path, [one.qpos[row], two.qpos[row]], dataclasses.asdict(camera), SIZE, tmp_path
@@ -221,7 +227,7 @@ def test_the_ghost_is_the_second_side_in_its_own_pose(
 
 def _camera(model: sm.Model, *traces: Trace) -> Camera:
     times = np.linspace(0, 0.5, 6)
-    cloud = np.concatenate([corners(motion_of(t, model, times), model) for t in traces])
+    cloud = np.concatenate([motion_of(t, model, times).corners() for t in traces])
     return framed(cloud, SIZE[0] / SIZE[1], 140, -20)
 
 
@@ -238,9 +244,10 @@ def test_poses_are_those_of_the_trace_not_of_its_qpos(
     """An engine that says its bodies are elsewhere is drawn as it says."""
     model, one, _ = sides
     moved = Trace(one.header, {**one.columns, "xpos": one["xpos"] + np.array([0, 0, 0.1])})
-    how: Any = {"size": SIZE, "timing": Timing(0.1, 10), "renderer": mujoco_here}
-    how["camera"] = _camera(model, one)
-    (here,), (there,) = (list(frames(trace, **how)) for trace in (one, moved))
+    (here,), (there,) = (
+        frames([trace], [model], SIZE, Timing(0.1, 10), mujoco_here, _camera(model, one))
+        for trace in (one, moved)
+    )
     assert _differ(here, there).mean() > 0.05
 
 
@@ -250,11 +257,10 @@ def test_two_models_of_one_robot_are_drawn_in_one_picture(
     """Each side with its own looks and its own file."""
     wide = ball.with_name("wide.xml")
     models = (sm.load(ball), sm.load(written(wide, ball.read_text().replace("0.1'", "0.2'"))))
-    one, two = (record(model, None, 0.02) for model in models)
-    how: Any = {"size": SIZE, "timing": Timing(0.02, 50), "renderer": mujoco_here}
-    how["camera"] = Camera((0, 0, 1), 2.0, 90, 0)
-    (alone,) = frames(one, models=models[:1], **how)
-    (together,) = frames(one, two, models=models, **how)
+    traces = [record(model, None, 0.02) for model in models]
+    how: Any = SIZE, Timing(0.02, 50), mujoco_here, Camera((0, 0, 1), 2.0, 90, 0)
+    (alone,) = frames(traces[:1], models[:1], *how)
+    (together,) = frames(traces, models, *how)
     # A sphere of radius r at distance d is seen under asin(r/d): here a disc of 96 pixels.
     changed = _differ(alone, together)
     radius = 120 * np.tan(np.arcsin(0.2 / 2.0)) / np.tan(np.radians(15))
@@ -266,11 +272,12 @@ def test_two_models_of_one_robot_are_drawn_in_one_picture(
 
 @pytest.fixture
 def film(sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer, tmp_path: Path) -> Any:
-    _, one, two = sides
+    model, *traces = sides
 
     def make(name: str, **how: Any) -> Film:
-        how = {"size": SIZE, "fps": 20, "slow": 2, "renderer": mujoco_here, **how}
-        return write_film(tmp_path / name, one, two, compare(one, two), **how)
+        how = {"size": SIZE, "fps": 20, "slow": 2, **how}
+        found = compare(*traces)
+        return write_film(tmp_path / name, traces, [model] * 2, mujoco_here, found, **how)
 
     return make
 
@@ -315,7 +322,7 @@ def test_mp4(film: Any) -> None:
 def test_the_strip_has_cursor_curve_and_figures(sides: tuple[sm.Model, Trace, Trace]) -> None:
     _, one, two = sides
     charts = charts_of(compare(one, two), one, two, series(one, two), None)
-    overlay = Overlay((400, 300), Timing(0.5, 20), "x", ["a", "b"], charts[0])
+    overlay = Overlay((400, 300), Timing(0.5, 20).times, 1.0, "x", ["a", "b"], charts[0])
     width, height = overlay.inner
     assert (width, height % 2) == (400, 0)
     frame = np.full((height, width, 3), 77, np.uint8)
@@ -477,7 +484,7 @@ def test_ctrl_c_leaves_no_half_film_and_no_process(
 
 def _drawing(place: Path) -> list[int]:
     """Processes that draw or encode in a folder."""
-    pids = [*processes_with("rendering._child"), *processes_with("ffmpeg")]
+    pids = [*processes_with("engines.pictures"), *processes_with("ffmpeg")]
     return [pid for pid in pids if Path(f"/proc/{pid}/cwd").resolve() == place]
 
 

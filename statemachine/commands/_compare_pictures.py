@@ -49,14 +49,11 @@ def checked(options: argparse.Namespace) -> Any:
         check_place(options.plot)
     renderer = None
     if options.film is not None:
-        from ..rendering import renderer_here, renderers
-        from ..rendering.pictures import check_size, check_speed
+        from ..engines.pictures import renderer_here, renderers
         from ..report import film as films
         from ..report.progress import progress
 
-        films.check_suffix(options.film)
-        check_speed(options.fps, options.slow)
-        check_size(options.size, films.SMALLEST)
+        films.check_film(options.film, options.size, options.fps, options.slow)
         check_place(options.film)
         with progress("looking for OpenGL"):
             asked = None if options.renderer == "auto" else options.renderer
@@ -104,22 +101,22 @@ def write(
         from ..report import film as films
 
         files = [side.path for side in request.sides] if request else []
-        models = _models(options, files, *(trace for trace in (one, two) if trace is not None))
+        traces = [trace for trace in (one, two) if trace is not None]
+        models = _models(options, files, *traces)
         if files and two is not None:
             from ..compare.alike import with_bodies_of
 
-            one, two = with_bodies_of(one, models[0]), with_bodies_of(two, models[1])
+            traces = [with_bodies_of(*side) for side in zip(traces, models, strict=True)]
         with progress("film") as told:
             film = films.write_film(
                 options.film,
-                one,
-                two,
+                traces,
+                models,
+                renderer,
                 comparison,
                 size=options.size,
                 fps=options.fps,
                 slow=options.slow,
-                models=models,
-                renderer=renderer,
                 progress=told,
             )
         complain(

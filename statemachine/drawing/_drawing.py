@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from ..backends import on_default
 from ..interface import Model
 from . import _shapes
 from ._shapes import Surface
-from .camera import Camera
 
 # MuJoCo's mjtGeom, in its order.
 _KINDS = ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"]
@@ -64,6 +64,7 @@ class Drawing:
         center: (3,) middle of the model [m], and extent: its size [m], as the file has them.
         azimuth: Where MuJoCo's viewer looks from at first, about z [degrees]: 0 looks along x,
             90 along y. elevation: the same above the horizontal; below 0 looks down.
+        file: The model's; an engine that draws reads it again. Not there for a stick figure.
         left_out: What it has and is not drawn, in words.
     """
 
@@ -72,12 +73,8 @@ class Drawing:
     extent: float
     azimuth: float
     elevation: float
+    file: Path = Path()
     left_out: tuple[str, ...] = ()
-
-    def eye(self, distance: float) -> tuple[float, float, float]:
-        """Where the camera is that looks at the centre from so far away [m]."""
-        x, y, z = Camera(self.center, distance, self.azimuth, self.elevation).eye.tolist()
-        return x, y, z
 
     @property
     def bodies(self) -> tuple[int, ...]:
@@ -133,6 +130,7 @@ def drawing_of(model: Model) -> Drawing:
         extent=float(raw.stat.extent),
         azimuth=float(at.azimuth),
         elevation=float(at.elevation),
+        file=model.path,
         left_out=tuple(left_out),
     )
 

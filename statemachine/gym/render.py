@@ -10,9 +10,10 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from ..drawing.camera import Camera
+from ..drawing.motion import poses_through
+from ..engines.pictures import LivePictures, renderer_here
 from ..errors import ClosedDataError, check_name
 from ..interface import Array
-from ..rendering import LivePictures, motion_through, renderer_here
 from .tasks import Task
 
 RENDER_MODES = ("rgb_array",)
@@ -62,16 +63,15 @@ class TaskPictures:
             raise ResetNeeded("call reset before render: no episode has begun")
         if self._closed:
             raise ClosedDataError("this environment is closed: make another")
-        motion = motion_through(self._model, qpos)
+        poses = poses_through(self._model, qpos)
         if self._live is None:
             renderer = renderer_here()
             self._folder = tempfile.TemporaryDirectory()
             ball = Path(self._folder.name) / "target.xml"
             ball.write_text(_BALL.format(self._radius), encoding="utf-8")
-            bodies = [self._model.nbody, 2]
-            self._live = LivePictures([motion.file, ball], bodies, SIZE, CAMERA, renderer)
+            self._live = LivePictures([self._model.path, ball], SIZE, CAMERA, renderer)
         pictures = []
-        for xpos, xquat, target in zip(motion.xpos, motion.xquat, targets, strict=True):
+        for xpos, xquat, target in zip(*poses, targets, strict=True):
             ball_at = np.stack([np.zeros(3), target]), np.array([_UPRIGHT, _UPRIGHT])
             self._live.ask([(xpos, xquat), ball_at])
             pictures.append(self._live.take().copy())

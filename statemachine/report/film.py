@@ -1,26 +1,44 @@
-"""A film of a comparison: both sides in one picture, and how far apart they are."""
+"""Films: both sides of a comparison in one picture, and how far apart they are.
+
+WebP is written by Pillow, mp4 by ffmpeg.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+import subprocess
+import tempfile
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from ..compare import Comparison, compare, labels_of, series
-from ..errors import BadInputError
+import numpy as np
+
+from ..compare import Comparison, labels_of, series
+from ..drawing import drawing_of
+from ..drawing.camera import Camera
+from ..drawing.motion import Motion, camera_for, poses_through
+from ..drawing.shots import Pixels
+from ..engines.pictures import Renderer, drawn
+from ..errors import BadInputError, EngineError, TraceError
 from ..installed import require_extra
-from ..interface import Model
-from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
-from ..rendering.pictures import check_size
+from ..interface import Array, Model
+from ..measures import nearest
+from ..processes.pipes import last_line
 from ..runs import Trace
 from ..runs.drive import Progress, silent
+from ..runs.whole import beside, replace_file
 from .figures import require_matplotlib
-from .film_files import SUFFIXES, write_mp4, write_webp
 from .film_overlay import Overlay
 from .over_time import QuantityChart, charts_of
 
-SMALLEST = (240, 180)  # in which the strip and the text have room
+SUFFIXES = (".webp", ".mp4")
+_LONGEST = 5000  # pictures of one film
+_SMALLEST, _LARGEST = (240, 180), (1920, 1440)  # in the least the strip and the text have room
+_WEBP: dict[str, Any] = {"format": "WEBP", "save_all": True, "loop": 0, "quality": 70, "method": 3}
+_WEBP |= {"kmin": 30, "kmax": 60}  # pictures between those that stand alone
 
 
 @dataclass(frozen=True)
@@ -42,8 +60,44 @@ class Film:
     renderer: str
 
 
-def check_suffix(path: Path) -> None:
-    """Raise BadInputError for a file that is no film, MissingEngineError without an extra."""
+@dataclass(frozen=True)
+class Timing:
+    """When the pictures are of, and how long each is shown.
+
+    Attributes:
+        seconds: Simulated time that the film shows [s].
+        fps: Pictures a second.
+        slow: How many times as long it takes to watch.
+    """
+
+    seconds: float
+    fps: float = 30.0
+    slow: float = 1.0
+
+    @property
+    def count(self) -> int:
+        """How many pictures."""
+        return max(1, math.ceil(self.seconds * self.slow * self.fps - 1e-6))
+
+    @property
+    def times(self) -> Array:
+        """(count,) simulated time of each [s]."""
+        return np.arange(self.count) / (self.fps * self.slow)
+
+    @property
+    def milliseconds(self) -> list[int]:
+        """How long each is shown: together the whole of simulated time, times `slow`."""
+        ends = np.append(np.arange(self.count) / self.fps, self.seconds * self.slow)
+        return np.diff(np.round(1000 * ends)).astype(int).tolist()
+
+
+def check_film(path: Path, size: tuple[int, int], fps: float, slow: float) -> None:
+    """Whether there can be such a film, before anything is run.
+
+    Raises:
+        BadInputError: The path, size, fps or slow cannot be.
+        MissingEngineError: An extra is missing.
+    """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         hint = "; WebP is smaller and has all colours" if suffix == ".gif" else ""
@@ -52,85 +106,207 @@ def check_suffix(path: Path) -> None:
     require_matplotlib()
     if suffix == ".mp4":
         require_extra("imageio_ffmpeg", "mp4", "ffmpeg", "mp4", "WebP needs nothing more")
+    if not 1 <= fps <= 60:
+        raise BadInputError(f"--fps is from 1 to 60 pictures a second; got {fps:g}")
+    if not 0.05 <= slow <= 100:
+        raise BadInputError(f"--slow is from 0.05 to 100 times as long; got {slow:g}")
+    for word, pixels, least, most in zip(
+        ("width", "height"), size, _SMALLEST, _LARGEST, strict=True
+    ):
+        if not least <= pixels <= most or pixels % 2:
+            raise BadInputError(
+                f"the {word} of a film is even, from {least} to {most} pixels; got {pixels}"
+            )
 
 
 def write_film(
     path: Path,
-    one: Trace,
-    two: Trace | None = None,
+    traces: Sequence[Trace],
+    models: Sequence[Model],
+    renderer: Renderer,
     comparison: Comparison | None = None,
     *,
     size: tuple[int, int] = (640, 480),
     fps: float = 30.0,
     slow: float = 1.0,
-    models: tuple[Model, ...] | None = None,
-    renderer: Renderer | None = None,
     progress: Progress = silent,
 ) -> Film:
     """Write a film of one trace, or of two and how far apart they are.
 
     Args:
         path: A file .webp or .mp4; it is there whole or not at all.
-        one: Drawn solid.
-        two: Drawn as a ghost.
+        traces: The first is drawn solid, a second one as a ghost.
+        models: What each looks like.
+        renderer: What draws.
         comparison: Of the two; has the tolerance that is drawn.
         size: Width and height [pixels], even.
         fps: Pictures a second.
         slow: How many times as long as simulated time it takes.
-        models: What they look like; by default what the traces name.
-        renderer: What draws; by default what works here.
         progress: Told the fraction that is done.
 
     Raises:
-        BadInputError: The path, size, fps or slow cannot be.
-        MissingEngineError: An extra is missing, or nothing here can draw.
+        BadInputError: See `check_film`; or there would be too many pictures.
+        MissingEngineError: An extra is missing.
+        TraceError: A model has other bodies than its trace.
     """
-    check_suffix(path)
-    check_size(size, SMALLEST)
-    timing = timing_of(one, two, fps, slow)
-    renderer = renderer_here() if renderer is None else renderer
-    strip = _strip(one, two, comparison)
-    labels = [one.header.label] if two is None else labels_of(one.header, two.header).long
-    overlay = Overlay(size, timing, one.header.experiment, labels, strip)
-    drawn = frames(
-        one,
-        two,
-        size=overlay.inner,
-        timing=timing,
-        models=models,
-        renderer=renderer,
-    )
+    check_film(path, size, fps, slow)
+    timing = timing_of(traces, fps, slow)
+    header, strip = traces[0].header, _strip(traces, comparison)
+    labels = labels_of(header, traces[1].header).long if len(traces) > 1 else [header.label]
+    overlay = Overlay(size, timing.times, slow, header.experiment, labels, strip)
+    shots = frames(traces, models, overlay.inner, timing, renderer)
 
     def pictures() -> Iterator[Any]:
-        for k, frame in enumerate(drawn):
+        for k, shot in enumerate(shots):
             progress((k + 1) / timing.count)  # before: nobody asks for more than the last
-            yield overlay.paint(frame, k)
+            yield overlay.paint(shot, k)
 
+    seconds = sum(timing.milliseconds) / 1000
     try:
         if path.suffix.lower() == ".mp4":
-            write_mp4(path, pictures(), size, fps)
+            _write_mp4(path, pictures(), size, fps)
+            seconds = timing.count / fps  # all of its pictures are shown equally long
         else:
-            write_webp(path, pictures(), timing.milliseconds)
+            replace_file(path, lambda out: write_webp(out, pictures(), timing.milliseconds))
     finally:
-        drawn.close()
-    return Film(path, timing.count, _length(path, timing), path.stat().st_size, str(renderer))
+        shots.close()
+    return Film(path, timing.count, seconds, path.stat().st_size, str(renderer))
 
 
-def _length(path: Path, timing: Timing) -> float:
-    if path.suffix.lower() == ".mp4":  # all of its pictures are shown equally long
-        return timing.count / timing.fps
-    return sum(timing.milliseconds) / 1000
+def timing_of(traces: Sequence[Trace], fps: float, slow: float) -> Timing:
+    """The timing of a film of what all traces have.
+
+    Raises:
+        BadInputError: There would be too many pictures.
+    """
+    seconds = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
+    timing = Timing(round(seconds, 9), fps, slow)
+    if timing.count > _LONGEST:
+        raise BadInputError(
+            f"the film would have {timing.count} pictures; at most {_LONGEST}: lower --fps, "
+            "--slow or --seconds"
+        )
+    return timing
 
 
-def _strip(one: Trace, two: Trace | None, comparison: Comparison | None) -> QuantityChart | None:
+def frames(
+    traces: Sequence[Trace],
+    models: Sequence[Model],
+    size: tuple[int, int],
+    timing: Timing,
+    renderer: Renderer,
+    camera: Camera | None = None,
+) -> Generator[Pixels]:
+    """Pictures (height, width, 3) uint8 of one trace, or of two in one place.
+
+    Args:
+        traces: The first is drawn solid, a second one as a ghost where it parts from the first.
+        models: What each looks like.
+        size: Width and height in pixels, even.
+        timing: Which moments.
+        renderer: What draws.
+        camera: By default one that has the whole motion in its picture.
+
+    Raises:
+        TraceError: A model has other bodies than its trace.
+        EngineError: The process that draws gave up.
+    """
+    sides = [
+        motion_of(trace, model, timing.times) for trace, model in zip(traces, models, strict=True)
+    ]
+    return drawn(sides, size, camera or camera_for(sides, size[0] / size[1]), renderer)
+
+
+def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
+    """The poses of a trace at times (n,), counted from its start: each of the nearest row.
+
+    A trace without poses has them from its qpos.
+
+    Raises:
+        TraceError: The model has other bodies than the trace, or a pose is no number.
+    """
+    if tuple(model.body_names) != trace.header.bodies:
+        raise TraceError(
+            f"{model.path.name} has other bodies than the trace of {trace.header.experiment}: "
+            "it cannot be drawn with it"
+        )
+    rows = nearest(trace.time - trace.time[0], times)
+    if "xpos" not in trace or "xquat" not in trace:
+        return Motion(drawing_of(model), *poses_through(model, trace.qpos[rows]))
+    xpos, xquat = trace["xpos"][rows], trace["xquat"][rows]
+    strange = ~(np.isfinite(xpos).all((1, 2)) & np.isfinite(xquat).all((1, 2)))
+    if strange.any():
+        raise TraceError(
+            f"from {times[int(np.argmax(strange))]:.3g} s on the trace has no poses of the "
+            "bodies that are numbers: it cannot be drawn"
+        )
+    return Motion(drawing_of(model), xpos, xquat)
+
+
+def _strip(traces: Sequence[Trace], comparison: Comparison | None) -> QuantityChart | None:
     """How far apart the fingertips are; without one, what is farthest beyond its tolerance."""
-    if two is None:
-        return None
     if comparison is None:
-        comparison = compare(one, two)
+        return None
+    one, two = traces
     charts = charts_of(comparison, one, two, series(one, two), None)
     return max(
         charts,
-        key=lambda each: (each.curve.kind == "tip", each.found.tolerances()),
+        key=lambda chart: (chart.curve.kind == "tip", chart.found.tolerances()),
         default=None,
     )
+
+
+def write_webp(out: BinaryIO, pictures: Iterator[Any], milliseconds: list[int]) -> None:
+    """Write an animated WebP; `pictures` are Pillow's images, taken one at a time."""
+    reel = next(pictures).copy()
+    at = 0
+
+    def seek(number: int) -> None:
+        # Pillow asks for picture after picture, and in the end for the first again.
+        nonlocal at
+        while at < number:
+            reel.paste(next(pictures))
+            at += 1
+
+    # An image of many pictures, as Pillow knows them, that holds one of them at a time.
+    reel.n_frames, reel.seek = len(milliseconds), seek
+    reel.save(out, duration=milliseconds, **_WEBP)
+
+
+def _write_mp4(path: Path, pictures: Iterator[Any], size: tuple[int, int], fps: float) -> None:
+    """Write an mp4 that every player takes: H.264, 4:2:0, its index at the beginning.
+
+    Raises:
+        EngineError: ffmpeg gave up.
+    """
+    import imageio_ffmpeg
+
+    command = [
+        *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error"),
+        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}"),
+        *("-i", "-", "-an", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"),
+        *("-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact"),
+    ]
+    with beside(path) as (name,), tempfile.TemporaryFile() as errors:
+        child = subprocess.Popen(
+            [*command, "-f", "mp4", name],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            start_new_session=True,  # a Ctrl-C of the terminal is ours to hear, and to end it then
+        )
+        assert child.stdin is not None
+        try:
+            with suppress(BrokenPipeError):  # it gave up: its code says so
+                for picture in pictures:
+                    child.stdin.write(picture.tobytes())
+                child.stdin.close()
+            code = child.wait()
+        finally:  # also on Ctrl-C: no ffmpeg is left behind
+            child.kill()
+            with suppress(OSError):
+                child.stdin.close()
+            child.wait()
+        if code:
+            errors.seek(0)
+            raise EngineError(f"ffmpeg gave up: {last_line(errors.read(), code)}")

@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 
 from ..drawing.shots import GHOST
+from ..interface import Array
 from ..measures.text import quantity
-from ..rendering import Timing
-from .figures import chart
+from .figures import INK, SETTINGS, draw_picture, saved
 from .over_time import QuantityChart
 
-_INK, _PAPER = (34, 34, 34), (255, 255, 255)
-_VIOLET = tuple(round(255 * part) for part in GHOST)
-_ORANGE = (230, 159, 0)
+_ORANGE = "#e69f00"  # of the solid side's mark
 STRIP = 0.18  # of the film's height
-_BOX = (0.11, 0.25, 0.86, 0.5)  # of the axes of a strip: left, bottom, width, height
+_BOX = (0.11, 0.25, 0.86, 0.5)  # of the axes within a strip: left, bottom, width, height
 _TO_COME = 0.6  # how pale the curve is after the moment that is shown
+_DOTS = 100  # to an inch
 
 
 class Overlay:
@@ -32,108 +31,105 @@ class Overlay:
     def __init__(
         self,
         size: tuple[int, int],
-        timing: Timing,
+        times: Array,
+        slow: float,
         title: str,
         labels: Sequence[str],
         strip: QuantityChart | None,
     ) -> None:
-        """Prepare what is the same in all pictures.
+        """Draw what is the same in all pictures.
 
         Args:
             size: Width and height of the film.
-            timing: Of the film.
+            times: (n,) simulated time of each picture [s].
+            slow: How many times as long as simulated time it takes.
             title: What is done.
             labels: Who the solid side is, and the ghost.
             strip: How far apart the sides are, drawn below.
         """
+        from matplotlib.font_manager import findfont
         from PIL import Image, ImageFont
 
-        self._size, self._timing, self._strip = size, timing, strip
-        self._labels, self._title = [_plain(label) for label in labels], _plain(title)
+        self._size, self._times, self._strip = size, times, strip
         self._text = max(10, round(min(size[1] / 30, size[0] / 40)))
-        self._font = ImageFont.load_default(self._text)
-        self._fine = max(9, round(0.8 * self._text))
-        self._small = ImageFont.load_default(self._fine)
+        self._font = ImageFont.truetype(findfont("DejaVu Sans"), max(9, round(0.8 * self._text)))
         # Even heights: mp4 keeps colours by squares of two pixels.
-        self._low = low = 2 * round(STRIP * size[1] / 2) if strip is not None else 0
+        self._low = 2 * round(STRIP * size[1] / 2) if strip is not None else 0
         self._high = 2 * round(1.6 * self._text)
-        self.inner = (size[0], size[1] - self._high - low)
-        slow = timing.slow
+        self.inner = (size[0], size[1] - self._high - self._low)
         self._speed = "real time" if slow == 1 else f"{_ratio(slow)} of real time"
-        if strip is not None:
-            inches = size[0] / 100, low / 100
-            content = io.BytesIO(chart(strip.gap(), "png", inches, _BOX))
-            self._done = Image.open(content).convert("RGB").resize((size[0], low))
-            paper = Image.new("RGB", self._done.size, _PAPER)
-            self._to_come = Image.blend(self._done, paper, _TO_COME)
+        points = 72 / _DOTS * self._text
+        content = saved(
+            lambda: self._paper(title, labels, points),
+            "png",
+            {**SETTINGS, "font.size": 8, "axes.linewidth": 0.6},
+            _DOTS,
+        )
+        self._done = Image.open(io.BytesIO(content)).convert("RGB")
+        white = Image.new("RGB", size, "white")
+        self._to_come = Image.blend(self._done, white, _TO_COME)
 
-    def paint(self, frame: Any, k: int) -> Any:
-        """The picture of moment `k`, whole, as an image of Pillow's."""
+    def _paper(self, title: str, labels: Sequence[str], points: float) -> Any:
+        """Title, labels and the strip, as a figure of matplotlib's."""
+        from matplotlib.figure import Figure
+        from matplotlib.patches import Patch
+
+        width, height = self._size
+        figure = Figure((width / _DOTS, height / _DOTS), facecolor="white")
+        figure.text(0.01, 1 - 0.3 * self._text / height, title, va="top", size=points)
+        marks = [Patch(color=_ORANGE), Patch(facecolor=(*GHOST, 0.5), edgecolor=GHOST, linewidth=2)]
+        long = max(map(len, labels)) * 0.6 * self._text > 0.6 * width
+        figure.legend(
+            marks[: len(labels)],
+            labels,
+            loc="upper right",
+            frameon=False,
+            fontsize=(0.8 if long else 1) * points,
+            handlelength=1,
+            borderaxespad=0.1,
+            labelspacing=0.3,
+        )
+        if self._strip is not None:
+            left, bottom, wide, high = _BOX
+            share = self._low / height
+            axes = figure.add_axes((left, bottom * share, wide, high * share))
+            draw_picture(axes, self._strip.gap())
+        return figure
+
+    def paint(self, shot: Any, k: int) -> Any:
+        """Picture `k`, whole, as an image of Pillow's."""
         from PIL import Image, ImageDraw
 
-        time = float(self._timing.times[k])
-        image = Image.new("RGB", self._size, _PAPER)
-        image.paste(Image.fromarray(frame), (0, self._high))
-        draw = ImageDraw.Draw(image, "RGBA")
-        self._head(draw, time)
+        (width, height), time = self._size, float(self._times[k])
+        image = self._done.copy()
+        image.paste(Image.fromarray(shot), (0, self._high))
+        draw, pad = ImageDraw.Draw(image), round(0.3 * self._text)
+        digits = 3 if self._times[-1] < 100 else 1
+        text = f"t = {time:.{digits}f} s, {self._speed}"
+        draw.text((pad, pad + round(1.35 * self._text)), text, font=self._font, fill=INK)
         if self._strip is not None:
-            self._foot(image, draw, time)
+            top = height - self._low
+            share = time / max(float(self._strip.curve.time[-1]), 1e-12)
+            x = round((_BOX[0] + min(1.0, share) * _BOX[2]) * width)
+            rest = (x, top, width, height)
+            image.paste(self._to_come.crop(rest), rest)
+            ends = top + (1 - _BOX[1] - _BOX[3]) * self._low, top + (1 - _BOX[1]) * self._low
+            draw.line((x, ends[0], x, ends[1]), fill=INK, width=1)
+            draw.text((pad, top), _gap_at(self._strip, time), font=self._font, fill=INK)
         return image
 
-    def _head(self, draw: Any, time: float) -> None:
-        """Above the picture: what and when on the left, who on the right."""
-        pad, line = round(0.3 * self._text), round(1.35 * self._text)
-        width = self._size[0]
-        digits = 3 if self._timing.seconds < 100 else 1
-        draw.text((pad, pad), self._title, font=self._font, fill=_INK)
-        draw.text(
-            (pad, pad + line),
-            f"t = {time:.{digits}f} s, {self._speed}",
-            font=self._small,
-            fill=_INK,
-        )
-        fonts = self._font
-        widest = max(fonts.getlength(label) for label in self._labels)
-        if widest > 0.6 * width:
-            fonts = self._small
-            widest = max(fonts.getlength(label) for label in self._labels)
-        left = width - pad - widest
-        side = round(0.8 * self._text)
-        for row, label in enumerate(self._labels):
-            y = pad + row * line
-            draw.text((left, y), label, font=fonts, fill=_INK)
-            box = (left - 1.6 * side, y + 0.2 * side, left - 0.6 * side, y + 1.2 * side)
-            if row:
-                draw.rectangle(box, fill=(*_VIOLET, 130), outline=_VIOLET, width=2)
-            else:
-                draw.rectangle(box, fill=_ORANGE)
 
-    def _foot(self, image: Any, draw: Any, time: float) -> None:
-        strip, top = self._strip, self._size[1] - self._low
-        assert strip is not None
-        share = min(1.0, time / max(self._timing.seconds, 1e-12))
-        x = round((_BOX[0] + share * _BOX[2]) * self._size[0])
-        image.paste(self._to_come, (0, top))
-        image.paste(self._done.crop((0, 0, x, self._low)), (0, top))
-        ends = top + (1 - _BOX[1] - _BOX[3]) * self._low, top + (1 - _BOX[1]) * self._low
-        draw.line((x, ends[0], x, ends[1]), fill=_INK, width=1)
-        # The last moment that was compared: what is shown is not guessed between two.
-        curve = strip.curve
-        row = max(0, int(np.searchsorted(curve.time, time + 1e-9, side="right")) - 1)
-        gap = quantity(float(curve.difference[row]), curve.unit)
-        tolerance = quantity(strip.found.tolerance, curve.unit)
-        text = f"{strip.title}: {gap} apart; dotted: the tolerance, {tolerance}"
-        draw.text((0.5 * self._text, top), _plain(text), font=self._small, fill=_INK)
+def _gap_at(strip: QuantityChart, time: float) -> str:
+    """How far apart the sides are at the last moment that was compared; nothing is guessed."""
+    curve = strip.curve
+    row = max(0, int(np.searchsorted(curve.time, time + 1e-9, side="right")) - 1)
+    gap = quantity(float(curve.difference[row]), curve.unit)
+    tolerance = quantity(strip.found.tolerance, curve.unit)
+    return f"{strip.title}: {gap} apart; dotted: the tolerance, {tolerance}"
 
 
 def _ratio(slow: float) -> str:
-    """The speed at which simulated time is shown: "1/4", or "2 x"."""
+    """The speed at which simulated time is shown: "1/4", or "2 ×"."""
     if slow > 1 and slow == round(slow):
         return f"1/{slow:.0f}"
-    return f"{1 / slow:.3g} x"
-
-
-def _plain(text: str) -> str:
-    """In letters that Pillow's own font has."""
-    text = text.replace("–", "-").replace("×", "x").replace("µ", "u")
-    return text.encode("ascii", "replace").decode()
+    return f"{1 / slow:.3g} ×"

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import base64
-import tempfile
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
+import io
 
 import numpy as np
 
 from ..backends import load
+from ..drawing import drawing_of
 from ..drawing.camera import Camera, framed
+from ..drawing.motion import Motion, camera_for, poses_through
+from ..engines.pictures import drawn, renderer_here
 from ..errors import MissingEngineError
 from ..installed import require_extra
 from ..interface import Array
 from ..page import Picture, RobotPicture
-from ..rendering import Motion, camera_for, drawn, motion_through, renderer_here
 from .figures import svg
-from .film_files import write_webp
+from .film import write_webp
 
 _SIZE = (480, 360)
 _LAST = 1500  # milliseconds that the last pose of a film is shown
@@ -34,21 +33,19 @@ def webp(picture: RobotPicture) -> bytes:
     image_of = require_extra("PIL.Image", "the picture of a robot", "Pillow", "render")
     renderer = renderer_here()
     model = load(picture.model)
-    motions = [motion_through(model, qpos) for qpos in picture.poses() if qpos is not None]
-    camera = camera_for(motions, (model,) * len(motions), _SIZE)
+    drawing = drawing_of(model)
+    sides = [
+        Motion(drawing, *poses_through(model, qpos)) for qpos in picture.poses() if qpos is not None
+    ]
+    camera = camera_for(sides, _SIZE[0] / _SIZE[1])
     if picture.near:
-        camera = _close(camera, motions, model.body_id(picture.near))
-
-    def images() -> Iterator[Any]:
-        for pixels in drawn(motions, _SIZE, camera, renderer):
-            yield image_of.fromarray(pixels)
-
-    milliseconds = [round(1000 * picture.interval)] * len(motions[0].xpos)
+        camera = _close(camera, sides, model.body_id(picture.near))
+    milliseconds = [round(1000 * picture.interval)] * len(sides[0].xpos)
     milliseconds[-1] = _LAST
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "picture.webp")
-        write_webp(path, images(), milliseconds)
-        return path.read_bytes()
+    out = io.BytesIO()
+    shots = drawn(sides, _SIZE, camera, renderer)
+    write_webp(out, (image_of.fromarray(shot) for shot in shots), milliseconds)
+    return out.getvalue()
 
 
 def drawn_picture(picture: Picture) -> tuple[bytes, str]:
@@ -71,9 +68,9 @@ def inline(picture: Picture) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _close(camera: Camera, motions: list[Motion], body: int) -> Camera:
+def _close(camera: Camera, sides: list[Motion], body: int) -> Camera:
     """A camera in the same direction that sees what is about a body."""
-    places: Array = np.concatenate([motion.xpos[:, body] for motion in motions])
+    places: Array = np.concatenate([side.xpos[:, body] for side in sides])
     corners = _CLOSE * np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
     points = (places[:, None] + corners).reshape(-1, 3)
     return framed(points, _SIZE[0] / _SIZE[1], camera.azimuth, camera.elevation)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import Drawing, Part
+from ..drawing.camera import Camera
 from ..measures.text import millimetres, position, short_time
 from .live import Command, Tempo
 from .session import FASTEST, SLOWEST, Session, Snapshot
@@ -83,7 +84,10 @@ class ViserFront:
         scene.configure_default_lights(enabled=True, cast_shadow=True)
         camera = self._server.initial_camera
         camera.look_at = drawing.center
-        camera.position = drawing.eye(_DISTANCE * drawing.extent)
+        eye = Camera(
+            drawing.center, _DISTANCE * drawing.extent, drawing.azimuth, drawing.elevation
+        ).eye
+        camera.position = tuple(eye.tolist())
         camera.up = (0.0, 0.0, 1.0)
         for part in drawing.parts:
             if part.body == 0:
