@@ -63,7 +63,7 @@ check: $(VENV)/test.stamp
 	@$(BIN)/lint-imports
 	@$(BIN)/python -m reference.size
 	@$(BIN)/pyright --pythonpath $(BIN)/python
-	@$(BIN)/check-jsonschema -q --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	@$(BIN)/check-jsonschema -q --builtin-schema vendor.github-workflows .github/workflows/*.yml docs/upgrade.yml
 	@$(BIN)/check-jsonschema -q --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/[!c]*.yml
 	@$(BIN)/check-jsonschema -q --builtin-schema vendor.citation-file-format CITATION.cff
 

@@ -91,10 +91,39 @@ def backends_of(versions: str) -> list[str]:
     """
     names = [f"{DEFAULT}=={word.strip()}" for word in versions.split(",")]
     others = [name for name in names if version_of(name) != engine_version(DEFAULT)]
-    missing = [name for name in others if not _python_in(folder() / name).exists()]
+    missing = [name for name in others if not is_here(name)]
     if missing:
         raise MissingEngineError(_ADD.format(" and ".join(missing), " ".join(missing)))
     return [*others, DEFAULT]
+
+
+def is_here(name: str) -> bool:
+    """Whether a release has an environment."""
+    return _python_in(folder() / name).exists()
+
+
+def published(since: str) -> list[str]:
+    """The backends of all releases since one, up to the one that is installed, the oldest first.
+
+    The package index names them.
+
+    Raises:
+        EngineError: It cannot be asked.
+        BadInputError: It has no such release.
+    """
+    asked = [sys.executable, "-m", "pip", "index", "versions", DEFAULT]
+    done = subprocess.run(asked, capture_output=True, text=True, stdin=subprocess.DEVNULL)  # noqa: PLW1510
+    line = re.search(r"^Available versions: (.*)$", done.stdout, re.MULTILINE)
+    if line is None:
+        reason = (done.stderr.strip().splitlines() or ["pip does not say"])[-1]
+        raise EngineError(f"the releases of {DEFAULT} cannot be listed: {reason}")
+    installed = engine_version(DEFAULT)
+    newest_first = [version.strip() for version in line[1].split(",")]
+    if since not in newest_first:
+        raise BadInputError(f"the package index has no {DEFAULT}=={since}")
+    start = newest_first.index(installed) + 1 if installed in newest_first else 0
+    older = newest_first[start : newest_first.index(since) + 1]
+    return [*(f"{DEFAULT}=={version}" for version in reversed(older)), DEFAULT]
 
 
 def _python_in(place: Path) -> Path:
@@ -125,7 +154,7 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         EngineError: It cannot be installed, or does not run.
     """
     version, home = version_of(name), folder()
-    if _python_in(home / name).exists():
+    if is_here(name):
         say(f"{name} is here already")
         return
     if shutil.which(python) is None:

@@ -142,6 +142,27 @@ class TestReleases:
         assert main(["compare", "fall", *versions]) == 0
         assert "is the same" in capsys.readouterr().out
 
+    def test_bisection_finds_the_release_that_changed_it(
+        self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        since = releases.published("3.3.7")
+        assert (since[0], since[-1]) == (OLD, "mujoco")
+        assert "mujoco==3.4.0" in since
+        assert SAME not in since
+        with pytest.raises(BadInputError, match=r"has no mujoco==3\.3\.99"):
+            releases.published("3.3.99")
+        # Each release of this row is here: the change is from the last 3.3.7 to the first 4.0.0.
+        monkeypatch.setattr(
+            releases, "published", lambda _since: [OLD] * 4 + [SAME] * 3 + ["mujoco"]
+        )
+        asked = ("--versions", "3.3.7", "--bisect", "--model", "so101", "--json")
+        assert main(["compare", "hold", *asked]) == SAYS_NO
+        pairs = [
+            (pair["one"]["backend"], pair["two"]["backend"], pair["agrees"])
+            for pair in json.loads(capsys.readouterr().out)
+        ]
+        assert pairs == [(OLD, OLD, True), (OLD, SAME, False), (SAME, "mujoco", True)]
+
     def test_what_a_release_cannot_read_is_said(self) -> None:
         with pytest.raises(ModelError, match=r"MuJoCo 3\.0\.1 cannot read .*'kv'"):
             sm.load("so101", backend=STRANGE)

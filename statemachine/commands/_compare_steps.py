@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +28,11 @@ OPTIONS: tuple[Row, ...] = (
         "--versions",
         "V,V,…",
         "run on releases of MuJoCo, and on the one that is installed: between which it changes",
+    ),
+    (
+        "--bisect",
+        "",
+        "with --versions V: add releases since V until it is known which one changed it",
     ),
 )
 
@@ -83,22 +89,54 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
 def _versions(options: argparse.Namespace, request: Any) -> int:
     from ..compare import compare, sides_of
     from ..measures import parse_tolerances
-    from ..releases import backends_of
+    from ..releases import backends_of, published
     from ..report.progress import progress
     from ..report.versions import page
     from ..runs.drive import part_of
 
     tolerances = parse_tolerances(options.tolerance)
     check_junit(options)
-    pairs = list(pairwise(backends_of(options.versions)))
-    comparisons = []
-    with progress("versions") as told:
-        for k, pair in enumerate(pairs):
-            share = part_of(told, k / len(pairs), 1 / len(pairs))
-            traces, _ = sides_of(replace(request, backends=pair), share)
-            comparisons.append(compare(*traces, tolerances=tolerances))
+
+    def compared(pair: tuple[str, str], *bar: Any) -> Any:
+        traces, _ = sides_of(replace(request, backends=pair), *bar)
+        return compare(*traces, tolerances=tolerances)
+
+    if options.bisect:
+        backends = _around_a_change(published(options.versions), compared)
+    else:
+        backends = backends_of(options.versions)
+    pairs = list(pairwise(backends))
+    with progress("versions") as bar:
+        comparisons = [
+            compared(pair, part_of(bar, k / len(pairs), 1 / len(pairs)))
+            for k, pair in enumerate(pairs)
+        ]
     write_junit(options, comparisons)
     return show(page(comparisons, _name(request)), comparisons, options.json)
+
+
+def _around_a_change(
+    backends: Sequence[str], compared: Callable[[tuple[str, str]], Any]
+) -> list[str]:
+    """The first and the last of a row of releases, and two neighbours between that differ.
+
+    By bisection: the left bound agrees with the first one. Releases that are not here are added.
+    """
+    from ..releases import add, is_here, is_release
+
+    def differs(k: int) -> bool:
+        for name in (backends[0], backends[k]):
+            if is_release(name) and not is_here(name):
+                add(name, say=lambda line: print(line, file=sys.stderr))
+        return not compared((backends[0], backends[k])).agrees
+
+    left, right = 0, len(backends) - 1
+    if not differs(right):
+        return [backends[0], backends[-1]]
+    while right - left > 1:
+        middle = (left + right) // 2
+        left, right = (left, middle) if differs(middle) else (middle, right)
+    return [backends[k] for k in sorted({0, left, right, len(backends) - 1})]
 
 
 def check_junit(options: argparse.Namespace) -> None:

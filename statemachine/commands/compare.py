@@ -133,6 +133,7 @@ RULES: tuple[Rule, ...] = (
     ("versions", EXCLUDES, "why html plot film models uncertainty backends"),
     ("one_step", EXCLUDES, "converge"),
     ("junit", EXCLUDES, "why one_step converge models"),
+    ("bisect", NEEDS, "versions"),
     ("versions", EXCLUDES, "one_step converge"),
     (_OF_RUN, EXCLUDES, "models", "{flag} is of a run, and --models runs nothing"),
 )
