@@ -395,8 +395,8 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     """A limp arm without joint damping, which reaches its limits and the floor."""
     from statemachine.engines.pybullet import dials as module
 
-    fresh = quietly("so101/scene", defaults="engine")
-    fresh = fresh.replace(gravity=[0, 0, -9.81], actuation=False)
+    loaded = quietly("so101/scene", defaults="engine")
+    fresh: Any = loaded.replace(gravity=[0, 0, -9.81], actuation=False)
     raw = fresh.compiled
 
     def limp(world: Any) -> None:
