@@ -76,7 +76,7 @@ class PybulletDials:
 
     def _with_motors(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         raw = self.model.compiled
-        model = cast("PybulletModel", self.model.replace(**_world_options(dials, values)))
+        model = self.model.replace(**_world_options(dials, values))
         joint = values["damping"] if dials.get("damping") == "model" else np.zeros(raw.nv)
         acts: dict[str, Act] = {
             "inertia": partial(_set_inertias, inertias=raw.body_inertia),
@@ -133,16 +133,11 @@ class PybulletDials:
         return np.array(told)
 
 
-def _dialled(model: PybulletModel, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
+def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:
     """A Model whose worlds are given some settings; what `forward` computes knows nothing of it."""
-    return PybulletModel(
-        plan or model.plan,
-        model.path,
-        model.substeps,
-        model.defaults,
-        model._asked,
-        (*model.acts, *acts),
-    )
+    own = cast("PybulletModel", model)
+    every = (*own.acts, *acts)
+    return PybulletModel(plan or own.plan, own.path, own.substeps, own.defaults, own._asked, every)
 
 
 def _world_options(dials: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
