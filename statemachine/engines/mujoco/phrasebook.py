@@ -9,10 +9,6 @@ from ..measured import ANGLE, TORQUE, Cell, Phrases, accelerated, near
 from ..samples import PENDULUM_MJCF, acceleration, tip_at
 
 
-def _loaded(n: Any) -> bool:
-    return n.m.nq == n.m.nu == 1 and n.d.time == 0
-
-
 def _accelerates(n: Any, torque: float) -> bool:
     """The engine computes with the state, and with the command."""
     n.mujoco.mj_forward(n.m, n.d)
@@ -22,15 +18,6 @@ def _accelerates(n: Any, torque: float) -> bool:
 def _stepped(n: Any) -> bool:
     h = n.m.opt.timestep
     return n.d.time == h and near((n.d.qpos[0], n.d.qvel[0]), accelerated(h), 1e-12)
-
-
-def _recomputed(n: Any) -> bool:
-    """And no time has passed."""
-    return n.d.time == n.m.opt.timestep and near(n.d.site("tip").xpos, tip_at(n.d.qpos[0]), 1e-12)
-
-
-def _read(n: Any) -> bool:
-    return near(n.tip, tip_at(n.d.qpos[0]), 1e-12)
 
 
 def _was_reset(n: Any) -> bool:
@@ -57,13 +44,20 @@ _CELLS = {
         "import numpy as np\n"
         "m = mujoco.MjModel.from_xml_path(file)\n"
         "d = mujoco.MjData(m)",
-        _loaded,
+        lambda n: n.m.nq == n.m.nu == 1 and n.d.time == 0,
     ),
     "state": Cell(f"d.qpos[0], d.qvel[0] = {ANGLE}, 0", partial(_accelerates, torque=0.0)),
     "command": Cell(f"d.ctrl[0] = {TORQUE}", partial(_accelerates, torque=TORQUE)),
     "step": Cell("mujoco.mj_step(m, d)", _stepped),
-    "recompute": Cell("mujoco.mj_forward(m, d)", _recomputed),
-    "read a site": Cell('tip = d.site("tip").xpos', _read),
+    "recompute": Cell(
+        "mujoco.mj_forward(m, d)",  # and no time passes
+        lambda n: (
+            n.d.time == n.m.opt.timestep and near(n.d.site("tip").xpos, tip_at(n.d.qpos[0]), 1e-12)
+        ),
+    ),
+    "read a site": Cell(
+        'tip = d.site("tip").xpos', lambda n: near(n.tip, tip_at(n.d.qpos[0]), 1e-12)
+    ),
     "reset": Cell("mujoco.mj_resetData(m, d)", _was_reset),
     "save": Cell(
         "part = mujoco.mjtState.mjSTATE_INTEGRATION\n"

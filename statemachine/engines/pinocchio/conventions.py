@@ -14,6 +14,8 @@ from ...interface import Array
 from .. import samples
 from ..measured import Absent, LetGo, Measurement, ReadTwice
 
+pin: Any = require("pinocchio")
+
 
 def names_with(pin: Any, *words: str) -> tuple[str, ...]:
     """Public names of Pinocchio's, and of its Data's, that have one of the words in them."""
@@ -25,30 +27,29 @@ def names_with(pin: Any, *words: str) -> tuple[str, ...]:
     )
 
 
-def _marks(pin: Any, model: Any, data: Any, q: Array) -> Array:
+def _marks(model: Any, data: Any, q: Array) -> Array:
     """The marks in the world (3, 3) [m]."""
     pin.framesForwardKinematics(model, data, q)
     frames = [model.getFrameId(f"mark{k}") for k in range(len(samples.MARKS))]
     return np.array([data.oMf[frame].translation for frame in frames])
 
 
-def _free_body() -> tuple[Any, Any, Any]:
-    """The engine, a Model of the marked body on a free-flyer, and a Data."""
-    pin = require("pinocchio")
+def _free_body() -> tuple[Any, Any]:
+    """A Model of the marked body on a free-flyer, and a Data."""
     model = pin.buildModelFromXML(samples.MARKED_URDF, pin.JointModelFreeFlyer())
-    return pin, model, model.createData()
+    return model, model.createData()
 
 
 def _absent(*words: str, part: str = "", figures: tuple[Measurement, ...] = ()) -> Absent:
-    return Absent(words, names_with(require("pinocchio"), *words), part, figures)
+    return Absent(words, names_with(pin, *words), part, figures)
 
 
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
     """Four numbers into the q of a free-flyer."""
-    pin, model, data = _free_body()
+    model, data = _free_body()
     return [
         (
-            _marks(pin, model, data, np.array([0, 0, 0, *four])),
+            _marks(model, data, np.array([0, 0, 0, *four])),
             np.array(pin.SE3ToXYZQUAT(data.oMi[1])[3:]),
         )
         for four in fours
@@ -57,15 +58,15 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
     """Six numbers, times a short time, into integrate."""
-    pin, model, data = _free_body()
+    model, data = _free_body()
     q = np.array([*place, *four])
-    before = _marks(pin, model, data, q)
-    return before, _marks(pin, model, data, pin.integrate(model, q, six * seconds))
+    before = _marks(model, data, q)
+    return before, _marks(model, data, pin.integrate(model, q, six * seconds))
 
 
 def gravity(_steps: int) -> tuple[Array, Array]:
     """The acceleration of a free body on which nothing else acts."""
-    pin, model, data = _free_body()
+    model, data = _free_body()
     still = np.zeros(model.nv)
     # At a pose without turn the body's axes are the world's.
     fall = pin.aba(model, data, pin.neutral(model), still, still)
@@ -74,7 +75,7 @@ def gravity(_steps: int) -> tuple[Array, Array]:
 
 def timestep() -> Absent:
     """Whether there is a step at all; integrate takes the time from its caller."""
-    pin, model, _ = _free_body()
+    model, _ = _free_body()
     q, v = pin.neutral(model), np.zeros(model.nv)
     v[0] = 1
     moved = float(pin.integrate(model, q, v)[0] - q[0])
@@ -84,7 +85,6 @@ def timestep() -> Absent:
 
 def actuation(_seconds: float) -> list[LetGo]:
     """The acceleration at zero torque: there is nothing else that could act."""
-    pin = require("pinocchio")
     model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     rest = np.zeros(model.nv)
     started = float(pin.aba(model, model.createData(), pin.neutral(model), rest, rest)[0])
@@ -101,7 +101,6 @@ command = damping = step = friction = _no_step
 
 def write(angle: float, _deep: float) -> list[ReadTwice]:
     """Another q, handed to one function after the other."""
-    pin = require("pinocchio")
     model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     data, tip = model.createData(), model.getFrameId("tip")
     pin.framesForwardKinematics(model, data, pin.neutral(model))
@@ -116,7 +115,6 @@ def write(angle: float, _deep: float) -> list[ReadTwice]:
 
 def joints() -> dict[str, list[str]]:
     """The names of the joints after the universe, from a URDF and from an MJCF."""
-    pin = require("pinocchio")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "tree.xml"  # of an MJCF it takes files only
         file.write_text(samples.TREE_MJCF, encoding="utf-8")
@@ -134,7 +132,6 @@ def reset() -> Absent:
 
 def save(*_given: object) -> float:
     """Whether its Data holds a state: whether anything of its past shows in what comes out."""
-    pin = require("pinocchio")
     model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     used, new = model.createData(), model.createData()
     q = pin.neutral(model)

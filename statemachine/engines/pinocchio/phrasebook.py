@@ -7,25 +7,14 @@ from typing import Any
 import numpy as np
 
 from ..measured import ANGLE, TORQUE, Cell, Phrases, accelerated, near
-from ..samples import PENDULUM_URDF, TIP, acceleration, tip_at
+from ..samples import PENDULUM_URDF, acceleration, tip_at
 from .conventions import names_with
 
 _STEP = 0.002  # s; whatever its user likes
 
 
-def _loaded(n: Any) -> bool:
-    return n.m.nq == n.m.nv == 1 and n.m.existFrame("tip")
-
-
-def _has_state(n: Any) -> bool:
-    """Functions take it."""
-    return near(n.pin.aba(n.m, n.d, n.q, n.v, np.zeros(1)), acceleration(ANGLE, 0), 1e-6)
-
-
-def _commanded(n: Any) -> bool:
-    return not names_with(n.pin, "actuat", "motor") and near(
-        n.pin.aba(n.m, n.d, n.q, n.v, n.tau), acceleration(ANGLE, TORQUE), 1e-6
-    )
+def _accelerates(n: Any, torque: Any, expected: float) -> bool:
+    return near(n.pin.aba(n.m, n.d, n.q, n.v, torque), acceleration(ANGLE, expected), 1e-6)
 
 
 def _stepped(n: Any) -> bool:
@@ -34,34 +23,20 @@ def _stepped(n: Any) -> bool:
     )
 
 
-def _recomputed(n: Any) -> bool:
-    return _stepped(n) and near(n.d.oMf[n.m.getFrameId("tip")].translation, tip_at(n.q[0]), 1e-12)
-
-
-def _read(n: Any) -> bool:
-    return near(n.tip, tip_at(n.q[0]), 1e-12)
+def _tip_at(n: Any, data: Any, angle: float) -> bool:
+    return near(data.oMf[n.m.getFrameId("tip")].translation, tip_at(angle), 1e-12)
 
 
 def _was_reset(n: Any) -> bool:
     n.pin.framesForwardKinematics(n.m, n.d, n.q)
-    tip = n.d.oMf[n.m.getFrameId("tip")].translation
-    return not names_with(n.pin, "reset") and near(tip, (TIP, 0, 0), 1e-12) and not n.v.any()
-
-
-def _restored(n: Any) -> bool:
-    """What was kept is still what it was."""
-    q, v = n.saved
-    return _was_reset(n) and near((q[0], v[0]), (0, 0), 0)
+    return not names_with(n.pin, "reset") and _tip_at(n, n.d, 0.0) and not n.v.any()
 
 
 def _apart(n: Any) -> bool:
-    for data, angle in zip(n.worlds, (0.1, 0.2, 0.3), strict=True):
+    worlds = dict(zip((0.1, 0.2, 0.3), n.worlds, strict=True))
+    for angle, data in worlds.items():
         n.pin.framesForwardKinematics(n.m, data, np.array([angle]))
-    frame = n.m.getFrameId("tip")
-    return all(
-        near(data.oMf[frame].translation, tip_at(angle), 1e-12)
-        for data, angle in zip(n.worlds, (0.1, 0.2, 0.3), strict=True)
-    )
+    return all(_tip_at(n, data, angle) for angle, data in worlds.items())
 
 
 _CELLS = {
@@ -70,10 +45,16 @@ _CELLS = {
         "import pinocchio as pin\n"
         "m = pin.buildModelFromUrdf(file)\n"
         "d = m.createData()",
-        _loaded,
+        lambda n: n.m.nq == n.m.nv == 1 and n.m.existFrame("tip"),
     ),
-    "state": Cell(f"q, v = np.array([{ANGLE}]), np.zeros(1)", _has_state),
-    "command": Cell(f"tau = np.array([{TORQUE}])  # a torque; no actuators", _commanded),
+    "state": Cell(
+        f"q, v = np.array([{ANGLE}]), np.zeros(1)",
+        lambda n: _accelerates(n, np.zeros(1), 0.0),  # functions take it
+    ),
+    "command": Cell(
+        f"tau = np.array([{TORQUE}])  # a torque; no actuators",
+        lambda n: not names_with(n.pin, "actuat", "motor") and _accelerates(n, n.tau, TORQUE),
+    ),
     "step": Cell(
         "a = pin.aba(m, d, q, v, tau)  # no step: integrate it yourself\n"
         f"v = v + {_STEP} * a\n"
@@ -83,15 +64,18 @@ _CELLS = {
     "recompute": Cell(
         "pin.forwardKinematics(m, d, q, v)  # joints\n"
         "pin.updateFramePlacements(m, d)    # and frames",
-        _recomputed,
+        lambda n: _stepped(n) and _tip_at(n, n.d, n.q[0]),
     ),
-    "read a site": Cell('tip = d.oMf[m.getFrameId("tip")].translation', _read),
+    "read a site": Cell(
+        'tip = d.oMf[m.getFrameId("tip")].translation',
+        lambda n: near(n.tip, tip_at(n.q[0]), 1e-12),
+    ),
     "reset": Cell("q, v = pin.neutral(m), np.zeros(m.nv)  # no reset", _was_reset),
     "save": Cell(
         "saved = q.copy(), v.copy()  # they are yours\n"
         "q = pin.integrate(m, q, np.ones(m.nv))\n"
         "q, v = saved  # back",
-        _restored,
+        lambda n: _was_reset(n) and n.saved[0][0] == n.saved[1][0] == 0,  # as it was kept
     ),
     "many worlds": Cell("worlds = [m.createData() for _ in range(3)]", _apart),
 }

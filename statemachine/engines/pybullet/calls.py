@@ -119,9 +119,10 @@ class _Arrays(WatchedObject):
         contents["time"] = marshal.dumps(machine.time, 2)
         # Not by asking the Data, which would compute what nobody has read.
         for name, value in machine.derived.items():
-            whole = name in DERIVED
-            parts = [value] if whole else [value.geom, value.dist, value.pos, value.force]
-            contents[name] = b"".join(part.tobytes() for part in parts)
+            arrays = (
+                [value] if name in DERIVED else [value.geom, value.dist, value.pos, value.force]
+            )
+            contents[name] = b"".join(array.tobytes() for array in arrays)
         return contents
 
     def differing(self, before: Contents, now: Contents) -> list[str]:

@@ -23,14 +23,6 @@ def _joint(n: Any) -> tuple[float, float]:
     return n.pb.getJointState(n.arm, 0, n.w)[:2]
 
 
-def _loaded(n: Any) -> bool:
-    return n.pb.getNumJoints(n.arm, n.w) == 2 and _joint(n) == (0, 0)
-
-
-def _has_state(n: Any) -> bool:
-    return _joint(n) == (ANGLE, 0)
-
-
 def _stepped(n: Any) -> bool:
     """As far as the damping that it gives its bodies lets it."""
     angle, speed = accelerated(n.pb.getPhysicsEngineParameters(n.w)["fixedTimeStep"])
@@ -49,18 +41,12 @@ def _recomputed(n: Any) -> bool:
     return _stepped(n) and near(read, tip_at(_joint(n)[0]), _SINGLE)
 
 
-def _read(n: Any) -> bool:
-    return near(n.tip, tip_at(_joint(n)[0]), _SINGLE)
-
-
 def _was_reset(n: Any) -> bool:
-    told = n.pb.getPhysicsEngineParameters(n.w)
-    inertia = n.pb.getDynamicsInfo(n.arm, 0, n.w)[2]
     return (
         n.pb.getNumBodies(n.w) == 1
         and _joint(n) == (0, 0)
-        and told["gravityAccelerationZ"] == -GRAVITY
-        and near(inertia, (INERTIA, INERTIA, INERTIA), _SINGLE)
+        and n.pb.getPhysicsEngineParameters(n.w)["gravityAccelerationZ"] == -GRAVITY
+        and near(n.pb.getDynamicsInfo(n.arm, 0, n.w)[2], (INERTIA,) * 3, _SINGLE)
     )
 
 
@@ -85,9 +71,9 @@ _CELLS = {
         "pb.setGravity(0, 0, -9.81, w)\n"
         "arm = pb.loadURDF(file, useFixedBase=True, physicsClientId=w,\n"
         "                  flags=pb.URDF_USE_INERTIA_FROM_FILE)",
-        _loaded,
+        lambda n: n.pb.getNumJoints(n.arm, n.w) == 2 and _joint(n) == (0, 0),
     ),
-    "state": Cell(f"pb.resetJointState(arm, 0, {ANGLE}, 0, w)", _has_state),
+    "state": Cell(f"pb.resetJointState(arm, 0, {ANGLE}, 0, w)", lambda n: _joint(n) == (ANGLE, 0)),
     "command": Cell(
         "pb.setJointMotorControl2(arm, 0, pb.VELOCITY_CONTROL,\n"
         "                         force=0, physicsClientId=w)  # motor\n"
@@ -102,7 +88,10 @@ _CELLS = {
         "pb.performCollisionDetection(w)     # and contacts",
         _recomputed,
     ),
-    "read a site": Cell("tip = pb.getLinkState(arm, 1, physicsClientId=w)[4]", _read),
+    "read a site": Cell(
+        "tip = pb.getLinkState(arm, 1, physicsClientId=w)[4]",
+        lambda n: near(n.tip, tip_at(_joint(n)[0]), _SINGLE),
+    ),
     "reset": Cell(
         "pb.resetSimulation(physicsClientId=w)  # and all of load again\n"
         "pb.setGravity(0, 0, -9.81, w)\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations, product
+from operator import itemgetter
 
 import numpy as np
 
@@ -39,15 +40,14 @@ def quaternion(turned: Sequence[tuple[Array, Array]]) -> Iterator[EngineAnswer]:
             the first of them [m], and the four numbers that are read.
     """
     should = np.array([_turned(mark) for mark in MARKS])
-    written: dict[str, float] = {}
-    told: dict[str, Array] = {}
-    for order, (marks, read) in zip(_FOURS, turned, strict=True):
-        told[order] = read
-        written[order] = float(np.abs(marks - should).max())
-    words, off, following = closest(written)
+    by_order = dict(zip(_FOURS, turned, strict=True))
+    words, off, following = closest(
+        {order: float(np.abs(marks - should).max()) for order, (marks, _) in by_order.items()}
+    )
     if words != UNDECIDED:
+        _, read = by_order[words]
         reads, _, _ = closest(
-            {order: float(np.abs(told[words] - four).max()) for order, four in _FOURS.items()}
+            {order: float(np.abs(read - four).max()) for order, four in _FOURS.items()}
         )
         words = words if reads == words else f"{words} written, {reads} read"
     figures = Measurement("off by", off, "m"), Measurement("the next order", following, "m")
@@ -125,36 +125,30 @@ def velocity(marks: tuple[Array, Array]) -> Iterator[EngineAnswer]:
         yield _nearest(best, "m/s", part)
 
 
-def _below(parent: str, by_name: bool) -> list[str]:
-    """Names of the joints on a link."""
-    children = [name for name, above, _ in TREE if above == parent]
-    return sorted(children) if by_name else children
+def _depth_first(
+    tree: Sequence[tuple[str, str, str]], parent: str = "base", level: int = 0
+) -> Iterator[tuple[int, str]]:
+    """Levels and names of the joints below a link."""
+    for name, above, _ in tree:
+        if above == parent:
+            yield level, name
+            yield from _depth_first(tree, name, level + 1)
 
 
-def depth_first(parent: str, by_name: bool) -> Iterator[str]:
-    """Names of the joints below a link."""
-    for name in _below(parent, by_name):
-        yield name
-        yield from depth_first(name, by_name)
+def _orders(tree: Sequence[tuple[str, str, str]], children: str) -> dict[str, list[str]]:
+    """The joints in each order, where those of one link come as they do in the tree."""
+    walk = list(_depth_first(tree))
+    return {
+        children: [name for name, _, _ in tree],
+        f"depth first, children {children}": [name for _, name in walk],
+        # Those of one level come in the order of a walk in depth, too.
+        f"breadth first, children {children}": [
+            name for _, name in sorted(walk, key=itemgetter(0))
+        ],
+    }
 
 
-def breadth_first(by_name: bool) -> Iterator[str]:
-    """Names of all joints, level by level."""
-    level = ["base"]
-    while level:
-        level = [name for parent in level for name in _below(parent, by_name)]
-        yield from level
-
-
-_listed = [name for name, _, _ in TREE]
-ORDERS = {
-    "as listed": _listed,
-    "by alphabet": sorted(_listed),
-    "depth first, children as listed": list(depth_first("base", False)),
-    "depth first, children by alphabet": list(depth_first("base", True)),
-    "breadth first, children as listed": list(breadth_first(False)),
-    "breadth first, children by alphabet": list(breadth_first(True)),
-}
+ORDERS = _orders(TREE, "as listed") | _orders(sorted(TREE), "by alphabet")
 
 
 @question(
