@@ -13,6 +13,7 @@ import numpy as np
 from ..backends import load
 from ..engines.auditing import Driver, ReferenceRun, SavePoint
 from ..interface import (
+    INPUTS,
     OPTIONS,
     Array,
     Contacts,
@@ -183,10 +184,16 @@ def require_close(got: Any, expected: Any, within: float, what: str) -> None:
 
 
 def require_raises(
-    kinds: type[Exception] | tuple[type[Exception], ...], *calls: Callable[[], Any]
+    kinds: type[Exception] | tuple[type[Exception], ...],
+    *calls: Callable[[], Any],
+    unchanged: Data | None = None,
 ) -> Exception:
-    """Each call raises one of these errors, whose message is not empty; the last of them."""
-    caught = Exception()
+    """Each call raises one of these errors, whose message is not empty; the last of them.
+
+    And the inputs and the time of `unchanged` are afterwards what they were, bit by bit.
+    """
+    caught, names = Exception(), (*INPUTS, "time") if unchanged else ()
+    before = {name: np.array(getattr(unchanged, name)) for name in names}
     for number, call in enumerate(calls):
         try:
             call()
@@ -195,6 +202,9 @@ def require_raises(
             require(bool(str(error)), f"{type(error).__name__} without a message")
         else:
             raise AssertionError(f"no error in call {number}; expected {kinds}")
+    for name, value in before.items():
+        now = getattr(unchanged, name)
+        require(np.array_equal(now, value, equal_nan=True), f"a refused call changed {name}")
     return caught
 
 

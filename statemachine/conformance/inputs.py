@@ -19,7 +19,7 @@ from ..errors import (
 )
 from ..interface import INPUTS, Data, Model, forward, get_state, make_data, reset, set_state, step
 from ..measures.readings import readings
-from ._lab import Lab, check, inputs_of, require, require_equal, require_raises
+from ._lab import Lab, check, require, require_equal, require_raises
 
 
 @check(on="box")
@@ -62,7 +62,6 @@ def check_assignment_copies_in(lab: Lab, model: Model, data: Data) -> None:
 @check(on="box", keyframe=0)
 def check_bad_assignment_changes_nothing(lab: Lab, model: Model, data: Data) -> None:
     """Wrong shape, length, kind, NaN, infinity or a zero quaternion: refused, unchanged."""
-    before = inputs_of(model, data)
     bad: list[tuple[str, Any]] = [
         ("ctrl", [0.0] * 5),
         ("ctrl", [[0.0] * 6]),
@@ -81,8 +80,7 @@ def check_bad_assignment_changes_nothing(lab: Lab, model: Model, data: Data) -> 
         ("time", np.nan),
         ("time", "soon"),
     ]
-    require_raises(BadInputError, *(partial(setattr, data, *each) for each in bad))
-    require_equal(inputs_of(model, data), before, "inputs after refused assignments")
+    require_raises(BadInputError, *(partial(setattr, data, *each) for each in bad), unchanged=data)
 
 
 @check(on="arm")
@@ -102,8 +100,8 @@ def check_derived_is_read_only(lab: Lab, model: Model, data: Data) -> None:
 def check_nstep_is_a_positive_whole_number(lab: Lab, model: Model, data: Data) -> None:
     """0, -1, 1.5, True, None and text are refused, and no time passes."""
     bad: tuple[Any, ...] = (0, -1, 1.5, 1.0, True, None, "2", 2**40, np.float64(3))
-    require_raises(BadInputError, *(partial(step, model, data, nstep) for nstep in bad))
-    require(data.time == 0.0, "time passed in a refused step")
+    calls = [partial(step, model, data, nstep) for nstep in bad]
+    require_raises(BadInputError, *calls, unchanged=data)
     step(model, data, np.int64(2))  # pyright: ignore[reportArgumentType]
     require(abs(data.time - 2 * model.timestep) < 1e-12, "a NumPy integer was not taken")
 
@@ -127,11 +125,8 @@ def check_not_finite_in_place_is_caught(lab: Lab, model: Model, data: Data) -> N
             set_state(model, data, good)
             require(get_state(model, data) == good, "set_state did not restore the State")
         getattr(data, name)[2] = value
-        before = [getattr(data, array).copy() for array in INPUTS]
-        require_raises(BadInputError, lambda: forward(model, data))
-        for array, old in zip(INPUTS, before, strict=True):
-            require(np.array_equal(getattr(data, array), old, equal_nan=True), f"{array} changed")
-        require_raises(BadInputError, lambda: get_state(model, data))
+        verbs = (lambda: forward(model, data)), (lambda: get_state(model, data))
+        require_raises(BadInputError, *verbs, unchanged=data)
         reset(model, data, keyframe=0)
     step(model, data, 10)
     require(bool(np.isfinite(data.qpos).all()), "not finite after the recovery")
@@ -196,10 +191,8 @@ def check_zero_quaternion_is_refused(lab: Lab, model: Model, data: Data) -> None
     """A quaternion of zeros names no rotation: step and forward refuse, unchanged."""
     start = lab.box_at[0] + 3
     data.qpos[start : start + 4] = 0.0
-    before = data.qpos.copy()
-    require_raises(BadInputError, lambda: step(model, data), lambda: forward(model, data))
-    require_equal(data.qpos, before, "qpos after a refused zero quaternion")
-    require(data.time == 0.0, "time passed in a refused step")
+    verbs = (lambda: step(model, data)), (lambda: forward(model, data))
+    require_raises(BadInputError, *verbs, unchanged=data)
 
 
 def check_foreign_data_is_refused(lab: Lab) -> None:
@@ -257,8 +250,8 @@ def check_unknown_names_are_refused(lab: Lab, model: Model, data: Data) -> None:
         lambda: reset(model, data, keyframe=-1),
         lambda: reset(model, data, keyframe="helt"),
         lambda: reset(model, data, keyframe=1.0),  # pyright: ignore[reportArgumentType]
+        unchanged=data,
     )
-    require(data.time == 0.0, "a refused reset changed the Data")
 
 
 def check_bad_options_are_refused(lab: Lab) -> None:

@@ -146,7 +146,8 @@ def check_foreign_states_are_refused(lab: Lab, model: Model, data: Data) -> None
         {"layout": good.layout[::-1]},
     )
     foreign = [boxed, *(dataclasses.replace(good, **other) for other in others)]
-    require_raises(ForeignStateError, *(partial(set_state, model, data, each) for each in foreign))
+    calls = [partial(set_state, model, data, state) for state in foreign]
+    require_raises(ForeignStateError, *calls, unchanged=data)
     not_finite = dataclasses.replace(good, blob=bad.tobytes())
     require_raises(BadInputError, lambda: set_state(model, data, not_finite))
     require_raises(TypeError, lambda: set_state(model, data, good.vector))  # pyright: ignore

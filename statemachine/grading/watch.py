@@ -200,27 +200,27 @@ def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[.
 
     @functools.wraps(original)
     def seen(data: Any, model: Any, advance: Callable[..., None], *more: Any) -> None:
-        def advanced(raw_model: Any, raw: Any, nstep: int = 1) -> None:
-            step = functools.partial(advance, raw_model, raw, nstep)
-            if _watch is None:
-                step()
-            else:
-                _watch.step(model, data, step, nstep)
-
-        original(data, model, advance if model.backend == telling else advanced, *more)
+        seen_by_engine = model.backend == telling
+        original(
+            data, model, advance if seen_by_engine else _seen_step(advance, (model, data)), *more
+        )
         if _watch is not None:
             _watch.meet(data)
 
     return seen
 
 
-def _seen_step(original: Callable[..., Any]) -> Callable[..., Any]:
+def _seen_step(
+    original: Callable[..., Any], of: tuple[Any, Any] | None = None
+) -> Callable[..., Any]:
+    """What steps the engine's own model and data, or with these a Model and a Data: `of`."""
+
     @functools.wraps(original)
     def seen(m: Any, d: Any, nstep: int = 1) -> Any:
         given = (m, d) if nstep == 1 else (m, d, nstep)
         if _watch is None:
             return original(*given)
-        return _watch.step(m, d, functools.partial(original, *given), nstep)
+        return _watch.step(*(of or (m, d)), functools.partial(original, *given), nstep)
 
     return seen
 

@@ -137,10 +137,8 @@ class CallRecorder:
         self._written = defaultdict[tuple[WatchedObject, str], set[str]](set)
         self._listening = True
 
-    def end(
-        self, namespace: Mapping[str, Any]
-    ) -> tuple[tuple[Call, ...], tuple[str, ...], tuple[str, ...]]:
-        """A statement has run: its calls, what changed outside them, whose values are due."""
+    def end(self, source: str, line: int, printed: str, namespace: Mapping[str, Any]) -> Statement:
+        """A statement has run, and printed something: what it did."""
         self._listening = False
         due: list[str] = []
         for watch in self._watches:
@@ -167,7 +165,7 @@ class CallRecorder:
             for (watched, field), entries in self._written.items()
             if watched.named
         )
-        return calls, changed, tuple(due)
+        return Statement(source, line, calls, changed, printed, tuple(due))
 
     def _call(
         self, watch: CallWatch, function: str, bare: Callable[..., Any], args: Any, kwargs: Any
@@ -243,8 +241,7 @@ def record(code: str, engine: str) -> CallRecording:
                     run(namespace)
             except StateMachineError as refusal:
                 error = " ".join(str(refusal).split())
-            calls, changed, due = recorder.end(namespace)
-            done.append(Statement(source, line, calls, changed, out.getvalue(), due))
+            done.append(recorder.end(source, line, out.getvalue(), namespace))
             if error is not None:
                 break
     for name, value in namespace.items():
@@ -262,7 +259,7 @@ def statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]],
     linecache.cache[name] = (len(code), None, [f"{line}\n" for line in lines], name)
     body = ast.parse(code, name).body
     firsts = [
-        min([node.lineno, *(each.lineno for each in getattr(node, "decorator_list", []))])
+        min([node.lineno, *(own.lineno for own in getattr(node, "decorator_list", []))])
         for node in body
     ]
     ends = [node.end_lineno or node.lineno for node in body]
@@ -272,7 +269,4 @@ def statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]],
         source = (ast.get_source_segment(code, node) or whole) if shared else whole
         compiled = compile(ast.Module([node], []), name, "exec", dont_inherit=True)
 
-        def run(namespace: dict[str, Any], compiled: Any = compiled) -> None:
-            exec(compiled, namespace)
-
-        yield source, first, run
+        yield source, first, functools.partial(exec, compiled)

@@ -17,6 +17,8 @@ from ..auditing import ONLY, Disturbance, Driver, Restore, SaveMethod, SavePoint
 # What another past may have left in them, as a part of the weight or inertia that it acts on.
 _PUSH = 0.1
 _SEVERAL, _THREADS = 3, 2  # simulations, and threads, of the engine's own pools
+mj: Any = require("mujoco")
+_STATE = mj.mjtState
 
 
 class MujocoDriver(Driver):
@@ -32,29 +34,27 @@ class MujocoDriver(Driver):
     def __init__(self, model: Model, seed: int) -> None:
         super().__init__(model, seed)
         self.name = f"MuJoCo {model.engine_version} itself"
-        self.mj: Any = require("mujoco")
-        state = self.mj.mjtState
-        self.whole = int(state.mjSTATE_INTEGRATION)
+        self.whole = int(_STATE.mjSTATE_INTEGRATION)
         # Every component that this model has, by the engine's own name for it.
         self.fields = {
             name.removeprefix("mjSTATE_").lower(): int(bit)
-            for name, bit in state.__members__.items()
+            for name, bit in _STATE.__members__.items()
             if name != "mjNSTATE"
             and int(bit).bit_count() == 1
-            and self.mj.mj_stateSize(model.raw, int(bit))
+            and mj.mj_stateSize(model.raw, int(bit))
         }
 
     def fresh(self, point: SavePoint) -> Any:
-        return self.mj.MjData(point.model.raw)
+        return mj.MjData(point.model.raw)
 
     def close(self, machine: Any) -> None:
         """It goes with its last name."""
 
     def reset(self, machine: Any) -> None:
-        self.mj.mj_resetData(machine.model, machine)
+        mj.mj_resetData(machine.model, machine)
 
     def advance(self, machine: Any, nstep: int = 1) -> None:
-        self.mj.mj_step(machine.model, machine, nstep)
+        mj.mj_step(machine.model, machine, nstep)
 
     def leave_traces(self, machine: Any, point: SavePoint) -> None:
         """Every component that stepping does not change is left at something else."""
@@ -70,22 +70,21 @@ class MujocoDriver(Driver):
         data.eq_active[:] = 1 - data.eq_active
 
     def touching(self, machine: Any) -> tuple[int, int]:
-        self.mj.mj_forward(machine.model, machine)
-        limit = int(self.mj.mjtConstraint.mjCNSTR_LIMIT_JOINT)
+        mj.mj_forward(machine.model, machine)
+        limit = int(mj.mjtConstraint.mjCNSTR_LIMIT_JOINT)
         return int(machine.ncon), int((machine.efc_type == limit).sum())
 
     def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         """Parts of the integration state, then all of it but one component."""
-        state = self.mj.mjtState
-        qpos, qvel = int(state.mjSTATE_QPOS), int(state.mjSTATE_QVEL)
-        ctrl, full = int(state.mjSTATE_CTRL), int(state.mjSTATE_FULLPHYSICS)
+        qpos, qvel = int(_STATE.mjSTATE_QPOS), int(_STATE.mjSTATE_QVEL)
+        ctrl, full = int(_STATE.mjSTATE_CTRL), int(_STATE.mjSTATE_FULLPHYSICS)
         candidates = {
             "qpos qvel": qpos | qvel,
             "qpos qvel ctrl": qpos | qvel | ctrl,
-            "qpos qvel ctrl time": qpos | qvel | ctrl | int(state.mjSTATE_TIME),
-            "mjSTATE_PHYSICS": int(state.mjSTATE_PHYSICS),
+            "qpos qvel ctrl time": qpos | qvel | ctrl | int(_STATE.mjSTATE_TIME),
+            "mjSTATE_PHYSICS": int(_STATE.mjSTATE_PHYSICS),
             "mjSTATE_FULLPHYSICS": full,
-            "FULLPHYSICS + USER": full | int(state.mjSTATE_USER),
+            "FULLPHYSICS + USER": full | int(_STATE.mjSTATE_USER),
             "mjSTATE_INTEGRATION": self.whole,
         }
         return (
@@ -106,18 +105,17 @@ class MujocoDriver(Driver):
         @contextmanager
         def save(machine: Any) -> Iterator[Restore]:
             kept = saved(machine, spec)
-            yield lambda other: self.mj.mj_setState(other.model, other, kept, spec)
+            yield lambda other: mj.mj_setState(other.model, other, kept, spec)
 
         return SaveMethod(name, save, left_out)
 
     @contextmanager
     def _copied(self, machine: Any) -> Iterator[Restore]:
-        kept = self.mj.MjData(machine.model)
-        self.mj.mj_copyData(kept, machine.model, machine)
-        yield lambda other: self.mj.mj_copyData(other, other.model, kept)
+        kept = mj.MjData(machine.model)
+        mj.mj_copyData(kept, machine.model, machine)
+        yield lambda other: mj.mj_copyData(other, other.model, kept)
 
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
-        mj = self.mj
 
         def halves(machine: Any) -> None:
             mj.mj_step1(machine.model, machine)
@@ -138,23 +136,21 @@ class MujocoDriver(Driver):
         return {f"mujoco.rollout, {on}": self._rollout, f"mujoco.batch, {on}": self._batch}
 
     def _rollout(self, point: SavePoint, steps: int) -> list[Array]:
-        state, user = self.mj.mjtState, int(self.mj.mjtState.mjSTATE_USER)
-        model = point.model.raw
+        user, model = int(_STATE.mjSTATE_USER), point.model.raw
         with self.at(point) as machine:
-            start = saved(machine, int(state.mjSTATE_FULLPHYSICS))
+            start = saved(machine, int(_STATE.mjSTATE_FULLPHYSICS))
             inputs = saved(machine, user)
             warm, first = np.array(machine.qacc_warmstart), self.read(machine)
         out, _ = import_module("mujoco.rollout").rollout(
             model,
-            [self.mj.MjData(model) for _ in range(_THREADS)],
+            [mj.MjData(model) for _ in range(_THREADS)],
             np.tile(start, (_SEVERAL, 1)),
             np.tile(inputs, (_SEVERAL, steps, 1)),
             control_spec=user,
             initial_warmstart=np.tile(warm, (_SEVERAL, 1)),
         )
-        before = self.mj.mj_stateSize(model, int(state.mjSTATE_TIME))
-        width = len(first)
-        return [np.vstack((first, each[:, before : before + width])) for each in out]
+        clock = mj.mj_stateSize(model, int(_STATE.mjSTATE_TIME))  # qpos and qvel follow it
+        return [np.vstack((first, rows[:, clock : clock + len(first)])) for rows in out]
 
     def _batch(self, point: SavePoint, steps: int) -> list[Array]:
         batch = import_module("mujoco.batch").Batch(point.model.raw, _SEVERAL, _THREADS)
@@ -163,12 +159,11 @@ class MujocoDriver(Driver):
             first = self.read(machine)
         out = batch.rollout(steps, record=["qpos", "qvel"])
         futures = np.concatenate((out["qpos"], out["qvel"]), axis=2)
-        return [np.vstack((first, each)) for each in futures]
+        return [np.vstack((first, future)) for future in futures]
 
 
 def saved(machine: Any, spec: int) -> Array:
     """The components of an MjData that a mask of mjtState names, as the engine gives them."""
-    mj = require("mujoco")
     state = np.empty(mj.mj_stateSize(machine.model, spec))
     mj.mj_getState(machine.model, machine, state, spec)
     return state

@@ -104,17 +104,16 @@ class MujocoWatch(CallWatch):
         yield from super().functions()
         for owner in (self.module.MjModel, self.module.MjData, self.module.MjSpec):
             for name, value in vars(owner).items():
-                public = not name.startswith("_") or name in ("__copy__", "__deepcopy__")
+                public = not name.startswith("_") or name in _SPECIAL
                 if public and type(value).__name__ in _METHODS:
-                    yield owner, name, f"{owner.__name__}.{name}"
-            if type(vars(owner)["__init__"]).__name__ in _METHODS:
-                yield owner, "__init__", owner.__name__
+                    method = f"{owner.__name__}.{name}"
+                    yield owner, name, method.removesuffix(".__init__")
 
     def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
         if function in ("MjModel", "MjData", "MjSpec"):  # the first is not an object yet
             args = args[1:]
-        things = [*args, *kwargs.values()]
-        objects = [self._watched(thing) for thing in things if isinstance(thing, self._kinds)]
+        things = (thing for thing in (*args, *kwargs.values()) if isinstance(thing, self._kinds))
+        objects = [self._watched(thing) for thing in things]
         return sorted(objects, key=lambda watched: isinstance(watched, _MjModel))
 
     def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
@@ -150,3 +149,4 @@ class MujocoWatch(CallWatch):
 
 
 _METHODS = ("instancemethod", "staticmethod", "function")
+_SPECIAL = ("__init__", "__copy__", "__deepcopy__")

@@ -9,23 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from ...installed import require
 from ...interface import Array
 from .. import samples
 from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
+from .audit import mj
 from .pile import MujocoPile
 
 
-def _loaded(text: str) -> tuple[Any, Any, Any]:
-    """The engine, a Model of an MJCF text and a fresh Data."""
-    mj = require("mujoco")
+def _loaded(text: str) -> tuple[Any, Any]:
+    """A Model of an MJCF text and a fresh Data."""
     model = mj.MjModel.from_xml_string(text)
-    return mj, model, mj.MjData(model)
+    return model, mj.MjData(model)
 
 
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
     """Four numbers into the qpos of a free joint."""
-    mj, model, data = _loaded(samples.MARKED_MJCF)
+    model, data = _loaded(samples.MARKED_MJCF)
     turned = []
     for four in fours:
         data.qpos[3:] = four
@@ -36,7 +35,7 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
     """Six numbers into the qvel of a free joint, and one short step."""
-    mj, model, data = _loaded(samples.MARKED_MJCF)
+    model, data = _loaded(samples.MARKED_MJCF)
     model.opt.timestep = seconds
     data.qpos[:], data.qvel[:] = (*place, *four), six
     mj.mj_kinematics(model, data)
@@ -48,7 +47,7 @@ def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Arr
 
 def gravity(steps: int) -> tuple[Array, Array]:
     """A body in a model that says nothing of gravity, let go."""
-    mj, model, data = _loaded(
+    model, data = _loaded(
         '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'
     )
     mj.mj_step(model, data, steps)
@@ -57,7 +56,7 @@ def gravity(steps: int) -> tuple[Array, Array]:
 
 def timestep() -> OneStep:
     """A body at 1 m/s, one step."""
-    mj, model, data = _loaded(samples.MARKED_MJCF)
+    model, data = _loaded(samples.MARKED_MJCF)
     data.qvel[0] = 1
     mj.mj_step(model, data)
     return (model.opt.timestep, float(data.qpos[0]), "data.time", float(data.time))
@@ -70,7 +69,7 @@ def actuation(seconds: float) -> list[LetGo]:
         ("no actuator", ""),
         ("a position actuator", '<actuator><position joint="j" kp="1000" kv="50"/></actuator>'),
     ):
-        mj, model, data = _loaded(samples.PENDULUM_MJCF % actuator)
+        model, data = _loaded(samples.PENDULUM_MJCF % actuator)
         mj.mj_step(model, data, round(seconds / model.opt.timestep))
         torque = Measurement("it exerts", float(data.qfrc_actuator[0]), "N·m")
         runs.append((part, float(data.qpos[0]), data.time, (torque,) if actuator else ()))
@@ -79,7 +78,7 @@ def actuation(seconds: float) -> list[LetGo]:
 
 def command(torque: float) -> dict[str, list[float]]:
     """A motor, without gravity."""
-    mj, model, data = _loaded(samples.PENDULUM_MJCF % '<actuator><motor joint="j"/></actuator>')
+    model, data = _loaded(samples.PENDULUM_MJCF % '<actuator><motor joint="j"/></actuator>')
     model.opt.gravity[:] = 0
     data.ctrl[0] = torque
     speeds = [float(data.qvel[0])]
@@ -91,32 +90,32 @@ def command(torque: float) -> dict[str, list[float]]:
 
 def damping(seconds: float, fast: float) -> tuple[float, float]:
     """A free body for a while; a joint for a step."""
-    mj, model, data = _loaded(samples.MARKED_MJCF)
+    model, data = _loaded(samples.MARKED_MJCF)
     data.qvel[0] = 1
     mj.mj_step(model, data, round(seconds / model.opt.timestep))
-    _, joint, turning = _loaded(samples.PENDULUM_MJCF % "")
+    joint, turning = _loaded(samples.PENDULUM_MJCF % "")
     joint.opt.gravity[:] = 0
     turning.qvel[0] = fast
     mj.mj_step(joint, turning)
     return float(data.qvel[0]), float(turning.qvel[0])
 
 
-def _tip_read(act: Callable[[Any, Any, Any], object]) -> ReadTwice:
+def _tip_read(act: Callable[[Any, Any], object]) -> ReadTwice:
     """Where the pendulum's tip is, after something was done to its joint."""
-    mj, model, data = engine = _loaded(samples.PENDULUM_MJCF % "")
+    model, data = _loaded(samples.PENDULUM_MJCF % "")
     mj.mj_forward(model, data)
-    act(*engine)
+    act(model, data)
     tip = np.array(data.site("tip").xpos)
     mj.mj_forward(model, data)
     return "the tip", tip, np.array(data.site("tip").xpos), samples.tip_at(data.qpos[0])
 
 
-def _contact_read(height: float, act: Callable[[Any, Any, Any], object]) -> ReadTwice:
+def _contact_read(height: float, act: Callable[[Any, Any], object]) -> ReadTwice:
     """How deep a ball is in the floor, after something was done to it at a height [m]."""
-    mj, model, data = engine = _loaded(samples.BALL)
+    model, data = _loaded(samples.BALL)
     data.qpos[2] = height
     mj.mj_forward(model, data)
-    act(*engine)
+    act(model, data)
     depths = []
     for _ in range(2):
         depths.append(max((-float(contact.dist) for contact in data.contact), default=0.0))
@@ -128,15 +127,15 @@ def write(angle: float, deep: float) -> list[ReadTwice]:
     """Write qpos of a pendulum, then of a ball that is put into the floor."""
     down = samples.RADIUS - deep
     return [
-        _tip_read(lambda _mj, _model, data: setitem(data.qpos, 0, angle)),
-        _contact_read(1.0, lambda _mj, _model, data: setitem(data.qpos, 2, down)),
+        _tip_read(lambda _, data: setitem(data.qpos, 0, angle)),
+        _contact_read(1.0, lambda _, data: setitem(data.qpos, 2, down)),
     ]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
     """A pendulum on its way, and a ball on its way out of the floor."""
 
-    def step_at(mj: Any, model: Any, data: Any, dof: int) -> None:
+    def step_at(model: Any, data: Any, dof: int) -> None:
         data.qvel[dof] = speed
         mj.mj_step(model, data)
 
@@ -150,7 +149,7 @@ def joints() -> dict[str, list[str]]:
     """The ids of the joints, from a URDF and from an MJCF."""
     names = {}
     for form, text in (("URDF", samples.TREE_URDF), ("MJCF", samples.TREE_MJCF)):
-        mj, model, _ = _loaded(text)
+        model, _ = _loaded(text)
         name = partial(mj.mj_id2name, model, mj.mjtObj.mjOBJ_JOINT)
         names[form] = [name(joint) for joint in range(model.njnt)]
     return names
@@ -161,7 +160,7 @@ def friction() -> dict[str, Sliding]:
 
     def speed(block: float, ground: float, lean: float, priority: int = 0) -> float:
         x, y, z = samples.BLOCK
-        mj, model, data = _loaded(
+        model, data = _loaded(
             f'<mujoco><option gravity="0 0 {-samples.SLOPE_GRAVITY}" cone="elliptic"/><worldbody>'
             f'<geom type="plane" size="9 9 1" friction="{ground}"/>'
             f'<body pos="0 0 {z}"><freejoint/><geom type="box" size="{x} {y} {z}" '

@@ -9,10 +9,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...installed import require
 from ...interface import Array
 from ..pile import HALF, PLACES, TILT, Pile
-from .audit import saved
+from .audit import mj, saved
 
 MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
 {
@@ -51,18 +50,16 @@ def _copied(scene: MujocoPile) -> Iterator[Callable[[MujocoPile], object]]:
 @contextmanager
 def _state(scene: MujocoPile, part: str) -> Iterator[Callable[[MujocoPile], object]]:
     """The components of a mask of mjtState."""
-    mask = getattr(scene.mj.mjtState, part)
+    mask = getattr(mj.mjtState, part)
     state = saved(scene.data, int(mask))
-    yield lambda other: other.mj.mj_setState(other.model, other.data, state, mask)
+    yield lambda other: mj.mj_setState(other.model, other.data, state, mask)
 
 
 class MujocoPile(Pile):
     """A Model and a Data."""
 
     quantities = tuple(_FIELDS)
-    resets: ClassVar = {
-        "mj_resetData": lambda scene: scene.mj.mj_resetData(scene.model, scene.data)
-    }
+    resets: ClassVar = {"mj_resetData": lambda scene: mj.mj_resetData(scene.model, scene.data)}
     ways_to_save: ClassVar = {
         "qpos and qvel copied": _copied,
         "mjSTATE_FULLPHYSICS": partial(_state, part="mjSTATE_FULLPHYSICS"),
@@ -70,9 +67,8 @@ class MujocoPile(Pile):
     }
 
     def __init__(self) -> None:
-        self.mj: Any = require("mujoco")
-        self.model = self.mj.MjModel.from_xml_string(MJCF)
-        self.data = self.mj.MjData(self.model)
+        self.model = mj.MjModel.from_xml_string(MJCF)
+        self.data = mj.MjData(self.model)
 
     @classmethod
     @contextmanager
@@ -102,6 +98,6 @@ class MujocoPile(Pile):
     def run(self, steps: int) -> Array:
         trace = []
         for _ in range(steps):
-            self.mj.mj_step(self.model, self.data)
+            mj.mj_step(self.model, self.data)
             trace.append(np.array(self.data.qpos))
         return np.array(trace)

@@ -92,9 +92,9 @@ def ask(question: str, engine: str) -> Answers | None:
 
 
 def _absent(looked: Absent) -> Answers:
-    counted = Measurement(f"functions called …{'…, …'.join(looked.words)}…:", len(looked.names))
-    figures = (counted, *looked.figures)
-    return (EngineAnswer(", ".join(looked.names) or NO_ANSWER, figures, looked.part),)
+    count = Measurement(f"functions called …{'…, …'.join(looked.words)}…:", len(looked.names))
+    words = ", ".join(looked.names) or NO_ANSWER
+    return (EngineAnswer(words, (count, *looked.figures), looked.part),)
 
 
 def probe(

@@ -50,8 +50,8 @@ def reset(still_there: Mapping[str, Mapping[str, bool]]) -> Iterator[EngineAnswe
     for way, there in still_there.items():
         kept, gone = _split(there)
         gone = [f"{name} (gone)" if name == "bodies" else name for name in gone]
-        sets = Measurement("sets back", tuple(gone))
-        yield EngineAnswer("keeps " + (", ".join(kept) or "nothing"), (sets,), way)
+        words = f"keeps {', '.join(kept) or 'nothing'}"
+        yield EngineAnswer(words, (Measurement("sets back", tuple(gone)),), way)
 
 
 def _split(names: Mapping[str, bool]) -> tuple[list[str], list[str]]:
@@ -75,9 +75,9 @@ def save(back: Mapping[str, Mapping[str, bool]] | float) -> Iterator[EngineAnswe
         yield EngineAnswer("forgets a Data's past" if back else NO_ANSWER, (shown,))
         return
     for way, comes in back.items():
-        kept, forgotten = _split(comes)
-        brings = Measurement("brings back", tuple(kept))
-        yield EngineAnswer("forgets " + (", ".join(forgotten) or "nothing"), (brings,), way)
+        back_again, forgotten = _split(comes)
+        words = f"forgets {', '.join(forgotten) or 'nothing'}"
+        yield EngineAnswer(words, (Measurement("brings back", tuple(back_again)),), way)
 
 
 @question(
@@ -103,8 +103,7 @@ def future(trials: Mapping[str, Sequence[Futures]] | float) -> Iterator[EngineAn
             Measurement("exact in", f"{exact} of {len(futures)}"),
             Measurement("boxes off by", max(_apart(*pair) for pair in futures), "m"),
         )
-        words = "exact" if exact == len(futures) else "differs"
-        yield EngineAnswer(words, figures, way)
+        yield EngineAnswer("exact" if exact == len(futures) else "differs", figures, way)
 
 
 def _apart(first: Array, second: Array) -> float:

@@ -22,10 +22,9 @@ _SAME = 1e-6  # m/s², s, m/s
 def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Iterator[EngineAnswer]:
     """The gravity (3,) [m/s²] that a body feels, unless the engine tells of another."""
     told, measured = gravity
-    felt, said = (" ".join(f"{g:g}" for g in np.round(each, 2) + 0.0) for each in (measured, told))
-    agree = np.allclose(told, measured, atol=_SAME)
-    figures = (Measurement("falls with", tuple(map(float, measured)), "m/s²"),)
-    yield EngineAnswer(felt if agree else f"told {said}, felt {felt}", figures)
+    felt, said = (" ".join(f"{g:g}" for g in np.round(v, 2) + 0.0) for v in (measured, told))
+    words = felt if np.allclose(told, measured, atol=_SAME) else f"told {said}, felt {felt}"
+    yield EngineAnswer(words, (Measurement("falls with", tuple(map(float, measured)), "m/s²"),))
 
 
 @question(
@@ -38,10 +37,9 @@ def timestep(step: OneStep) -> Iterator[EngineAnswer]:
     told, moved, clock, ticked = step
     told_ms, moved_ms = (f"{span * 1e3:.4g} ms" for span in (told, moved))
     words = moved_ms if abs(told - moved) < _SAME else f"told {told_ms}, moves {moved_ms}"
-    moves = Measurement("at 1 m/s a body moves", moved, "m")
-    ticks = Measurement("it goes on by", ticked, "s")
-    yield EngineAnswer(words, (moves,), "one step")
-    yield EngineAnswer(clock if ticked else "none", (ticks,), "clock")
+    yield EngineAnswer(words, (Measurement("at 1 m/s a body moves", moved, "m"),), "one step")
+    ticks = (Measurement("it goes on by", ticked, "s"),)
+    yield EngineAnswer(clock if ticked else "none", ticks, "clock")
 
 
 @question(
@@ -95,9 +93,9 @@ def damping(speeds: tuple[float, float]) -> Iterator[EngineAnswer]:
     left, joint = speeds
     body = "keeps it" if abs(left - 1) < _SAME else f"loses {100 * (1 - left):.1f} % in 1 s"
     turns = "keeps it" if abs(joint / _FAST - 1) < 1e-3 else f"cut to {joint:.3g} rad/s"
-    after = Measurement("one step after", joint, "rad/s")
     yield EngineAnswer(body, (Measurement("left after 1 s", left),), "a body at 1 m/s")
-    yield EngineAnswer(turns, (after,), "a joint at 200 rad/s")
+    after = (Measurement("one step after", joint, "rad/s"),)
+    yield EngineAnswer(turns, after, "a joint at 200 rad/s")
 
 
 SMOOTH, ROUGH = 0.25, 0.75
