@@ -150,6 +150,13 @@ class DivergedWarning(UserWarning):
     """Some of many worlds diverged and are left out from now on."""
 
 
+def refuse(*rows: tuple[object, str]) -> None:
+    """Raise BadInputError with the text of the first row that holds."""
+    for holds, text in rows:
+        if holds:
+            raise BadInputError(text)
+
+
 def check_name(kind: str, name: object, known: Iterable[str]) -> None:
     """Raise UnknownNameError for a name that is not known."""
     if not isinstance(name, str) or name not in known:

@@ -35,7 +35,7 @@ from statemachine.sweep import (
     read_manifest,
     run_sweep,
 )
-from statemachine.sweep.factors import parse_vary, with_kinds
+from statemachine.sweep.design import parse_vary, with_kinds
 from statemachine.sweep.folder import locked, settle_manifest
 from statemachine.sweep.rows import KEY, RowWriter, counted, remove_failed
 from statemachine.sweep.worker import differing, run_batch

@@ -16,6 +16,7 @@ from ..errors import (
     ModelError,
     StateMachineError,
     UnsupportedError,
+    refuse,
 )
 from ..installed import DEFAULT
 
@@ -54,13 +55,6 @@ def resumable(written: Path | None, what: str, but: str = "") -> Iterator[None]:
             text = f"stopped; {written} has what was {what}. Type the same{but} to go on"
             raise SystemExit(complain(text, 130)) from None
         raise
-
-
-def refuse(*rows: tuple[object, str]) -> None:
-    """Raise BadInputError with the text of the first row that holds."""
-    for holds, text in rows:
-        if holds:
-            raise BadInputError(text)
 
 
 def refuse_given(options: argparse.Namespace, names: Iterable[str], text: str) -> None:

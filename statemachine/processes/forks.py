@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import faulthandler
 import os
-import signal
 import sys
 import threading
 import warnings
@@ -21,6 +20,7 @@ from multiprocessing import get_context
 from typing import Any, TypeVar
 
 from . import checked_jobs, end_with_parent
+from .parallel import sigint_blocked
 
 T = TypeVar("T")
 
@@ -92,18 +92,14 @@ def _shared(
         raise OSError("this system has no forks")
     pool = ProcessPoolExecutor(min(jobs, len(numbers)), get_context("fork"), _settle)
     futures: dict[int, Future[Any]] = {}
-    # A Ctrl-C comes only afterwards; to a fork never, since this process answers it for all.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        with warnings.catch_warnings():
+        with sigint_blocked(), warnings.catch_warnings():
             # Python counts threads of libraries, too: that of OpenBLAS is made for forks.
             warnings.simplefilter("ignore", DeprecationWarning)
             for number in numbers:
                 futures[number] = pool.submit(_do, number)
     except OSError:  # no more processes, or no more files
         return {}
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     forks, waiting = list(pool._processes.values()), set(futures.values())
     found: dict[Any, tuple[BaseException | None, Any]] = {}
     try:

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import importlib
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
+
+from . import ALONE
 
 T = TypeVar("T")
+
+_LOKY = "joblib.externals.loky.process_executor"
+_TRACKERS = (
+    "multiprocessing.resource_tracker",
+    "joblib.externals.loky.backend.resource_tracker",
+)
 
 
 def in_parallel(
@@ -39,6 +50,62 @@ def in_parallel(
         finally:
             stop()
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def worker_processes(jobs: int) -> Iterator[Callable[..., Future[Any]]]:
+    """A function that submits a call to one of several processes, which end with the context.
+
+    They are joblib's, which need no `if __name__ == "__main__"` of the user. Each computes on one
+    processor. Where one ends, all that is not done yet fails with BrokenProcessPool, and what is
+    submitted next has new processes.
+    """
+    _begin_trackers()
+    loky: Any = importlib.import_module(_LOKY)
+    executor = loky.ProcessPoolExecutor(jobs, env=ALONE)
+
+    def submit(function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        nonlocal executor
+        with sigint_blocked():
+            try:
+                return executor.submit(function, *arguments)
+            except BrokenProcessPool:
+                executor = loky.ProcessPoolExecutor(jobs, env=ALONE)
+                return executor.submit(function, *arguments)
+
+    try:
+        yield submit
+    finally:
+        with suppress(Exception):
+            executor.shutdown(wait=True, kill_workers=True)
+
+
+def _begin_trackers() -> None:
+    """Begin the processes that remove what others leave: they unblock SIGINT when they begin.
+
+    What is left where work is stopped they remove; they need not tell.
+    """
+    told = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (told, "ignore:resource_tracker")))
+    try:
+        for name in _TRACKERS if os.name != "nt" else ():
+            importlib.import_module(name).ensure_running()
+    finally:
+        del os.environ["PYTHONWARNINGS"]
+        os.environ.update({} if told is None else {"PYTHONWARNINGS": told})
+
+
+@contextmanager
+def sigint_blocked() -> Iterator[None]:
+    """A Ctrl-C comes only afterwards, and never to what is started inside: this process answers."""
+    if not hasattr(signal, "pthread_sigmask"):  # on Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _Ended(BaseException):

@@ -12,9 +12,8 @@ error. Called again, `run_sweep` runs what is missing.
 
 from __future__ import annotations
 
-from .design import Design, DesignPoint
+from .design import Design, DesignPoint, Vary
 from .drive import SweepSummary, run_sweep
-from .factors import Vary
 from .folder import design_of, read_manifest
 from .prepare import prepared
 from .request import PreparedSweep, Sweep

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import BadInputError, StateMachineError, check_name, unknown_name
+from ..errors import BadInputError, StateMachineError, check_name, refuse
 from ..interface import Array
 from ..measures.text import listed
 from ..runs.drive import Progress, part_of, silent
@@ -141,12 +141,13 @@ def sweep_report(
     labels = [vary.label for vary in design.factors]
     for name in fit:
         check_name("parameter", name, labels)
+        numeric = design.factors[labels.index(name)].numeric
+        refuse((not numeric, f"{name} has no numbers that could be fitted"))
     facts = facts_of(manifest, design.factors, sides, menagerie)
     seeds, moments = manifest["design"]["seeds"], manifest["request"]["moments"]
     data = sweep_data(read_cells(folder), design, sides, seeds, moments, facts.hinges)
-    if quantity is not None and quantity not in data.gaps:
-        raise unknown_name("quantity", quantity, data.gaps)
-    main = quantity or next(iter(data.gaps))
+    main = next(iter(data.gaps)) if quantity is None else quantity
+    check_name("quantity", main, data.gaps)
     runner, floor, no_floor = None, None, "nothing was to be run"
     if run:
         try:
@@ -225,18 +226,14 @@ def _together(
             and vary.name not in ("timestep", "substeps")
             and (vary.bounds is not None or len(vary.values) >= 3)
         ][:1]
-    finite = np.empty(0) if width is None else width[np.isfinite(width)]
-    floor = float(np.median(finite)) if len(finite) else 0.0
-    found = []
-    for k, vary in enumerate(chosen):
-        if not vary.numeric:
-            raise BadInputError(f"{vary.label} has no numbers that could be fitted")
-        how: Varied = varied or ("right" if vary.kind == "option" else "both")
-        found.append(
-            brought_together(
-                data, vary, agreement.name, max(agreement.tolerance, floor),
-                varied=how, own=facts.own.get(vary.label), runner=runner,
-                progress=part_of(progress, k / len(chosen), 1 / len(chosen)),
-            )
-        )  # fmt: skip
-    return tuple(found)
+    floors = [] if width is None else width[np.isfinite(width)]
+    good = max(agreement.tolerance, float(np.median(floors)) if len(floors) else 0.0)
+    return tuple(
+        brought_together(
+            data, vary, agreement.name, good,
+            varied=varied or ("right" if vary.kind == "option" else "both"),
+            own=facts.own.get(vary.label), runner=runner,
+            progress=part_of(progress, k / len(chosen), 1 / len(chosen)),
+        )
+        for k, vary in enumerate(chosen)
+    )  # fmt: skip

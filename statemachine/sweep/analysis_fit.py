@@ -41,7 +41,7 @@ class FittedValue:
     edge: bool
     curves: int
     scan: tuple[tuple[float, ...], tuple[float, ...]] = field(repr=False, metadata={"json": False})
-    each: Array = field(default_factory=lambda: np.empty(0), repr=False, metadata={"json": False})
+    each: Array = field(repr=False, metadata={"json": False})
 
     def within(self, good: float) -> tuple[float, float] | None:
         """The least and the largest value whose predicted gap is at most so much; None if none."""
@@ -123,6 +123,7 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
         values: (n,) of the parameter.
         gaps: (n,) at these settings; NaN where there is none.
     """
+    each = np.full(len(gaps), np.nan)
     known = np.isfinite(gaps)
     values, gaps = values[known], gaps[known]
     if len(values) < 8 or not np.ptp(values):
@@ -136,11 +137,12 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
         unit = 2 * (scan - low) / (high - low) - 1
         return np.asarray(np.polynomial.polynomial.polyval(unit, parabola), dtype=np.float64)
 
-    found = curve(slice(None))
-    place = int(np.argmin(found))
+    squares = curve(slice(None))
+    place = int(np.argmin(squares))
     again = [scan[int(np.argmin(curve(rows)))] for rows in drawn_again(len(values))]
-    predicted = np.sqrt(np.maximum(found, 0.0))
+    predicted = np.sqrt(np.maximum(squares, 0.0))
     value = float(scan[place])
+    each[known] = predicted[place]
     return FittedValue(
         value=value,
         error=float(np.std(again)),
@@ -150,6 +152,7 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
         edge=place in (0, _SCAN - 1),
         curves=len(values),
         scan=(tuple(scan.tolist()), tuple(predicted.tolist())),
+        each=each,
     )
 
 

@@ -13,7 +13,7 @@ from ..measures import QUANTITIES, Tolerance, tolerance_of
 from .analysis_data import RUN_QUANTITIES, SweepData, known, largest_known, median
 from .analysis_indices import Sensitivity, ranked
 from .analysis_runs import ModelFacts
-from .factors import Value, Vary
+from .design import Value, Vary
 
 SettingVerdict = Literal["agrees", "some seeds", "chaos", "differs", "no runs"]
 VERDICTS: tuple[SettingVerdict, ...] = ("agrees", "some seeds", "chaos", "differs", "no runs")

@@ -11,8 +11,7 @@ import numpy as np
 from ..installed import require_extra
 from ..interface import Array
 from .analysis_data import SweepData, drawn_again, median
-from .design import Design
-from .factors import Vary
+from .design import Design, Vary
 
 _TAIL = 50 * (1 - 0.95)  # percent, on each side of an interval
 _LEAST_SEEDS = 3  # of which a bootstrap says something
@@ -89,49 +88,45 @@ def _sobol(design: Design, centre: Array) -> Sensitivity | None:
     labels = [vary.label for vary in design.sampled]
     # The samples change slowest: blocks, then samples, then the combinations of lists.
     cube = centre.reshape(len(labels) + 2, design.samples, -1).mean(axis=2)
-    whole = np.flatnonzero(np.isfinite(cube).all(axis=0))
+    complete = np.flatnonzero(np.isfinite(cube).all(axis=0))
     notes: list[str] = []
     if design.listed:
         names = ", ".join(vary.label for vary in design.listed)
         notes.append(f"They are of the mean over the values of {names}.")
-    count = 2 ** int(np.log2(len(whole))) if len(whole) else 0
+    count = 2 ** int(np.log2(len(complete))) if len(complete) else 0
     if count < design.samples:
         notes.append(
-            f"{design.samples - len(whole)} of {design.samples} samples have no gap at one of "
+            f"{design.samples - len(complete)} of {design.samples} samples have no gap at one of "
             f"their points and are left out; the indices are of the first {count} others, a "
             "power of two."
         )
     if count < _LEAST_SAMPLES:
         return None
-    a, b, *mixed = cube[:, None, whole[:count]]
-    found = _stats().sobol_indices(func={"f_A": a, "f_B": b, "f_AB": np.array(mixed)}, n=count)
+    a, b, *mixed = cube[:, None, complete[:count]]
+    indices = _stats().sobol_indices(func={"f_A": a, "f_B": b, "f_AB": np.array(mixed)}, n=count)
     # (2, d) each: of all samples, and of samples that are drawn again from those there are.
-    shares = np.array([found.first_order, found.total_order]).reshape(2, -1)
+    shares = np.array([indices.first_order, indices.total_order]).reshape(2, -1)
     drawn = []
     for rows in drawn_again(count):
-        blocks = found._f_A[:, rows], found._f_B[:, rows], found._f_AB[..., rows]
-        drawn.append(np.reshape(found._indices_method(*blocks), shares.shape))
+        blocks = indices._f_A[:, rows], indices._f_B[:, rows], indices._f_AB[..., rows]
+        drawn.append(np.reshape(indices._indices_method(*blocks), shares.shape))
     return _result("sobol", labels, shares, count, drawn, "the samples drawn again", notes)
 
 
 def _factorial(design: Design, figures: Array) -> Sensitivity | None:
     """Every combination of lists and grids: the variance over the whole of it."""
     cube = figures.reshape(*(len(vary.values) for vary in design.factors), -1)
-    cube, left_out = _whole(cube)
-    if cube.size == 0 or cube[..., 0].size < 2:
-        return None
-    notes = []
-    if any(left_out):
-        told = [
-            f"{vary.label} = {', '.join(f'{vary.values[k]}' for k in gone)}"
-            for vary, gone in zip(design.factors, left_out, strict=True)
-            if gone
-        ]
-        notes.append(
-            f"A full factorial has no holes: what has failed cells is left out ({'; '.join(told)})."
-        )
+    levels = _without_holes(cube)
+    left_out = [
+        f"{vary.label} = {', '.join(str(v) for k, v in enumerate(vary.values) if k not in kept)}"
+        for vary, kept in zip(design.factors, levels, strict=True)
+        if len(kept) < len(vary.values)
+    ]
+    note = "A full factorial has no holes: what has failed cells is left out ({})."
+    notes = [note.format("; ".join(left_out))] if left_out else []
+    cube = cube[np.ix_(*levels)]
     centre = median(cube)
-    if not np.ptp(centre) > 0:
+    if centre.size < 2 or not np.ptp(centre) > 0:
         return None
     seeds, error, drawn = cube.shape[-1], "", []
     if seeds >= _LEAST_SEEDS:
@@ -157,18 +152,15 @@ def variance_shares(cube: Array) -> Array:
     return np.array([first, total])
 
 
-def _whole(cube: Array) -> tuple[Array, list[list[int]]]:
-    """The factorial without the levels that have holes, the worst first; which went."""
-    kept = [list(range(n)) for n in cube.shape[:-1]]
-    gone: list[list[int]] = [[] for _ in kept]
-    while cube.size and (holes := ~np.isfinite(median(cube))).any():
-        axes = range(holes.ndim)
+def _without_holes(cube: Array) -> list[list[int]]:
+    """The levels of each factor that stay where those with holes go, the worst first."""
+    levels = [list(range(n)) for n in cube.shape[:-1]]
+    axes = range(len(levels))
+    while (holes := np.isnan(median(cube[np.ix_(*levels)]))).any():
         shares = [holes.mean(axis=tuple(a for a in axes if a != k)) for k in axes]
         axis = max(axes, key=lambda k: shares[k].max())
-        level = int(shares[axis].argmax())
-        gone[axis].append(kept[axis].pop(level))
-        cube = np.delete(cube, level, axis=axis)
-    return cube, gone
+        del levels[axis][int(shares[axis].argmax())]
+    return levels
 
 
 def _rank(data: SweepData, centre: Array) -> Sensitivity | None:
@@ -205,7 +197,7 @@ def _result(
     intervals: Any = np.full((2, 2, len(labels)), None)
     if len(drawn):
         intervals = np.percentile(drawn, (_TAIL, 100 - _TAIL), axis=0)
-    found = [
+    indices = [
         ParameterIndex(
             label,
             *shares[:, k].tolist(),
@@ -213,5 +205,5 @@ def _result(
         )
         for k, label in enumerate(labels)
     ]
-    found.sort(key=lambda each: -each.total)
-    return Sensitivity(method, tuple(found), samples, error, tuple(notes))
+    indices.sort(key=lambda index: -index.total)
+    return Sensitivity(method, tuple(indices), samples, error, tuple(notes))

@@ -5,21 +5,21 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..backends import load
 from ..compare.perturbed import ROUNDING
-from ..errors import BadInputError, StateMachineError
-from ..interface import Array, Ints, JointType, Model, forward, make_data, reset
+from ..errors import StateMachineError, refuse
+from ..interface import Array, Ints, Model, forward, make_data, reset
+from ..measures import JointPlaces
 from ..processes import checked_jobs
-from ..runs.controllers import is_function
+from ..runs.controllers import function_file, is_function
 from ..runs.drive import Progress, silent
 from .analysis_data import Runs, SweepData, gap_between, read_runs
-from .apart import apart
-from .factors import Value, Vary
+from .design import Value, Vary
+from .drive import run_apart
 from .prepare import prepared
 from .request import DESIGN, REQUEST, PreparedSweep, Sweep, SweepCell
 from .rows import require_parquet, schema_of
@@ -67,7 +67,7 @@ class CellRunner:
         size = max(1, len(cells) // (4 * self.jobs))
         batches = [cells[k : k + size] for k in range(0, len(cells), size)]
         rows: dict[str, dict[str, Any]] = {}
-        for done in apart(self.ready, batches, min(self.jobs, len(batches))):
+        for done in run_apart(self.ready, batches, min(self.jobs, len(batches))):
             rows.update((row["cell"], row) for row in done)
             progress(len(rows) / len(cells))
         table = require_parquet()[0].Table.from_pylist(
@@ -90,19 +90,18 @@ def runner_of(
     """
     design, request = manifest["design"], manifest["request"]
     what = request["what"]
-    if is_function(what) and not Path(what.rpartition(":")[0]).is_file():
-        raise BadInputError(f"{what.rpartition(':')[0]} is not in this folder")
+    file = function_file(what)
+    refuse((is_function(what) and not file.is_file(), f"{file} is not in this folder"))
     given = {name: request[name] for name in REQUEST} | {name: design[name] for name in DESIGN}
     ready = prepared(Sweep(what, backends=data.sides, menagerie=menagerie, **given))
-    before = manifest["files"], request["function"]
-    if (ready.files, ready.function) != before:
-        raise BadInputError("the model or the function is another one than that of the sweep")
-    versions = ready.versions, manifest["versions"]
-    others = [name for name in data.sides if versions[0].get(name) != versions[1].get(name)]
-    if others:
-        raise BadInputError(
-            f"{' and '.join(others)} here is of another version than that of the sweep"
-        )
+    others = [n for n in data.sides if ready.versions.get(n) != manifest["versions"].get(n)]
+    refuse(
+        (
+            (ready.files, ready.function) != (manifest["files"], request["function"]),
+            "the model or the function is another one than that of the sweep",
+        ),
+        (others, f"{' and '.join(others)} here is of another version than that of the sweep"),
+    )
     return CellRunner(ready, hinges, checked_jobs(jobs), data.runs.dtype)
 
 
@@ -159,14 +158,13 @@ def floor_of(
 
 def _nearest(data: SweepData, chosen: Ints) -> Ints:
     """(p) which of the chosen settings is nearest to each, every parameter as wide as any."""
-    place = np.zeros((len(data.points), len(data.design.factors)))
+    places = np.zeros((len(data.points), len(data.design.factors)))
     for k, vary in enumerate(data.design.factors):
         values = data.values(vary.label)
         if not vary.numeric:  # by its place in the list
             values = [vary.values.index(value) for value in values]
-        wide = float(np.ptp(values))
-        place[:, k] = (np.array(values) - min(values)) / wide if wide else 0.0
-    return np.array([((place[chosen] - each) ** 2).sum(axis=1).argmin() for each in place])
+        places[:, k] = (np.array(values) - min(values)) / (np.ptp(values) or 1.0)
+    return np.array([((places[chosen] - place) ** 2).sum(axis=1).argmin() for place in places])
 
 
 @dataclass(frozen=True)
@@ -202,8 +200,7 @@ def facts_of(
             model = load(files[0], backend=backend, menagerie=menagerie)
         except StateMachineError:
             continue
-        kinds = zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True)
-        hinges = tuple(place for kind, place in kinds if kind == JointType.HINGE)
+        hinges = tuple(JointPlaces.of(model.jnt_type, model.jnt_qposadr).hinges.tolist())
         with make_data(model) as data:
             reset(model, data)
             forward(model, data)

@@ -13,7 +13,7 @@ from ..runs.drive import Progress, silent
 from .analysis_data import Runs, SweepData, gap_between, median, vectors
 from .analysis_fit import FittedValue, fit_curves, fit_scatter
 from .analysis_runs import CellRunner, evenly
-from .factors import Value, Vary
+from .design import Value, Vary
 
 Setting = tuple[tuple[Value | None, ...], int]  # values of the factors, and a seed
 Varied = Literal["right", "both"]
@@ -169,9 +169,10 @@ class _Case:
         self._levels = np.sort(
             np.array(vary.values or np.linspace(*(vary.bounds or (0, 0)), 9), float)
         )
-        self._near = np.flatnonzero(np.isclose(self._levels, np.nan if own is None else own))[:1]
+        self._at_own = np.nan if own is None else own
+        self._near = np.flatnonzero(np.isclose(self._levels, self._at_own))[:1]
         self.lacks_references = not (self._both or len(self._near))
-        self._kept: list[Setting] = []  # those that the fit is of
+        self._settings: list[Setting] = []  # those that the fit is of
 
     def _curves(self, values: Array) -> Array:
         """(c, k, …) of what is (p, s, …): by the other values and seeds, and by the parameter."""
@@ -190,25 +191,25 @@ class _Case:
         # The first point of each curve, its parameter at the least value.
         first = self._curves(np.arange(points * seeds).reshape(points, seeds))[:, 0]
         chosen = evenly(len(first), MOST_REFERENCES if self.lacks_references else len(first))
-        self._kept = [
+        self._settings = [
             (self._data.points[k // seeds].values, k % seeds) for k in first[chosen].tolist()
         ]
         if self.lacks_references:
-            (runs,) = self._run([(0, self._at(self._kept, self._own))], 0.0)
+            (runs,) = self._run([(0, self._at(self._settings, self._own))], 0.0)
             left, right = vectors(self._quantity, runs)[:, None], right[chosen]
         elif not self._both:
             left = left[:, self._near]
-        seeds = [seed for _, seed in self._kept]
+        seeds = [seed for _, seed in self._settings]
         return fit_curves(self._quantity, self._levels, left, right, seeds)
 
     def scatter(self) -> FittedValue | None:
         """From samples of a range."""
         values = np.array(self._data.values(self._vary.label), dtype=float)
         chosen = evenly(len(values), len(values) if self._both else MOST_REFERENCES)
-        self._kept = [(self._data.points[k].values, 0) for k in chosen]
+        self._settings = [(self._data.points[k].values, 0) for k in chosen]
         if self._both:
             return fit_scatter(values, median(self._data.gaps[self._quantity]))
-        (runs,) = self._run([(0, self._at(self._kept, self._own))], 0.0)
+        (runs,) = self._run([(0, self._at(self._settings, self._own))], 0.0)
         gap = gap_between(self._quantity, runs, self._data.runs[1, chosen, 0])
         return fit_scatter(values[chosen], gap)
 
@@ -242,10 +243,9 @@ class _Case:
         """
         picked = self._picked(fit)
         values = [fit.value, self._own] if self._vary.kind == "option" else [fit.value]
-        gap, *before = self._gaps([self._kept[k] for k in picked], values, 0.5)
-        predicted = float(np.mean(fit.each[picked])) if len(fit.each) else fit.gap
+        gap, *before = self._gaps([self._settings[k] for k in picked], values, 0.5)
         own = _mean(before[0]) if before else None
-        return own, _mean(gap), predicted, int(np.isfinite(gap).sum())
+        return own, _mean(gap), float(np.mean(fit.each[picked])), int(np.isfinite(gap).sum())
 
     def refined(self, fit: FittedValue, measured: float) -> tuple[list[float], list[float], float]:
         """Run both sides between the neighbours of the value in the design.
@@ -259,7 +259,7 @@ class _Case:
         low = self._levels[self._levels < fit.value].max(initial=fit.bounds[0])
         high = self._levels[self._levels > fit.value].min(initial=fit.bounds[1])
         values = np.linspace(low, high, REFINED).tolist()
-        by_value = self._gaps([self._kept[k] for k in self._picked(fit)], values, 0.75)
+        by_value = self._gaps([self._settings[k] for k in self._picked(fit)], values, 0.75)
         stood = np.isfinite(by_value).all(axis=0)  # the same pairs at every value
         means = by_value[:, stood].mean(axis=1) if stood.any() else np.full(REFINED, np.nan)
         apart = float(high - low) / (REFINED - 1)
@@ -267,17 +267,13 @@ class _Case:
 
     def _picked(self, fit: FittedValue) -> list[int]:
         """The settings that are run at a value."""
-        known = np.arange(len(self._kept))
-        if len(fit.each):
-            known = np.flatnonzero(np.isfinite(fit.each))
+        known = np.flatnonzero(np.isfinite(fit.each))
         return known[evenly(len(known), CHECKED)].tolist()
 
     def own_gap(self) -> float | None:
         """The gap of the dataset with the parameter as the model has it."""
-        if self._own is None:
-            return None
         values = np.array(self._data.values(self._vary.label), dtype=float)
-        return _mean(self._data.gaps[self._quantity][np.isclose(values, self._own)])
+        return _mean(self._data.gaps[self._quantity][np.isclose(values, self._at_own)])
 
 
 def _mean(gaps: Array) -> float | None:

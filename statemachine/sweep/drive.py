@@ -8,24 +8,28 @@ import os
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..errors import BadInputError
+from ..errors import BadInputError, WorkerEndedError
 from ..installed import require_extra
 from ..processes import checked_jobs
-from ..processes.parallel import unwinding
+from ..processes.parallel import unwinding, worker_processes
 from ..runs.drive import Progress, silent
-from .apart import Batch, Results, apart
 from .folder import check_folder, locked, settle_manifest
 from .prepare import prepared
-from .request import PreparedSweep, Sweep
+from .request import PreparedSweep, Sweep, SweepCell
 from .rows import CELLS, DONE, RowWriter, counted, remove_failed
-from .worker import differing, run_batch
+from .worker import Row, differing, row_of, run_batch
+
+Batch = Sequence[SweepCell]
+Results = Generator[list[Row], None, None]
 
 _BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
 _TASKS = 4  # at least so many for each job, so that none is idle at the end
@@ -56,7 +60,7 @@ class SweepSummary:
     ran: int
     seconds: float
     said: tuple[str, ...] = ()
-    read: str = field(default="")
+    read: str = ""
 
     @property
     def missing(self) -> int:
@@ -97,9 +101,7 @@ def run_sweep(
     ready = sweep if isinstance(sweep, PreparedSweep) else prepared(sweep)
     check_folder(folder)
     with locked(folder), ExitStack() as stack:
-        client = None
-        if scheduler is not None:
-            client = stack.enter_context(_connected(scheduler, ready))
+        client = stack.enter_context(_connected(scheduler, ready)) if scheduler else None
         known = dict(counted(folder))
         if extend:
             _check_growth(ready, known, folder)
@@ -107,32 +109,27 @@ def run_sweep(
         if retry_failed:
             remove_failed(folder)
             known = {cell: kind for cell, kind in known.items() if kind == DONE}
-        total = len(ready)
-        missing = total - len(known)
-        writer = RowWriter(folder, ready.design.factors, ready.provenance())
+        missing, ran = len(ready) - len(known), 0
         kinds = Counter(known.values())
-        ran = 0
-        batches = _batches(ready, known, jobs if client is None else _workers(client))
-        results = (
-            apart(ready, batches, jobs) if client is None else _on_dask(client, ready, batches)
-        )
+        writer = RowWriter(folder, ready.design.factors, ready.provenance())
+        batches = _batches(ready, known, _workers(client) if client else jobs)
+        run = _run_on_dask(ready, batches, client) if client else run_apart(ready, batches, jobs)
         with unwinding():
             try:
-                with closing(results) as found:
-                    for rows in found:
+                with closing(run) as results:
+                    for rows in results:
                         writer.add(rows)
                         kinds.update(row.get("error_class") or row["status"] for row in rows)
                         ran += len(rows)
                         progress(ran / max(1, missing))
             finally:
                 writer.flush()
-    done = kinds.pop(DONE, 0)
     place = (folder / CELLS).as_posix()
     return SweepSummary(
         folder=os.fspath(folder),
-        cells=total,
+        cells=len(ready),
         points=ready.design.size,
-        done=done,
+        done=kinds.pop(DONE, 0),
         failed=dict(kinds.most_common()),
         ran=ran,
         seconds=time.monotonic() - began,
@@ -145,10 +142,10 @@ def _check_growth(ready: PreparedSweep, known: Mapping[str, str], folder: Path) 
     """Raise BadInputError where a folder has cells that a design lacks."""
     if not known:
         return
-    found = sum(cell.id in known for name in ready.backends for cell in ready.cells(name))
-    if found < len(known):
+    shared = sum(cell.id in known for name in ready.backends for cell in ready.cells(name))
+    if shared < len(known):
         raise BadInputError(
-            f"{folder} has {len(known) - found} cells that are not of this design: a sweep grows "
+            f"{folder} has {len(known) - shared} cells that are not of this design: a sweep grows "
             "by values, seeds and backends that are added"
         )
 
@@ -167,34 +164,69 @@ def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Itera
     return (batch for turn in turns for batch in turn if batch is not None)
 
 
-def _on_dask(client: Any, ready: PreparedSweep, batches: Iterator[Batch]) -> Results:
-    """The rows of all batches, as they are ready, from the workers of Dask.
+def run_apart(ready: PreparedSweep, batches: Iterable[Batch], jobs: int) -> Results:
+    """The rows of each batch, as they are ready, from processes of this machine."""
+    require_extra("joblib", "a sweep", "joblib", "sweep")
+    with worker_processes(jobs) as submit:
+        yield from _results(
+            batches,
+            jobs,
+            lambda batch: submit(run_batch, ready, batch, True),
+            lambda batch: _cell_by_cell(ready, batch),
+        )
 
-    A batch that its worker does not survive is run here, apart from everything else.
+
+def _run_on_dask(ready: PreparedSweep, batches: Iterable[Batch], client: Any) -> Results:
+    """The same from the workers of Dask; what they do not survive is run here.
 
     Raises:
         BadInputError: The scheduler went away.
     """
-    distributed = require_extra("distributed", "--scheduler", "Dask", "cluster")
-    finished, out = distributed.as_completed(loop=client.loop), {}
+    submit = client.get_executor(pure=False).submit
 
-    def hand_out(count: int) -> None:
-        for batch in itertools.islice(batches, count):
-            future = client.submit(run_batch, ready, batch, False, pure=False)
-            out[future.key] = batch
-            finished.add(future)
+    def run_here(batch: Batch) -> list[Row]:
+        if client.status != "running":
+            raise BadInputError("the scheduler went away; what was done is kept")
+        return _cell_by_cell(ready, batch)
 
-    hand_out(2 * _workers(client))
-    for future in finished:
-        batch = out.pop(future.key)
-        try:
-            rows = future.result()
-        except Exception as error:
-            if client.status != "running":
-                raise BadInputError("the scheduler went away; what was done is kept") from error
-            (rows,) = apart(ready, [batch], 1)
-        hand_out(1)
-        yield rows
+    return _results(
+        batches, _workers(client), lambda batch: submit(run_batch, ready, batch, False), run_here
+    )
+
+
+def _results(
+    batches: Iterable[Batch],
+    workers: int,
+    submit: Callable[[Batch], Future[list[Row]]],
+    run_again: Callable[[Batch], list[Row]],
+) -> Results:
+    """The rows of each batch, as they are ready; some always wait, so that no worker is idle."""
+    coming, waiting = iter(batches), dict[Future[list[Row]], Batch]()
+    while True:
+        for batch in itertools.islice(coming, 2 * workers - len(waiting)):
+            waiting[submit(batch)] = batch
+        if not waiting:
+            return
+        for future in wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done:
+            batch = waiting.pop(future)
+            try:
+                rows = future.result()
+            except Exception:  # its process ended
+                rows = run_again(batch)
+            yield rows
+
+
+def _cell_by_cell(ready: PreparedSweep, batch: Batch) -> list[Row]:
+    """The rows of a batch that was lost with a process; a cell that ends another one fails."""
+    rows: list[Row] = []
+    with worker_processes(1) as submit:
+        for cell in batch:
+            try:
+                rows += submit(run_batch, ready, [cell], True).result()
+            except BrokenProcessPool:
+                error = WorkerEndedError("its process ended before it was done, twice")
+                rows.append(row_of(ready, cell, error))
+    return rows
 
 
 @contextmanager
@@ -217,10 +249,10 @@ def _connected(address: str, ready: PreparedSweep) -> Iterator[Any]:
     try:
         with suppress(TimeoutError):
             client.wait_for_workers(1, timeout=_PATIENCE)
-        found = client.run(differing, ready, __version__, on_error="return")
-        if not found:
+        answers = client.run(differing, ready, __version__, on_error="return")
+        if not answers:
             raise BadInputError(f"the scheduler at {address} has no workers")
-        for worker, wrong in found.items():
+        for worker, wrong in answers.items():
             if isinstance(wrong, BaseException):
                 raise BadInputError(f"the worker {worker} cannot run a sweep: {wrong}")
             if wrong:

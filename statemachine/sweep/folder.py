@@ -13,8 +13,7 @@ from typing import Any
 from ..errors import BadInputError, shown
 from ..measures.text import listed
 from ..runs.whole import replace_text
-from .design import Design
-from .factors import Vary
+from .design import Design, Vary
 from .request import MANIFEST_VERSION
 
 MANIFEST = "sweep.json"

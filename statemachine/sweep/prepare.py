@@ -15,7 +15,7 @@ import numpy as np
 from .. import __version__
 from ..backends import backend_names, check_backend
 from ..compare.perturbed import EXACT, parse_uncertainty
-from ..errors import BadInputError, MissingEngineError, StateMachineError
+from ..errors import MissingEngineError, StateMachineError, refuse
 from ..interface import Model, make_data
 from ..interface.options import checked_options
 from ..models import resolve
@@ -23,8 +23,7 @@ from ..runs.controllers import is_function, parameters_of
 from ..runs.drive import check_length, cost_of_a_second, steps_in
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario, scenario
-from .design import Design, require_qmc
-from .factors import MODEL, Vary, parse_vary, with_kinds
+from .design import MODEL, Design, Vary, parse_vary, require_qmc, with_kinds
 from .request import PreparedSweep, Sweep
 from .rows import require_parquet
 from .settings import beyond_ranges, options_at, start_at
@@ -50,13 +49,17 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     typed = parse_vary(sweep.vary)
     _check_numbers(sweep)
     function = is_function(sweep.what)
-    if not function and (sweep.every != 1 or sweep.keyframe is not None):
-        name = "every" if sweep.every != 1 else "keyframe"
-        raise BadInputError(f"--{name} is of a FUNCTION; {sweep.what} is an experiment")
     usual = MODEL_OF_A_FUNCTION if function else scenario(sweep.what).model
     varied = [str(value) for vary in typed if vary.label == MODEL for value in vary.values]
-    if varied and sweep.model is not None:
-        raise BadInputError("--model says one model and --vary model=… several: leave one out")
+    of_a_function = f"is of a FUNCTION; {sweep.what} is an experiment"
+    refuse(
+        (not function and sweep.every != 1, f"--every {of_a_function}"),
+        (not function and sweep.keyframe is not None, f"--keyframe {of_a_function}"),
+        (
+            varied and sweep.model is not None,
+            "--model says one model and --vary model=… several: leave one out",
+        ),
+    )
     sweep = dataclasses.replace(
         sweep,
         what=os.path.abspath(sweep.what) if function else sweep.what,
@@ -74,28 +77,31 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     options = dict.fromkeys(name for model in models for name in model.capabilities.options)
     factors = with_kinds(typed, options, [name for name in parameters if name != "seed"])
     design = Design(factors, sweep.samples, sweep.indices, sweep.design_seed)
+    cells = design.size * sweep.seeds * len(backends)
+    no_power = sweep.samples & (sweep.samples - 1)
+    refuse(
+        (
+            no_power and sweep.indices,
+            f"--indices wants a power of two of --samples; got {sweep.samples}",
+        ),
+        (
+            cells > _MOST,
+            f"{cells:.3g} cells are more than a sweep can hold, which is {_MOST:,}: vary less, or "
+            "divide it into several",
+        ),
+    )
     if design.sampled:
         require_qmc()
-        if sweep.samples & (sweep.samples - 1):
-            if sweep.indices:
-                raise BadInputError(
-                    f"--indices wants a power of two of --samples; got {sweep.samples}"
-                )
-            said.append(f"{sweep.samples} samples are no power of two: a Sobol sequence wants one")
-    cells = design.size * sweep.seeds * len(backends)
-    if cells > _MOST:
-        raise BadInputError(
-            f"{cells:.3g} cells are more than a sweep can hold, which is {_MOST:,}: vary less, or "
-            "divide it into several"
-        )
+    if no_power:
+        said.append(f"{sweep.samples} samples are no power of two: a Sobol sequence wants one")
     if cells > _MANY:
         said.append(f"{cells:,} cells")
     for vary in factors:
         said += _check_values(vary, models)
     chosen = {"seed": 0} if "seed" in parameters else {}
     chosen |= {v.name: v.extremes[0] for v in factors if v.kind == "parameter"}
-    doing = sweep.scenario(chosen)
-    _refused(models, lambda model: _check_run(doing, factors, model))
+    asked = sweep.scenario(chosen)
+    _refused(models, lambda model: _check_run(asked, factors, model))
     return PreparedSweep(
         sweep,
         design,
@@ -111,19 +117,24 @@ def prepared(sweep: Sweep) -> PreparedSweep:
         digest_of(sweep.what) if function else "",
         parameters,
         EXACT if sweep.spread == "0" else parse_uncertainty(sweep.spread.split(",")),
-        {model.backend: _cost(model, doing.seconds) for model in models},
+        {model.backend: _cost(model, asked.seconds) for model in models},
         tuple(said),
     )
 
 
 def _check_numbers(sweep: Sweep) -> None:
-    least = {"seeds": 1, "samples": 0, "design_seed": 0, "every": 1, "moments": 1}
-    for name, smallest in least.items():
-        if (value := getattr(sweep, name)) < smallest:
-            flag = name.replace("_", "-")
-            raise BadInputError(f"--{flag} must be at least {smallest}; got {value}")
-    if not 0 < sweep.timeout <= 86400 * 7:
-        raise BadInputError(f"--timeout must be above 0 s; got {sweep.timeout:g}")
+    least = {"seeds": 1, "samples": 0, "design-seed": 0, "every": 1, "moments": 1}
+    values = {flag: getattr(sweep, flag.replace("-", "_")) for flag in least}
+    refuse(
+        *(
+            (values[flag] < smallest, f"--{flag} must be at least {smallest}; got {values[flag]}")
+            for flag, smallest in least.items()
+        ),
+        (
+            not 0 < sweep.timeout <= 86400 * 7,
+            f"--timeout must be above 0 s; got {sweep.timeout:g}",
+        ),
+    )
 
 
 def _loaded(
@@ -191,17 +202,16 @@ def _check_values(vary: Vary, models: Sequence[Model]) -> list[str]:
     return said + (beyond_ranges(models[0], vary) if vary.kind == "state" else [])
 
 
-def _check_run(doing: Scenario, factors: Sequence[Vary], model: Model) -> None:
+def _check_run(scenario: Scenario, factors: Sequence[Vary], model: Model) -> None:
     """Raise what a model says of the run itself: its start, its length."""
-    keyframe = doing.on(model).keyframe
+    keyframe = scenario.on(model).keyframe
     if keyframe is not None:
         model.key_id(keyframe)
-    steps_in(model, doing.seconds)
+    steps_in(model, scenario.seconds)
     timesteps = [(v, value) for v in factors if v.label == "timestep" for value in v.extremes]
-    for pair in timesteps:
-        check_length(model.replace(**options_at(model, [pair])), doing.seconds)
-    if not timesteps:
-        check_length(model, doing.seconds)
+    variants = [model.replace(**options_at(model, [pair])) for pair in timesteps]
+    for variant in variants or [model]:
+        check_length(variant, scenario.seconds)
 
 
 def _cost(model: Model, seconds: float) -> float:

@@ -12,8 +12,7 @@ from ..compare.perturbed import Uncertainty
 from ..measures.text import command
 from ..runs.controllers import function_scenario, is_function
 from ..runs.scenarios import Scenario, scenario
-from .design import Design, digest
-from .factors import Value, Vary
+from .design import Design, Value, Vary, digest
 from .rows import columns_of
 
 MANIFEST_VERSION = 2
@@ -71,10 +70,10 @@ class Sweep:
             BadInputError: The user's file fails.
         """
         if is_function(self.what):
-            doing = function_scenario(self.what, self.every, self.keyframe, parameters)
+            asked = function_scenario(self.what, self.every, self.keyframe, parameters)
         else:
-            doing = scenario(self.what)
-        return doing if self.seconds is None else dataclasses.replace(doing, seconds=self.seconds)
+            asked = scenario(self.what)
+        return asked if self.seconds is None else dataclasses.replace(asked, seconds=self.seconds)
 
     def typed(self, out: str) -> str:
         """The command that runs it."""

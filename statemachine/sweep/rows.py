@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..runs.whole import replace_bytes
-from .factors import Vary
+from .design import Vary
 
 DONE, FAILED = "done", "failed"  # the status of a cell
 CELLS = "cells"  # the folder of the dataset, in that of the sweep

@@ -12,7 +12,7 @@ from ..errors import BadInputError, StateMachineError, check_name
 from ..interface import Array, JointType, Model
 from ..interface.checks import index_of
 from ..runs.robot import scalar_joint
-from .factors import Value, Vary
+from .design import Value, Vary
 
 _AXES = ("x", "y", "z")
 _STREAM = 1  # of a seed: not that of the commands which an experiment draws
@@ -109,17 +109,16 @@ def beyond_ranges(model: Model, vary: Vary) -> list[str]:
         return []
     (place,) = start_at(model, [(vary, vary.extremes[0])])[0]
     joints = np.flatnonzero((model.jnt_qposadr == place) & np.array(model.jnt_limited, dtype=bool))
-    said = []
     for joint in joints.tolist():
         low, high = model.jnt_range[joint].tolist()
         outside = [value for value in vary.extremes if not low <= float(value) <= high]
         if outside:
             unit = vary.unit_on({int(model.jnt_type[joint])})
-            said.append(
+            return [
                 f"{vary.label}={outside[0]:g} starts outside the range of the joint, {low:.4g} to "
                 f"{high:.4g} {unit}: its limit pushes from the first step on"
-            )
-    return said
+            ]
+    return []
 
 
 def drawn_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> Array:

@@ -1,4 +1,7 @@
-"""What a worker does: cells one after the other, each to a row, with the Models kept between."""
+"""What a worker does: cells one after the other, each to a row, with the Models kept between.
+
+A cell is a point of the design, a seed and a backend. Whatever happens in it, it gives a row.
+"""
 
 from __future__ import annotations
 
@@ -12,32 +15,40 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from types import FrameType
 from typing import Any, TypeVar
 
+import numpy as np
+
 from .. import __version__
 from ..backends import load
-from ..errors import BadInputError, StateMachineError
-from ..interface import Model
+from ..compare.perturbed import nudged_controller, nudged_start
+from ..errors import BadInputError, StateMachineError, TimedOutError
+from ..interface import Array, Data, Model, forward, make_data, reset
+from ..interface.records import usual_site
+from ..measures import ContactNames
 from ..measures.text import listed
 from ..models import resolve
 from ..processes import end_with_parent
 from ..runs.controllers import function_file
+from ..runs.drive import check_length, drive, steps_in
+from ..runs.energy import energies
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario
 from ..silence import silence
-from .cell import run_cell, timed_out
 from .design import digest
 from .request import PreparedSweep, Sweep, SweepCell
 from .rows import DONE, FAILED
-from .settings import options_at
+from .settings import drawn_start, options_at, start_at
 
 T = TypeVar("T")
 Row = dict[str, Any]
 
 _TO_LOAD = 60.0  # seconds that an engine and a model may take at least
 _GRACE = 10.0  # seconds beyond a time-out, after which a process that still hangs ends itself
-_KEPT = 8  # of the latest Models
+_CACHED = 16  # of the latest Models
+_LOOKED = 64  # steps after which the clock is looked at
 _ONE_AT_A_TIME = threading.Lock()  # a Dask worker may have several threads, and an engine must not
 
 
@@ -54,6 +65,16 @@ def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], own: bool) -> li
     with _ONE_AT_A_TIME, warnings.catch_warnings(), silence():
         warnings.simplefilter("ignore")  # the driver has loaded the same models, and passed them on
         return [_row(ready, cell, own) for cell in cells]
+
+
+@functools.cache
+def _settle() -> None:
+    """Once in a process of our own: nothing it prints is shown, and it ends with its driver."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it was not kept from it already
+    end_with_parent()
 
 
 def row_of(ready: PreparedSweep, cell: SweepCell, error: BaseException | None = None) -> Row:
@@ -76,85 +97,19 @@ def row_of(ready: PreparedSweep, cell: SweepCell, error: BaseException | None = 
 
 
 def _row(ready: PreparedSweep, cell: SweepCell, own: bool) -> Row:
-    began = time.perf_counter()
+    began, limit = time.perf_counter(), ready.sweep.timeout
     row: Row = {}
     failure: BaseException | None = None
-    limit = ready.sweep.timeout
     try:
-        if ready.function and digest_of(ready.sweep.what) != ready.function:
-            name = function_file(ready.sweep.what).name
-            raise BadInputError(f"{name} is not the file of the sweep: it changed")
         with _limited(max(limit, _TO_LOAD), own):
-            model, options, doing = _model(ready, cell, row)
+            model, options, scenario = _model(ready, cell, row)
         with _limited(limit, own):
-            run_cell(ready, cell, model, options, doing, row)
+            _run(ready, cell, model, options, scenario, row)
     except _OutOfTimeError:
-        failure = timed_out(limit)
+        failure = _timed_out(limit)
     except Exception as error:  # of any kind: it belongs into the row
         failure = error
     return {**row, **row_of(ready, cell, failure), "wall_seconds": time.perf_counter() - began}
-
-
-def digest_of(function: str) -> str:
-    """A digest of the user's file."""
-    return digest(function_file(function).read_text(encoding="utf-8", errors="replace"))
-
-
-def _model(
-    ready: PreparedSweep, cell: SweepCell, row: Row
-) -> tuple[Model, dict[str, Any], Scenario]:
-    """The Model of a cell, the options that it was made with, and what is done on it."""
-    sweep = ready.sweep
-    seeded = {"seed": cell.seed} if "seed" in ready.parameters else {}
-    chosen = {vary.name: value for vary, value in ready.settings(cell, "parameter")}
-    doing = sweep.scenario({**seeded, **chosen})
-    name = next((value for _, value in ready.settings(cell, "model")), next(iter(ready.files)))
-    varied = [(v, value) for v, value in ready.settings(cell, "option") if value is not None]
-    # A switch may be what lets an engine take the file at all: `load` is told.
-    first = {**doing.options, **{v.name: value for v, value in varied if isinstance(value, bool)}}
-    rest = [(v, value) for v, value in varied if not isinstance(value, bool)]
-    key = repr((name, ready.files[name], cell.backend, first, sweep))
-
-    def loaded() -> tuple[Model, Scenario]:
-        if not _is_here(ready, name):
-            raise BadInputError(
-                f"{name} is not the file of the sweep: it changed, or is another here"
-            )
-        base = load_of(sweep, ready.places[name], cell.backend, first)
-        return base, doing.on(base)
-
-    base, on_robot = _kept(_LOADED, key, loaded)
-    row["engine_version"] = base.engine_version
-    doing = doing if doing.own else on_robot  # the user's own is the same on every robot
-    if not (options := options_at(base, rest)):
-        return base, first, doing
-    typed = repr([(v.label, v.times, value) for v, value in rest])
-    model = _kept(_REPLACED, key + typed, lambda: base.replace(**options))
-    return model, {**first, **options}, doing
-
-
-def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, Any]) -> Model:
-    """A model of a sweep as all of its cells load it."""
-    defaults, menagerie = sweep.defaults, sweep.menagerie
-    return load(place, backend=backend, defaults=defaults, menagerie=menagerie, **options)
-
-
-_LOADED: dict[str, Any] = {}
-_REPLACED: dict[str, Any] = {}
-
-
-def _kept(results: dict[str, Any], key: str, make: Callable[[], T]) -> T:
-    """What was made for a key, or is made now; an error is a result too."""
-    if key not in results:
-        if len(results) == _KEPT:
-            del results[next(iter(results))]
-        try:
-            results[key] = make()
-        except Exception as error:
-            results[key] = error
-    if isinstance(results[key], Exception):
-        raise results[key].with_traceback(None)
-    return results[key]
 
 
 class _OutOfTimeError(BaseException):
@@ -177,7 +132,6 @@ def _limited(seconds: float, own: bool) -> Iterator[None]:
 
     signal.signal(signal.SIGALRM, end)
     signal.setitimer(signal.ITIMER_REAL, seconds)
-    assert sys.stderr is not None
     faulthandler.dump_traceback_later(seconds + _GRACE, exit=True, file=sys.__stderr__ or 2)
     try:
         yield
@@ -186,14 +140,166 @@ def _limited(seconds: float, own: bool) -> Iterator[None]:
         faulthandler.cancel_dump_traceback_later()
 
 
-@functools.cache
-def _settle() -> None:
-    """Once in a process of our own: nothing it prints is shown, and it ends with its driver."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):
-        os.dup2(nowhere, stream)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it was not kept from it already
-    end_with_parent()
+def _timed_out(seconds: float) -> TimedOutError:
+    return TimedOutError(f"not at its end after {seconds:g} s on the clock")
+
+
+def _model(
+    ready: PreparedSweep, cell: SweepCell, row: Row
+) -> tuple[Model, dict[str, Any], Scenario]:
+    """The Model of a cell, the options that it was made with, and what is done on it.
+
+    Raises:
+        BadInputError: The model or the function is another one than that of the sweep.
+    """
+    sweep, wrong = ready.sweep, "is not the file of the sweep: it changed, or is another here"
+    if not _same_function(ready):
+        raise BadInputError(f"{function_file(sweep.what).name} {wrong}")
+    seeded = {"seed": cell.seed} if "seed" in ready.parameters else {}
+    chosen = {vary.name: value for vary, value in ready.settings(cell, "parameter")}
+    scenario = sweep.scenario({**seeded, **chosen})
+    name = next((value for _, value in ready.settings(cell, "model")), next(iter(ready.files)))
+    varied = [(v, value) for v, value in ready.settings(cell, "option") if value is not None]
+    # A switch may be what lets an engine take the file at all: `load` is told.
+    switches = {v.name: value for v, value in varied if isinstance(value, bool)}
+    first = {**scenario.options, **switches}
+    rest = [(v, value) for v, value in varied if not isinstance(value, bool)]
+    key = repr((name, ready.files[name], cell.backend, first, sweep))
+
+    def loaded() -> tuple[Model, Scenario]:
+        if not _same_model(ready, name):
+            raise BadInputError(f"{name} {wrong}")
+        base = load_of(sweep, ready.places[name], cell.backend, first)
+        return base, scenario.on(base)
+
+    base, on_robot = _cached(key, loaded)
+    row["engine_version"] = base.engine_version
+    # The user's own is the same on every robot, and has the parameters of this cell.
+    scenario = scenario if scenario.own else on_robot
+    if not (options := options_at(base, rest)):
+        return base, first, scenario
+    typed = repr([(v.label, v.times, value) for v, value in rest])
+    model = _cached(key + typed, lambda: base.replace(**options))
+    return model, {**first, **options}, scenario
+
+
+def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, Any]) -> Model:
+    """A model of a sweep as all of its cells load it."""
+    defaults, menagerie = sweep.defaults, sweep.menagerie
+    return load(place, backend=backend, defaults=defaults, menagerie=menagerie, **options)
+
+
+_LATEST: dict[str, Any] = {}
+
+
+def _cached(key: str, make: Callable[[], T]) -> T:
+    """What was made for a key, or is made now; an error is a result too."""
+    try:
+        result: Any = _LATEST.pop(key) if key in _LATEST else make()
+    except Exception as error:
+        result = error
+    _LATEST[key] = result  # the last one, so that the first is the one longest not asked for
+    if len(_LATEST) > _CACHED:
+        del _LATEST[next(iter(_LATEST))]
+    if isinstance(result, Exception):
+        raise result.with_traceback(None)
+    return result
+
+
+def _run(
+    ready: PreparedSweep,
+    cell: SweepCell,
+    model: Model,
+    options: Mapping[str, Any],
+    scenario: Scenario,
+    row: Row,
+) -> None:
+    """Run a cell and fill its row, with what is known until it fails as well.
+
+    Raises:
+        StateMachineError: The run fails: it diverges, takes too long, has bad input.
+    """
+    sweep, deadline = ready.sweep, time.monotonic() + ready.sweep.timeout
+    check_length(model, scenario.seconds)
+    total = steps_in(model, scenario.seconds)
+    controller = scenario.controller(model, cell.seed)
+    moments = np.round(np.arange(1, sweep.moments + 1) * total / sweep.moments).astype(int)
+    sampled = set(moments[moments > 0].tolist())
+    row["sample_time"], samples = [], list[Array]()
+    speed, fastest = np.zeros(model.nv), np.zeros(model.nv)
+    with make_data(model) as data:
+        reset(model, data, scenario.keyframe)
+        qpos, qvel = data.qpos, data.qvel  # the same arrays for the whole life of the Data
+        starts = start_at(model, ready.settings(cell, "state"))
+        for values, start in zip((qpos, qvel), starts, strict=True):
+            values[list(start)] = list(start.values())
+        qpos[:] = drawn_start(model, qpos, ready.spread, cell.seed)
+        if cell.nudge:
+            draw = np.random.default_rng([cell.nudge, cell.seed])
+            qpos[:], qvel[:] = nudged_start(model, qpos, qvel, draw)
+            controller = nudged_controller(controller, draw)
+        at_start = qpos.copy(), qvel.copy()
+        try:
+            for k, (began, now) in enumerate(pairwise(drive(model, data, controller, total)), 1):
+                row["steps"] = k
+                np.maximum(fastest, np.abs(qvel, out=speed), out=fastest)
+                if "touch" not in row and len(contacts := data.contacts):
+                    # As derived arrays are: of the state in which the step began.
+                    row["first_touch"] = began
+                    names = ContactNames.of(model)
+                    pairs = {names.pair(*geoms) for geoms in contacts.geom.tolist()}
+                    row["touch"] = ", ".join(sorted(pairs))
+                if k in sampled:
+                    samples.append(qpos.copy())
+                    row["sample_time"].append(float(now))
+                if not k % _LOOKED and time.monotonic() > deadline:
+                    raise _timed_out(sweep.timeout)
+        finally:
+            row["max_qvel"] = float(np.nan_to_num(fastest).max(initial=0.0))
+            row["qpos"], row["qvel"] = qpos.tolist(), qvel.tolist()
+            row["time"] = float(data.time)
+            row["sample_qpos"] = [sample.tolist() for sample in samples]
+        states = np.array([at_start[0], qpos]), np.array([at_start[1], qvel])
+        row["sample_tip"] = tips = _tips(model, data, samples)
+        row["tip"] = tips[-1] if tips else None
+    both, _ = energies(model, sweep.defaults, *states, options.get("gravity"))
+    sums = [float(energy) if np.isfinite(energy) else None for energy in both.sum(axis=1)]
+    row["energy_start"], row["energy"] = sums
+
+
+def _tips(model: Model, data: Data, samples: list[Array]) -> list[list[float]] | None:
+    """The fingertip (3,) [m] in world axes at some positions; the run is over, so `data` serves."""
+    site = usual_site(model.site_names)
+    if site is None:
+        return None
+    tips = []
+    reset(model, data)
+    for qpos in samples:
+        data.qpos = qpos
+        forward(model, data)
+        tips.append(data.site_xpos[site].tolist())
+    return tips
+
+
+def digest_of(function: str) -> str:
+    """A digest of the user's file."""
+    return digest(function_file(function).read_text(encoding="utf-8", errors="replace"))
+
+
+def _same_function(ready: PreparedSweep) -> bool:
+    """Whether the user's file, if there is one, is that of the sweep."""
+    try:
+        return not ready.function or digest_of(ready.sweep.what) == ready.function
+    except OSError:
+        return False
+
+
+def _same_model(ready: PreparedSweep, name: str) -> bool:
+    """Whether the file of a model is that of the sweep."""
+    try:
+        return model_digest(resolve(ready.places[name], ready.sweep.menagerie)) == ready.files[name]
+    except (StateMachineError, OSError):
+        return False
 
 
 def differing(ready: PreparedSweep, version: str) -> str:
@@ -204,17 +310,5 @@ def differing(ready: PreparedSweep, version: str) -> str:
         version: Of the driver's library.
     """
     wrong = [] if version == __version__ else ["statemachine"]
-    wrong += [name for name in ready.files if not _is_here(ready, name)]
-    if ready.function and not (
-        function_file(ready.sweep.what).is_file() and digest_of(ready.sweep.what) == ready.function
-    ):
-        wrong.append(ready.sweep.what)
-    return listed(wrong)
-
-
-def _is_here(ready: PreparedSweep, name: str) -> bool:
-    """Whether the file of a model is that of the sweep."""
-    try:
-        return model_digest(resolve(ready.places[name], ready.sweep.menagerie)) == ready.files[name]
-    except (StateMachineError, OSError):
-        return False
+    wrong += [name for name in ready.files if not _same_model(ready, name)]
+    return listed(wrong if _same_function(ready) else [*wrong, ready.sweep.what])
