@@ -1,17 +1,17 @@
 """One model, examined: what it does on each engine that is here.
 
-It runs in a process of its own: `python -m statemachine.robots.examine JOB ANSWER`. What is known
+It runs in a process of its own: `python -m statemachine.robots.examine`. What is known
 is told before each part, so that a part that crashes leaves what was found before it.
 """
 
 from __future__ import annotations
 
-import json
+import pickle
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ from ..probes.audit import trials
 from ..probes.audit.interface_driver import InterfaceDriver
 from ..runs import record_scenario
 from ..runs.scenarios import scenario
-from ..runs.whole import replace_text
+from ..runs.whole import replace_bytes
 from . import gaps
 from .records import RUNS, BackendRow, ExaminedModel, WitnessRow
 
@@ -241,15 +241,13 @@ def _features(error: StateMachineError) -> tuple[str, ...]:
     return ("not read",) if isinstance(error, ModelError) else (type(error).__name__,)
 
 
-def main(job: str, answer: str) -> None:
+def main(path: str, quick: str, seed: str, answer: str) -> None:
     """Examine, and keep what is known in the file `answer`, whole at any moment."""
-    asked = json.loads(Path(job).read_text(encoding="utf-8"))
 
     def tell(row: ExaminedModel, part: str) -> None:
-        replace_text(Path(answer), json.dumps({"part": part, "row": asdict(row)}))
+        replace_bytes(Path(answer), pickle.dumps((part, row)))
 
-    row = ExaminedModel(asked["file"], asked["sha256"], asked["made_with"])
-    tell(examine(Path(asked["path"]), row, asked["quick"], asked["seed"], tell), "")
+    tell(examine(Path(path), ExaminedModel("", "", ""), bool(quick), int(seed), tell), "")
 
 
 if __name__ == "__main__":

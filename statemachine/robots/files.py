@@ -6,11 +6,11 @@ import hashlib
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from ..errors import BadInputError
+from ..errors import refuse
 from ..installed import DEFAULT
 from ..models import SUFFIXES
 from ..runs.provenance import model_digest, model_files
@@ -46,31 +46,26 @@ def find(paths: Sequence[str | os.PathLike[str]]) -> list[ModelFile]:
     Raises:
         BadInputError: A path is not there, or nothing is found at all.
     """
-    found: dict[Path, ModelFile] = {}
+    files: dict[Path, tuple[str, Path]] = {}  # what each is called, and where it was found
     for given in map(Path, paths):
-        if given.is_dir():
-            before = "" if len(paths) == 1 else f"{given.as_posix()}/"
-            for file in _below(given):
-                name = before + file.relative_to(given).as_posix()
-                found.setdefault(file.resolve(), ModelFile(name, file, ""))
-        elif not given.is_file():
-            raise BadInputError(f"there is no file or folder {given}")
-        elif given.suffix.lower() not in SUFFIXES:
-            raise BadInputError(f"{given} is no model: it does not end in {', '.join(SUFFIXES)}")
-        else:
-            found.setdefault(given.resolve(), ModelFile(given.as_posix(), given, ""))
-    if not found:
-        raise BadInputError(f"no models (MJCF or URDF) in {', '.join(map(str, paths))}")
-    owners: dict[Path, str] = {}
-    for each in found.values():
-        with suppress(ValueError, OSError):
-            for part in list(model_files(each.path))[1:]:  # what it includes
-                owners.setdefault(part.resolve(), each.name)
-    return [
-        replace(
-            each, path=each.path.absolute(), sha256=_digest(each.path), part_of=owners.get(path, "")
+        is_file = given.is_file()
+        wrong_end = f"{given} is no model: it does not end in {', '.join(SUFFIXES)}"
+        refuse(
+            (not is_file and not given.is_dir(), f"there is no file or folder {given}"),
+            (is_file and given.suffix.lower() not in SUFFIXES, wrong_end),
         )
-        for path, each in found.items()
+        for file in [given] if is_file else _below(given):
+            name = (file.relative_to(given) if len(paths) == 1 and not is_file else file).as_posix()
+            files.setdefault(file.resolve(), (name, file))
+    refuse((not files, f"no models (MJCF or URDF) in {', '.join(map(str, paths))}"))
+    owners: dict[Path, str] = {}
+    for name, file in files.values():
+        with suppress(ValueError, OSError):
+            for part in list(model_files(file))[1:]:  # what it includes
+                owners.setdefault(part.resolve(), name)
+    return [
+        ModelFile(name, file.absolute(), _digest(file), owners.get(place, ""))
+        for place, (name, file) in files.items()
     ]
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
+import pickle
 import platform
 import tempfile
 import threading
@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from .. import __version__
-from ..errors import BadInputError, MissingEngineError
+from ..errors import MissingEngineError, refuse
 from ..installed import DEFAULT, ENGINES, engine_version, require
 from ..processes import ALONE, checked_jobs, fresh_python, sandbox
 from ..processes.parallel import in_parallel, unwinding
@@ -57,10 +57,13 @@ def examine_all(
         MissingEngineError: The default engine is not installed here.
     """
     jobs = checked_jobs(jobs)
-    if not 0 < seconds <= 86400:
-        raise BadInputError(f"seconds must be above 0, and at most 86400; got {seconds:g}")
-    if seed < 0:
-        raise BadInputError(f"seed must not be negative; got {seed}")
+    refuse(
+        (
+            not 0 < seconds <= 86400,
+            f"seconds must be above 0, and at most 86400; got {seconds:g}",
+        ),
+        (seed < 0, f"seed must not be negative; got {seed}"),
+    )
     require(DEFAULT)
     made_with = _made_with(quick, seed)
     before = tables.read(table) if table is not None and table.exists() else {}
@@ -72,9 +75,8 @@ def examine_all(
         if known is not None and not (known.ended and known.limit != seconds):
             rows[model.name] = replace(known, part_of=model.part_of)
         else:
-            empty = ExaminedModel(model.name, model.sha256, made_with)
             work[model.name] = partial(
-                _examined, model, empty, quick=quick, seconds=seconds, seed=seed, stop=stop
+                _examined, model, made_with, quick=quick, seconds=seconds, seed=seed, stop=stop
             )
 
     def in_order() -> list[ExaminedModel]:
@@ -113,30 +115,21 @@ def _made_with(quick: bool, seed: int) -> str:
 
 def _examined(
     model: ModelFile,
-    empty: ExaminedModel,
+    made_with: str,
     *,
     quick: bool,
     seconds: float,
     seed: int,
     stop: threading.Event,
 ) -> ExaminedModel | None:
-    """A model's row, from a process of its own, which fills an empty one; None if stopped."""
+    """A model's row, from a process of its own; None if stopped."""
     if stop.is_set():
         return None
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder:
-        job, answer = Path(folder) / "job", Path(folder) / "answer"
-        asked = {
-            "file": model.name,
-            "sha256": model.sha256,
-            "made_with": empty.made_with,
-            "path": os.fspath(model.path),
-            "quick": quick,
-            "seed": seed,
-        }
-        job.write_text(json.dumps(asked), encoding="utf-8")
-        files = os.fspath(job), os.fspath(answer)
-        command, environment = fresh_python(f"{__package__}.examine", *files)
+        answer = Path(folder) / "answer"
+        words = os.fspath(model.path), "quick" * quick, str(seed), os.fspath(answer)
+        command, environment = fresh_python(f"{__package__}.examine", *words)
         outcome = sandbox.run(
             command,
             cpu=4 * seconds + 60,
@@ -148,19 +141,21 @@ def _examined(
         )
         if stop.is_set():
             return None
-        part, row = "start", empty
-        with suppress(OSError, ValueError):
-            told = json.loads(answer.read_text(encoding="utf-8"))
-            part, row = told["part"], tables.row_of(told["row"])
-    how = ""
+        part, row = "start", ExaminedModel("", "", "")
+        with suppress(OSError):
+            part, row = pickle.loads(answer.read_bytes())
+    ended = ""
     if outcome.end != "code" or outcome.code or part:
         said = outcome.stderr.strip().splitlines() if outcome.end == "code" else []
-        words = f"its process failed: {said[-1][:200]}" if said else f"it {outcome.how}"
-        how = f"{words} (at: {part or 'the end'})"
+        ended = f"its process failed: {said[-1][:200]}" if said else f"it {outcome.how}"
+        ended += f" (at: {part or 'the end'})"
     return replace(
         row,
+        file=model.name,
+        sha256=model.sha256,
+        made_with=made_with,
         part_of=model.part_of,
-        ended=how,
+        ended=ended,
         limit=seconds,
         took=round(time.monotonic() - began, 1),
     )

@@ -103,9 +103,3 @@ def _built(kind: Any, value: Any) -> Any:
     if kind is bool:
         return value in ("yes", True)
     return kind(value)
-
-
-def row_of(plain: Mapping[str, Any]) -> ExaminedModel:
-    """A row from what `dataclasses.asdict` made of it."""
-    row: ExaminedModel = _built(ExaminedModel, plain)
-    return row

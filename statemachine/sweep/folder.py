@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, shown
+from ..errors import BadInputError, refuse, shown
 from ..measures.text import listed
 from ..runs.whole import replace_text
 from .design import Design, Vary
@@ -127,23 +127,25 @@ def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> 
     if path.exists():
         there = read_manifest(folder)
         others = [text for name in _SAME for text in _differences(there, wanted, name, extend)]
-        if others:
-            raise BadInputError(
-                f"{folder} is of another sweep: {listed(others)}. Name another folder with --out"
-            )
-        others = _differences(there, wanted, "design")
-        if others and not extend:
-            raise BadInputError(
-                f"{folder} is of another design: {listed(others)}. Name another folder with "
-                "--out, or let this one grow with --extend"
-            )
-        columns = [[each["label"] for each in manifest["factors"]] for manifest in (there, wanted)]
-        if sorted(columns[0]) != sorted(columns[1]):
-            raise BadInputError(
-                f"{folder} varies {listed(columns[0]) or 'nothing'}, and a sweep grows in values, "
-                "seeds and backends alone: name another folder with --out"
-            )
-        if not others:
+        design = _differences(there, wanted, "design")
+        old, new = ([vary["label"] for vary in m["factors"]] for m in (there, wanted))
+        refuse(
+            (
+                others,
+                f"{folder} is of another sweep: {listed(others)}. Name another folder with --out",
+            ),
+            (
+                design and not extend,
+                f"{folder} is of another design: {listed(design)}. Name another folder with "
+                "--out, or let this one grow with --extend",
+            ),
+            (
+                sorted(old) != sorted(new),
+                f"{folder} varies {listed(old) or 'nothing'}, and a sweep grows in values, "
+                "seeds and backends alone: name another folder with --out",
+            ),
+        )
+        if not design:
             return
     replace_text(path, json.dumps(wanted, indent=1) + "\n")
 
