@@ -18,7 +18,7 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -206,13 +206,14 @@ def test_a_lesson_sees_the_lines_of_its_code_and_each_step(arm: sm.Model) -> Non
         "data.ctrl[1] = 0.1\nsm.step(model, data, 3)\nprint(data.time)\n"
     )
 
-    lines: list[str] = []
     times: list[float] = []
+
+    def each_step(model: sm.Model, data: sm.Data) -> None:
+        times.append(data.time)
+        sm.step(model, data)
+
     with CodeRun(code, arm) as watched, CodeRun(code, arm) as alone:
-        watched(
-            before=lambda _model, data: times.append(data.time),
-            line=lambda source, _names: lines.append(source),
-        )
+        lines = list(watched.lines(each_step))
         alone()
         assert lines == code.splitlines()
         assert times == [0.0, 0.005, 0.01]
@@ -229,13 +230,13 @@ def test_the_run_of_a_lesson_is_the_one_that_is_seen(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     played: list[str] = []
-    play = CodeRun.__call__
+    lines = CodeRun.lines
 
-    def once(self: CodeRun, **watch: Any) -> Mapping[str, Any]:
+    def once(self: CodeRun, *watch: Any) -> Iterator[str]:
         played.append(self._code)
-        return play(self, **watch)
+        return lines(self, *watch)
 
-    monkeypatch.setattr(CodeRun, "__call__", once)
+    monkeypatch.setattr(CodeRun, "lines", once)
     _, taken = _take(name, "mujoco")
     assert played.count(taken.code) == 1
 

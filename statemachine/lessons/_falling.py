@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,9 +10,9 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..interface import Array, Data, forward
 from ..measures.text import NONE, position
-from ..runs.drive import Progress, steps_in
-from ..runs.robot import carried_by, touching
-from ._robot import coordinate
+from ..runs.drive import steps_in
+from ..runs.robot import touching
+from ._robot import carried_by_joint, coordinate
 
 BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _SHARE = 1e-4  # of the largest part; a sum below it is zero, too
@@ -123,62 +123,51 @@ class Droop:
         return PARTS[part] if against[part] > 0 else "nothing"
 
 
-class Falling:
-    """A joint of a Data that is stepped, noted after each step."""
+def droop(
+    data: Data,
+    joint: str,
+    seconds: float,
+    ctrl: Array,
+    path: Array,
+    touches: Iterable[tuple[float, Sequence[str]]] = (),
+    diverged: float | None = None,
+) -> Droop:
+    """What a run came to.
 
-    def __init__(self, data: Data, joint: str, seconds: float, progress: Progress) -> None:
-        model = self._model = data.model
-        self._data, self._ctrl, self._progress = data, data.ctrl.copy(), progress
-        at = coordinate(model, joint)
-        self._place, self._dof = at.place, at.dof
-        self._bodies = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
-        self._total = steps_in(model, seconds)
-        self._path: list[float] = []
-        self._touches: dict[str, float] = {}
-        self._time = 0.0
-        self._look()
-
-    def note(self, contacts: bool) -> None:
-        """A step is over; `contacts`: whether to look at them, too."""
-        if contacts:  # those of a step are of the state that it started from
-            self._touch()
-        self._look()
-
-    def _touch(self) -> tuple[str, ...]:
-        pairs = touching(self._model, self._data.contacts, self._bodies)
-        for pair in pairs:
-            self._touches.setdefault(pair, self._time)
-        return pairs
-
-    def _look(self) -> None:
-        if len(self._path) % 1000 == 0:
-            self._progress(len(self._path) / self._total)
-        self._time = self._data.time
-        self._path.append(float(self._data.qpos[self._place]))
-
-    def end(self, diverged: float | None = None) -> Droop:
-        """The run; after the last step, or as the engine diverged at a time [s]."""
-        model, data, path = self._model, self._data, np.array(self._path)
-        time = np.array(milestones(self._total * model.timestep))
-        rows = np.rint(time / model.timestep).astype(int)
-        position = np.full(len(time), np.nan)
-        position[rows < len(path)] = path[rows[rows < len(path)]]
-        if diverged is not None:
-            return Droop(time, position, path, diverged)
-        forward(model, data)
-        return Droop(
-            time=time,
-            position=position,
-            path=path,
-            qpos=data.qpos.copy(),
-            forces=forces_on(data, self._dof),
-            velocity=float(data.qvel[self._dof]),
-            acceleration=float(data.qacc[self._dof]),
-            most_acceleration=float(np.abs(data.qacc).max()),
-            touching=self._touch(),
-            touches=self._touches,
-            ctrl_untouched=np.array_equal(data.ctrl, self._ctrl),
-        )
+    Args:
+        data: As it was left.
+        joint: That is watched.
+        seconds: How long the run was to be.
+        ctrl: (nu,) at its start.
+        path: (steps + 1,) positions of the joint.
+        touches: What of the bodies that it carries touched what, and when [s].
+        diverged: When the engine gave up [s].
+    """
+    model, dof = data.model, coordinate(data.model, joint).dof
+    time = np.array(milestones(steps_in(model, seconds) * model.timestep))
+    rows = np.rint(time / model.timestep).astype(int)
+    position = np.full(len(time), np.nan)
+    position[rows < len(path)] = path[rows[rows < len(path)]]
+    if diverged is not None:
+        return Droop(time, position, path, diverged)
+    forward(model, data)
+    pairs_at_end = touching(model, data.contacts, carried_by_joint(model, joint))
+    first: dict[str, float] = {}
+    for moment, pairs in (*touches, (data.time, pairs_at_end)):
+        first |= {pair: moment for pair in pairs if pair not in first}
+    return Droop(
+        time=time,
+        position=position,
+        path=path,
+        qpos=data.qpos.copy(),
+        forces=forces_on(data, dof),
+        velocity=float(data.qvel[dof]),
+        acceleration=float(data.qacc[dof]),
+        most_acceleration=float(np.abs(data.qacc).max()),
+        touches=first,
+        touching=pairs_at_end,
+        ctrl_untouched=np.array_equal(data.ctrl, ctrl),
+    )
 
 
 def milestones(seconds: float) -> list[float]:

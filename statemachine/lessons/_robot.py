@@ -55,6 +55,11 @@ def coordinate(model: Model, joint: str) -> Coordinate:
     return Coordinate(joint, place, dof, kind is JointType.SLIDE, slot)
 
 
+def carried_by_joint(model: Model, joint: str) -> frozenset[int]:
+    """The bodies that a joint moves."""
+    return carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
+
+
 def usual_joint(model: Model, servos: bool = False) -> str:
     """The joint that a lesson takes where nobody names one; with `servos` one that has a servo.
 
@@ -135,7 +140,7 @@ def usual_tip(model: Model, joint: str) -> str:
     """The fingertip if there is one; else the last site or body that a joint carries."""
     if FINGERTIP in model.site_names:
         return FINGERTIP
-    carried = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
+    carried = carried_by_joint(model, joint)
     bodies = list(enumerate(model.body_names))[1:]  # without the world
     sites = list(zip(model.site_bodyid.tolist(), model.site_names, strict=True))
     for places in (sites, bodies):

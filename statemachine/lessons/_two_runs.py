@@ -2,57 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..interface import Array, Data, Model
+from ..interface import Array
 from ..measures import largest
 from ..measures.text import millimetres
 from ..page import Table, Traces
-from ..runs.drive import Progress
-from ..runs.robot import body_pairs
 from .template import where
 
 BREAKS = ("extra-step", "late-ctrl")
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
 _SHORT = {"extra-step": "one step more", "late-ctrl": "late ctrl"}
-
-
-class Paths:
-    """Where the two runs go, step by step, and what touches in the first.
-
-    Attributes:
-        contacts: How many contacts each step of the first run found.
-        pairs: For each pair of bodies, in how many of these steps it touched.
-    """
-
-    def __init__(self, nstep: int, progress: Progress) -> None:
-        self.contacts: list[int] = []
-        self.pairs: Counter[str] = Counter()
-        self._poses: dict[Data, list[Array]] = {}
-        self._nstep, self._progress = nstep, progress
-
-    def before(self, _model: Model, data: Data) -> None:
-        if data not in self._poses:
-            self._poses[data] = [data.qpos.copy()]
-
-    def after(self, model: Model, data: Data) -> None:
-        poses = self._poses[data]
-        poses.append(data.qpos.copy())
-        if len(self._poses) == 1:
-            self.contacts.append(len(data.contacts))
-            self.pairs.update(body_pairs(model, data.contacts).keys())
-        if len(poses) % 100 == 0:
-            self._progress((len(self._poses) - 1 + (len(poses) - 2) / self._nstep) / 2)
-
-    def both(self) -> tuple[Array, Array]:
-        """Qpos after each counted step (n+1, nq) of the two runs; one step more is not counted."""
-        first, second = (np.array(poses[-self._nstep - 1 :]) for poses in self._poses.values())
-        return first, second
 
 
 @dataclass(frozen=True)

@@ -112,13 +112,12 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forwar
     model, joint, value = play.model, options["joint"], options["value"]
     place, tip = coordinate(model, joint).place, tip_of(model, options["site"])
     steps = _steps(model, options)
-    read: list[tuple[Array, float]] = []
-
-    def look(source: str, names: Mapping[str, Any]) -> None:
-        if source.startswith("print("):
-            read.append((tip.read(names["data"]), names["data"].time))
-
-    contacts = play(line=look)["data"].contacts
+    read = [
+        (tip.read(play.names["data"]), play.names["data"].time)
+        for source in play.lines()
+        if source.startswith("print(")
+    ]
+    contacts = play.names["data"].contacts
     labels = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
     places = [place for place, _ in read]
     asked = ["write"] * options["arrays"] + ["step"] * bool(steps)

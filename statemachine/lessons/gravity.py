@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -14,17 +13,17 @@ import numpy as np
 from ..engines import room
 from ..engines.records import LeftAlone
 from ..errors import DivergedError, UnsupportedError
-from ..interface import Data, Model, make_data, reset
+from ..interface import Model, make_data, reset
 from ..measures import largest
 from ..measures.text import NONE, apart, position, short_time, signed
 from ..page import Table, Traces
 from ..runs.commands import start_keyframe
 from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
 from ..runs.provenance import provenance
-from ..runs.robot import is_the_arm
+from ..runs.robot import is_the_arm, touching
 from ..runs.scenarios import SCENARIOS
-from ._falling import BALANCE, PARTS, Droop, Falling, milestones
-from ._robot import check_servos, coordinate, start_line, with_joint
+from ._falling import BALANCE, PARTS, Droop, droop, milestones
+from ._robot import carried_by_joint, check_servos, coordinate, start_line, with_joint
 from .session import CodeRun, LessonResult, stepping_loop
 from .template import differences, emulated, where
 
@@ -107,15 +106,23 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
         with suppress(UnsupportedError):
             variants["no contacts"] = model.replace(**SCENARIOS["fall"].options)
     total = 2 * seconds + len(variants) * options["longer"]
-    falls: dict[Data, Falling] = {}
-
-    def begin(_model: Model, data: Data) -> None:
-        if data not in falls:
-            share = part_of(progress, len(falls) * seconds / total, seconds / total)
-            falls[data] = Falling(data, joint, seconds, share)
-
-    play(before=begin, after=lambda _model, data: falls[data].note(contacts=True))
-    servos_on, servos_off = (falls[data].end() for _, data in play.worlds)
+    place, bodies = coordinate(model, joint).place, carried_by_joint(model, joint)
+    courses = play.follow(
+        lambda model, data: touching(model, data.contacts, bodies),
+        2 * steps_in(model, seconds),
+        part_of(progress, 0, 2 * seconds / total),
+    )
+    servos_on, servos_off = (
+        droop(
+            data,
+            joint,
+            seconds,
+            course.ctrl,
+            np.array(course.qpos)[:, place],
+            zip(course.time, course.looks, strict=False),
+        )
+        for (_, data), course in zip(play.worlds, courses, strict=True)
+    )
     longer = {}
     for number, (name, variant) in enumerate(variants.items()):
         start = 2 * seconds + number * options["longer"]
@@ -133,15 +140,18 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
 
 
 def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) -> Droop:
+    place, steps = coordinate(model, joint).place, steps_in(model, seconds)
     with make_data(model) as data:
         reset(model, data, start_keyframe(model))
-        fall = Falling(data, joint, seconds, progress)
+        ctrl, path, diverged = data.ctrl.copy(), list[float](), None
         try:
-            for _ in islice(drive(model, data, None, steps_in(model, seconds)), 1, None):
-                fall.note(contacts=False)
+            for _ in drive(model, data, None, steps):
+                path.append(float(data.qpos[place]))
+                if len(path) % 1000 == 0:
+                    progress(len(path) / steps)
         except DivergedError as error:
-            return fall.end(error.time)
-        return fall.end()
+            diverged = error.time
+        return droop(data, joint, seconds, ctrl, np.array(path), diverged=diverged)
 
 
 def slots(result: Gravity) -> dict[str, Any]:

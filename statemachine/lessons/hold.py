@@ -92,38 +92,26 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
     joints = model.actuator_jntid[servos]
     places, total = model.jnt_qposadr[joints], steps_in(model, options["seconds"])
     robot = trees_of_actuators(model)
-    times: list[float] = []
-    poses: list[Array] = []
-    touches: list[tuple[float, tuple[str, ...]]] = []  # when, and what touches what
 
-    def note(_model: Model, data: Data) -> None:
-        times.append(data.time)
-        poses.append(data.qpos[places])
-        if len(times) % 100 == 0:
-            progress(len(times) / total)
+    def touched(model: Model, data: Data) -> tuple[str, ...]:
+        return touching(model, data.contacts, robot, each_other=True)
 
-    def look(_model: Model, data: Data) -> None:
-        # The contacts of a step are those of the state that it started from.
-        if pairs := touching(model, data.contacts, robot, each_other=True):
-            touches.append((times[-1], pairs))
-
-    play(before=note, after=look)
+    (course,) = play.follow(touched, total, progress)
     _, data = play.worlds[0]
-    contact_steps = len(touches)
-    note(model, data)
     forward(model, data)
-    look(model, data)
-    first_contact, touched = touches[0] if touches else (None, ())
+    looks = [*course.looks, touched(model, data)]
+    touches = [(time, pairs) for time, pairs in zip(course.time, looks, strict=True) if pairs]
+    first_contact, first_pairs = touches[0] if touches else (None, ())
     ctrl, gear = data.ctrl.copy(), model.actuator_gear[servos]
     return Hold(
         target=ctrl[servos] / gear,
         goal=np.clip(ctrl, *model.actuator_ctrlrange.T)[servos] / gear,
-        time=np.array(times),
-        qpos=np.array(poses),
+        time=np.array(course.time),
+        qpos=np.array(course.qpos)[:, places],
         first_contact=first_contact,
-        touched=touched,
-        contact_steps=contact_steps,
-        touching=touches[-1][1] if len(touches) > contact_steps else (),
+        touched=first_pairs,
+        contact_steps=sum(map(bool, course.looks)),
+        touching=looks[-1],
         speed=data.qvel[model.jnt_dofadr[joints]].copy(),
         without_contacts=None if not touches else _freely(model, ctrl, total, places),
         joints=tuple(model.joint_names[joint] or f"joint {joint}" for joint in joints),

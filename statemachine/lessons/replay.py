@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -18,10 +19,10 @@ from ..measures import largest
 from ..measures.text import count, degrees, millimetres
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import provenance
-from ..runs.robot import command, is_the_arm
+from ..runs.robot import body_pairs, command, is_the_arm
 from ._restore import of_its_own, through_us, ways_back
-from ._two_runs import BREAKS, Broken, Paths, broken_table, growth
-from .session import CodeRun, LessonResult
+from ._two_runs import BREAKS, Broken, broken_table, growth
+from .session import CodeRun, Course, LessonResult
 from .template import by_engine, differences
 
 
@@ -133,17 +134,20 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
     """Watch both runs; then play the code that breaks them, and theirs with half the timestep."""
     model, nstep, way = play.model, options["steps"], options["break"]
     shares = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
-    paths = Paths(nstep, progress if way else shares[0])
-    play(before=paths.before, after=paths.after)
-    first, second = paths.both()
+    runs = play.follow(
+        lambda model, data: body_pairs(model, data.contacts),
+        2 * nstep,
+        progress if way else shares[0],
+    )
+    first, second = _poses(runs, nstep)
     broken, finer = [], None
     if way is None:
         for each, share in zip(BREAKS, shares[1:], strict=True):
-            watch = Paths(nstep, share)
             with CodeRun(code(model, {**options, "break": each}, "sm.load()"), model) as other:
-                other(before=watch.before, after=watch.after)
-            broken.append(Broken.of(each, *watch.both()))
+                courses = other.follow(lambda _model, _data: None, 2 * nstep, share)
+            broken.append(Broken.of(each, *_poses(courses, nstep)))
         finer = _finer(model, options, first[-1])
+    touches = runs[0].looks
     gap = first - second
     free = model.jnt_qposadr[model.jnt_type == int(JointType.FREE)].tolist()
     hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
@@ -159,8 +163,8 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
         hinges=tuple(hinges.tolist()),
         free=(free[0], free[0] + 1, free[0] + 2) if free else None,
         travel=float(np.ptp(first[:, hinges], axis=0).max(initial=0.0)),
-        contacts=np.array(paths.contacts, dtype=np.int64),
-        pairs=dict(paths.pairs),
+        contacts=np.array([pairs.total() for pairs in touches], dtype=np.int64),
+        pairs=dict(Counter(pair for pairs in touches for pair in pairs)),
         keyframe=model.keyframes[0].name if model.keyframes else None,
         breaks=tuple(broken),
         finer=finer,
@@ -169,6 +173,11 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
         own_ways=room(model.backend).ways_back(model),
         provenance=provenance(model),
     )
+
+
+def _poses(runs: Sequence[Course], nstep: int) -> list[Array]:
+    """Qpos after each counted step (n+1, nq) of each run; one step more is not counted."""
+    return [np.array(course.qpos[-nstep - 1 :]) for course in runs]
 
 
 def _finer(model: Model, options: Mapping[str, Any], end: Array) -> Finer | None:

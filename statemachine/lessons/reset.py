@@ -103,13 +103,11 @@ class Reset(LessonResult):
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
     """Look at the Data after each line; go on with it from each keyframe, and after a reset."""
     model = play.model
-    lines: dict[str, tuple[dict[str, bytes], dict[str, bytes]]] = {}  # stored, derived; after each
-
-    def look(source: str, names: Mapping[str, Any]) -> None:
-        if "data" in names:
-            lines[source] = read_stored(names["data"]), read_derived(names["data"])
-
-    play(line=look)
+    lines = {  # what is stored and derived after each
+        source: (read_stored(play.names["data"]), read_derived(play.names["data"]))
+        for source in play.lines()
+        if "data" in play.names
+    }
     start, blank = lines["data = sm.make_data(model)"]
     changed, _ = lines[f"sm.step(model, data, {_STEPS})"]
     again, derived = lines["sm.reset(model, data)"]

@@ -7,7 +7,7 @@ import io
 import itertools
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stdout
 from dataclasses import dataclass, replace
 from types import ModuleType
@@ -16,14 +16,30 @@ from typing import Any
 import statemachine
 
 from ..backends import backend_engine
-from ..interface import Data, Model, make_data, step
+from ..interface import Array, Data, Model, make_data, step
 from ..page import Code, Page, Printed
 from ..probes.calls import CallRecording, record, recorded_engines, statements
-from ..runs.drive import steps_in
+from ..runs.drive import Progress, silent, steps_in
 from ..runs.provenance import Provenance
 from ..runs.robot import is_the_arm
 from . import module, template
 from .records import Lesson
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What became of a Data, timestep by timestep.
+
+    Attributes:
+        ctrl: (nu,) its command before the first.
+        time: (n+1) times of the states that it went through [s]; qpos: (nq,) in each.
+        looks: (n) what was looked at after each step.
+    """
+
+    ctrl: Array
+    time: list[float]
+    qpos: list[Array]
+    looks: list[Any]
 
 
 class CodeRun(ExitStack):
@@ -53,20 +69,12 @@ class CodeRun(ExitStack):
         """What the code printed."""
         return self._out.getvalue()
 
-    def __call__(
-        self,
-        *,
-        before: Callable[[Model, Data], object] | None = None,
-        after: Callable[[Model, Data], object] | None = None,
-        line: Callable[[str, Mapping[str, Any]], object] | None = None,
-    ) -> Mapping[str, Any]:
-        """Run the code; its variables.
+    def lines(self, each_step: Callable[[Model, Data], object] = step) -> Iterator[str]:
+        """Run the code; yields each statement after it was run.
 
         Args:
-            before: Called before each timestep, one of several if the code asks for several.
-            after: Called after each. With one of these `sm.step(model, data, n)` is taken as n
-                steps, which end in the same bits.
-            line: Called after each statement, with it and with the variables of the code.
+            each_step: Called for each timestep in place of `step`, which it calls. Then
+                `sm.step(model, data, n)` is taken as n steps, which end in the same bits.
 
         Raises:
             Exception: Whatever the code raised.
@@ -79,19 +87,15 @@ class CodeRun(ExitStack):
 
         def watched(model: Model, data: Data, nstep: int = 1) -> None:
             for _ in range(nstep):
-                if before is not None:
-                    before(model, data)
-                step(model, data)
-                if after is not None:
-                    after(model, data)
+                each_step(model, data)
 
         # The package as the code imports it: its Model is given, its steps are looked at.
         facade = ModuleType(statemachine.__name__)
-        vars(facade).update(vars(statemachine))
         vars(facade).update(
+            vars(statemachine),
             load=lambda *_args, **_options: self.model,
             make_data=make,
-            step=step if before is after is None else watched,
+            step=step if each_step is step else watched,
         )
 
         def imported(name: str, *args: Any, **kwargs: Any) -> Any:
@@ -101,12 +105,48 @@ class CodeRun(ExitStack):
             "__name__": "__main__",
             "__builtins__": {**vars(builtins), "__import__": imported},
         }
-        with redirect_stdout(self._out):
-            for source, _, run in statements(self._code):
+        for source, _, run in statements(self._code):
+            with redirect_stdout(self._out):
                 run(self.names)
-                if line is not None:
-                    line(source, self.names)
+            yield source
+
+    def __call__(self, each_step: Callable[[Model, Data], object] = step) -> Mapping[str, Any]:
+        """Run the code as `lines` does; its variables."""
+        for _ in self.lines(each_step):
+            pass
         return self.names
+
+    def follow(
+        self, look: Callable[[Model, Data], Any], steps: int, progress: Progress
+    ) -> list[Course]:
+        """Run the code; where each Data that it stepped went.
+
+        Args:
+            look: What to keep of a Data after each step. Its contacts are then those of the state
+                that the step began from.
+            steps: How many there are.
+            progress: Told the fraction that is done.
+        """
+        courses: dict[Data, Course] = {}
+        numbers = itertools.count()
+
+        def note(data: Data) -> None:
+            if data not in courses:
+                courses[data] = Course(data.ctrl.copy(), [], [], [])
+            courses[data].time.append(data.time)
+            courses[data].qpos.append(data.qpos.copy())
+
+        def each_step(model: Model, data: Data) -> None:
+            note(data)
+            step(model, data)
+            courses[data].looks.append(look(model, data))
+            if (number := next(numbers)) % 100 == 0:
+                progress(number / steps)
+
+        self(each_step)
+        for _, data in self.worlds:
+            note(data)
+        return list(courses.values())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +181,7 @@ def take(
     options: Mapping[str, Any] | None = None,
     name: str | None = None,
     menagerie: str | None = None,
-    progress: Callable[[float], None] = lambda _fraction: None,
+    progress: Progress = silent,
     calls: bool = False,
 ) -> Taken:
     """Run the code of a lesson, and what else the lesson looks at.

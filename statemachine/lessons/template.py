@@ -1,17 +1,19 @@
-"""The page of a lesson, from the template beside its code: `hold.md` is that of `hold.py`.
+"""Pages from templates, which stand beside the code: `hold.md` is that of `hold.py`.
 
 A template is Markdown with named slots. Its paragraphs become the blocks of a page:
 
     # Six numbers in                  the title of the page; a lesson has its question as title
     ## Which arrays does it change?   a heading
-    {costs}                           alone: a block that the lesson made, or several
+    {costs}                           alone: a block that the code made, or several
     ? {right}: How far is it?         a question: below it "a) …", "b) …" and "> " with the reason
     ✓ {same}: Both are the same.      a verdict, and whether it holds
+    <small>Left: the gap.</small>     a note to what stands above it
     <!-- if moved -->                 what follows stands only where the slot `moved` is true, up to
     <!-- else -->, <!-- end -->       these; "if not moved" is the contrary
 
-A slot takes a number with its unit or a name, and a paragraph is filled in for each engine. It
-stands there once for all engines of which it says the same, under their names if not for all.
+A slot takes a number with its unit or a name. On the page of a lesson a paragraph is filled in for
+each engine. It stands there once for all engines of which it says the same, under their names if
+not for all. The pages of reports have more rules: see `report/template.py`.
 """
 
 from __future__ import annotations
@@ -37,7 +39,7 @@ def page(
     blocks: Mapping[str, Block | Sequence[Block]],
     prose: bool = True,
 ) -> Page:
-    """Fill in a template.
+    """The page of a lesson.
 
     Args:
         name: Of the template.
@@ -46,7 +48,7 @@ def page(
         blocks: What stands alone, by name.
         prose: Whether to keep texts and questions, which are about the arm.
     """
-    template = resources.files(__package__ or "").joinpath(f"{name}.md").read_text("utf-8")
+    template = text_of(__package__ or "", name)
     alone = {key: f"{{{key}}}" for key in blocks}
     texts = {
         engine: filled(template, dict.fromkeys(ENGINES, False) | {engine: True} | values | alone)
@@ -62,18 +64,20 @@ def page(
             prefix = f"{', '.join(names)}: " if len(names) < len(texts) else ""
             if text.startswith("# "):
                 title = text.removeprefix("# ")
-            elif text[1:-1] in blocks:
-                block = blocks[text[1:-1]]
-                page_blocks += block if isinstance(block, Sequence) else [block]
             elif not text.startswith("? ") or next(iter(texts)) in names:
-                page_blocks.append(own_block(text, prefix, always="{printed}" not in template))
+                page_blocks += blocks_of(text, blocks, prefix, always="{printed}" not in template)
     if not prose:
-        page_blocks = [each for each in page_blocks if not isinstance(each, (Text, Question))]
+        page_blocks = [block for block in page_blocks if not isinstance(block, (Text, Question))]
     return Page(title, origin(results), page_blocks)
 
 
+def text_of(package: str, name: str) -> str:
+    """A template that stands in a package."""
+    return resources.files(package).joinpath(f"{name}.md").read_text("utf-8")
+
+
 def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
-    """The paragraphs of a template for one engine, by their number, each on one line."""
+    """The paragraphs of a template that have a line under what holds, by number, a line each."""
     conditions: list[bool] = []
     paragraphs: dict[int, str] = {}
     number = 0
@@ -94,24 +98,35 @@ def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
     return paragraphs
 
 
-def own_block(text: str, prefix: str, always: bool) -> Block:
-    """The block that a paragraph is.
+def blocks_of(
+    text: str,
+    blocks: Mapping[str, Block | Sequence[Block]],
+    prefix: str = "",
+    always: bool = True,
+) -> Sequence[Block]:
+    """The block that a paragraph is, or those that it stands for.
 
     Args:
         text: The paragraph, its slots filled.
+        blocks: What stands alone, by name.
         prefix: Whose it is.
         always: Whether a question is shown even where nobody can answer.
     """
-    marked = _MARKED.fullmatch(text)
+    if text[1:-1] in blocks:
+        block = blocks[text[1:-1]]
+        return block if isinstance(block, Sequence) else [block]
     if text.startswith("## "):
-        return Heading(text.removeprefix("## "))
+        return [Heading(text.removeprefix("## "))]
+    marked = _MARKED.fullmatch(text)
     if marked is None:
-        return Text(prefix + text)
+        note = text.removeprefix("<small>").removesuffix("</small>").strip()
+        return [Text(prefix + note, small=note != text)]
     sign, value, said = marked.groups()
     if sign == "✓":
-        return Verdict(prefix + said, value == "True")
+        return [Verdict(prefix + said, value == "True")]
     asked, *choices, because = (part.strip() for part in _PARTS.split(said))
-    return Question(asked, choices, None if value == "None" else int(value), because, always)
+    right = None if value == "None" else int(value)
+    return [Question(asked, choices, right, because, always)]
 
 
 def origin(results: Mapping[str, Any]) -> str:

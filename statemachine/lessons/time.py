@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
-from ..interface import Data, Model
+from ..interface import Data, Model, step
 from ..measures.text import count, duration
 from ..runs.drive import Progress, steps_in
 from ..runs.provenance import provenance
@@ -113,26 +113,28 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
     """Watch the loop that is typed, and the other of the two on another Data."""
     model, total = play.model, _steps(play.model, options)
     also = (_free if options["realtime"] else _paced)(total, "sm.load()")
-    moments: list[tuple[float, float, bytes]] = []  # clock, data.time, qpos; after each line
     waits: list[tuple[float, float]] = []  # of each step: its waiting, and how late it was then
 
-    def after_line(_source: str, names: Mapping[str, Any]) -> None:
-        if "data" in names:
-            data: Data = names["data"]
-            moments.append((time.perf_counter(), data.time, data.qpos.tobytes()))
-
-    def waited(data: Data) -> None:
+    def note(data: Data) -> None:
         if "ahead" in paced.names:
             late = time.perf_counter() - paced.names["began"] - data.time
             waits.append((max(0.0, paced.names["ahead"]), late))
             progress(len(waits) / total)
 
+    def each_step(model: Model, data: Data) -> None:
+        note(data)
+        step(model, data)
+
     with CodeRun(also, model) as second:
         free, paced = (second, play) if options["realtime"] else (play, second)
-        free(line=after_line)
-        paced(before=lambda _model, data: waited(data))
+        moments = [  # clock, data.time and qpos after each line
+            (time.perf_counter(), free.worlds[0][1].time, free.worlds[0][1].qpos.tobytes())
+            for _ in free.lines()
+            if free.worlds
+        ]
+        paced(each_step)
         (_, data), (_, other) = free.worlds[0], paced.worlds[0]
-        waited(other)  # after the last step
+        note(other)  # after the last step
         began, stepped, printed, slept, _ = moments
         return Pace(
             nstep=total,

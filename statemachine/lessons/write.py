@@ -90,15 +90,11 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
     model, joint = play.model, options["joint"]
     at = coordinate(model, joint)
     place, dof = at.place, at.dof
-    looks: list[dict[str, bytes]] = []  # after the copy, the write and the print
-
-    def look(_source: str, names: Mapping[str, Any]) -> None:
-        if "copy" in names:
-            looks.append(read_derived(names["data"]))
-
-    names = play(line=look)
-    data, copy = names["data"], names["copy"]
+    looks = [  # after the copy, the write and the print
+        read_derived(play.names["data"]) for _ in play.lines() if "copy" in play.names
+    ]
     before, after, *_ = looks
+    data, copy = play.names["data"], play.names["copy"]
     view, in_engine = float(data.qpos[place]), _in_engine(data, place)
     step(model, data)
     contacts = len(data.contacts)

@@ -4,7 +4,6 @@ The grammar is that of a lesson's template (`lessons/template.py`): Markdown wit
 whose paragraphs become the blocks of a page. In a report
 
     *{engines}, {seconds:g} s*        below the title: what it was computed with
-    <small>Left: the gap.</small>     a note to what stands above it
     It is {width} wide.               a line with a slot that has no value, None, is left out, and
                                       so is a paragraph whose lines all are
 
@@ -14,12 +13,11 @@ A slot whose value is "" stands for a condition; see `if_true`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from string import Formatter
 from typing import Any
 
-from ..lessons.template import filled, own_block
-from ..page import Block, Headline, Page, Text
+from ..lessons.template import blocks_of, filled, text_of
+from ..page import Block, Headline, Page
 
 
 def page(name: str, headline: Headline | None = None, /, **slots: Any) -> Page:
@@ -31,18 +29,31 @@ def page(name: str, headline: Headline | None = None, /, **slots: Any) -> Page:
         **slots: Texts and numbers; None for no value. One whose value is a list of blocks stands
             in a paragraph of its own.
     """
-    title, origin, *rest = _paragraphs(name, slots)
+    title, origin, *rest = texts(name, **slots)
     return Page(title.removeprefix("# "), origin.strip("*"), _blocks(rest, slots), headline)
 
 
 def blocks(name: str, /, **slots: Any) -> list[Block]:
     """The blocks of a template that has neither a title nor an origin; arguments as of `page`."""
-    return _blocks(_paragraphs(name, slots), slots)
+    return _blocks(texts(name, **slots), slots)
 
 
 def texts(name: str, /, **slots: Any) -> list[str]:
-    """The paragraphs of a template that stand alone, as notes do; arguments as of `page`."""
-    return _paragraphs(name, slots)
+    """The paragraphs of a template that have all they need; arguments as of `page`.
+
+    One of blocks is its slot, in braces.
+    """
+    alone = {key: f"{{{key}}}" for key, value in slots.items() if isinstance(value, list)}
+    lines = [
+        line
+        for line in text_of(__package__ or "", name).splitlines()
+        if all(slots[slot] is not None for _, slot, *_ in Formatter().parse(line) if slot)
+    ]
+    return list(filled("\n".join(lines), slots | alone).values())
+
+
+def _blocks(paragraphs: Sequence[str], slots: Mapping[str, Any]) -> list[Block]:
+    return [block for text in paragraphs for block in blocks_of(text, slots)]
 
 
 def if_true(holds: object) -> str | None:
@@ -53,28 +64,3 @@ def if_true(holds: object) -> str | None:
 def versions_of(versions: Mapping[str, str]) -> str:
     """Engines and packages with their versions, in a row."""
     return ", ".join(f"{name} {version}".strip() for name, version in versions.items())
-
-
-def _paragraphs(name: str, slots: dict[str, Any]) -> list[str]:
-    """The paragraphs that have all they need; one of blocks as its slot, in braces."""
-    alone = {key: f"{{{key}}}" for key, value in slots.items() if isinstance(value, list)}
-    template = resources.files(__package__ or "").joinpath(f"{name}.md").read_text("utf-8")
-    lines = [
-        line
-        for line in template.splitlines()
-        if all(slots[slot] is not None for _, slot, *_ in Formatter().parse(line) if slot)
-    ]
-    return list(filled("\n".join(lines), slots | alone).values())
-
-
-def _blocks(paragraphs: Sequence[str], slots: dict[str, Any]) -> list[Block]:
-    shown: list[Block] = []
-    for text in paragraphs:
-        note = text.removeprefix("<small>").removesuffix("</small>").strip()
-        if text[1:-1] in slots:
-            shown += slots[text[1:-1]]
-        elif note != text:
-            shown.append(Text(note, small=True))
-        else:
-            shown.append(own_block(text, "", always=True))
-    return shown
