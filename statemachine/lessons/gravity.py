@@ -14,8 +14,7 @@ from ..engines import room
 from ..engines.records import LeftAlone
 from ..errors import DivergedError, UnsupportedError
 from ..interface import Model, make_data, reset
-from ..measures import largest
-from ..measures.text import NONE, apart, position, short_time, signed
+from ..measures.text import NONE, apart, position, signed
 from ..page import Table, Traces
 from ..runs.commands import start_keyframe
 from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
@@ -25,7 +24,7 @@ from ..runs.scenarios import SCENARIOS
 from ._falling import BALANCE, PARTS, Droop, droop, milestones
 from ._robot import carried_by_joint, check_servos, coordinate, start_line, with_joint
 from .session import CodeRun, LessonResult, stepping_loop
-from .template import differences, emulated, where
+from .template import differences, emulated, largest_gap, where
 
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
 # The first that is paid is taken; each is a row of the longer ones.
@@ -325,19 +324,12 @@ def _alone(name: str, result: Gravity) -> Table:
 def _apart(runs: str, touched: bool | None, left: Gravity, right: Gravity) -> str:
     """The largest distance between two runs, before or after the first touch of either."""
     pair: list[Droop] = [getattr(result, runs) for result in (left, right)]
-    common = min(len(run.path) for run in pair)
-    gaps = np.abs(pair[0].path[:common] - pair[1].path[:common])
-    timestep = left.provenance.timestep
+    steps, timestep = len(pair[0].path), left.provenance.timestep
     touches = [time for run in pair for time in run.touches.values()]
-    first = round(min(touches) / timestep) if touches else common
-    start = first if touched else 0
-    gaps = gaps[start : first + 1 if touched is False else None]
-    if not gaps.size:
-        return "nothing touched"
-    size, row = largest(gaps)
-    text = apart(size, left.slide)
-    at = f" at {short_time((start + row) * timestep)}"
-    return text if text.startswith("below") else f"{text}{at}"
+    first = round(min(touches) / timestep) if touches else steps
+    rows = {None: slice(None), False: slice(first + 1), True: slice(first, None)}[touched]
+    paths = [run.path[rows, None] for run in pair]
+    return largest_gap(*paths, [left.slide], [""], (np.arange(steps) * timestep)[rows])
 
 
 def _ends_apart(label: str, left: Gravity, right: Gravity) -> str:

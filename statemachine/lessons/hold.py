@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import DivergedError, UnsupportedError
 from ..interface import Array, Data, Ints, JointType, Model, forward, make_data, reset, step
 from ..measures import largest, together
-from ..measures.text import apart, position, short_time
+from ..measures.text import position, short_time
 from ..page import Table, Traces
 from ..runs.commands import hold_ctrl, is_servo, start_keyframe
 from ..runs.drive import Progress, steps_in
@@ -19,7 +19,7 @@ from ..runs.provenance import provenance
 from ..runs.robot import command, touching, trees_of_actuators
 from ._robot import check_servos, start_line
 from .session import CodeRun, LessonResult, stepping_loop
-from .template import differences, where
+from .template import differences, largest_gap, where
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
@@ -196,9 +196,9 @@ def tables(results: Mapping[str, Hold]) -> dict[str, Any]:
         "differences": differences(
             results,
             {
-                "any joint, until one touches": lambda a, b: _apart(a, b, 0, _touch(a, b)),
-                "any joint, after that": lambda a, b: _apart(a, b, _touch(a, b), None),
-                "any joint, at the end": lambda a, b: _apart(a, b, -1, None),
+                "any joint, until one touches": lambda a, b: _apart(a, b, slice(_touch(a, b))),
+                "any joint, after that": lambda a, b: _apart(a, b, slice(_touch(a, b), None)),
+                "any joint, at the end": lambda a, b: _apart(a, b, slice(-1, None)),
                 "at the end, contacts left out": _apart_freely,
             },
         ),
@@ -233,22 +233,13 @@ def _touch(left: Hold, right: Hold) -> int:
     return round(min(times) / left.provenance.timestep) + 1 if times else len(left.time)
 
 
-def _apart(left: Hold, right: Hold, start: int, stop: int | None) -> str:
-    """The largest gap of a joint in some rows of two runs, whose it is, and when."""
-    gaps = np.abs(left.qpos - right.qpos)[start:stop]
-    if not gaps.size:
-        return "nothing touched"
-    size, place = largest(gaps.ravel())
-    row, joint = divmod(place, gaps.shape[1])
-    time = short_time(left.time[start:stop][row])
-    return _gap(left, size, joint, f" at {time}")
+def _apart(left: Hold, right: Hold, rows: slice) -> str:
+    """The largest gap of a joint in some rows of two runs."""
+    paths = left.qpos[rows], right.qpos[rows]
+    return largest_gap(*paths, left.slides, left.joints, left.time[rows])
 
 
 def _apart_freely(left: Hold, right: Hold) -> str:
-    ends = [r.qpos[-1] if r.without_contacts is None else r.without_contacts for r in (left, right)]
-    return _gap(left, *largest(np.abs(ends[0] - ends[1])))
-
-
-def _gap(result: Hold, size: float, joint: int, at: str = "") -> str:
-    text = apart(size, result.slides[joint])
-    return text if text.startswith("below") else f"{text}  {result.joints[joint]}{at}"
+    """That of the ends without contacts."""
+    free = [r.qpos[-1] if r.without_contacts is None else r.without_contacts for r in (left, right)]
+    return largest_gap(free[0][None], free[1][None], left.slides, left.joints, np.array([]))

@@ -69,7 +69,7 @@ class CodeRun(ExitStack):
         """What the code printed."""
         return self._out.getvalue()
 
-    def lines(self, each_step: Callable[[Model, Data], object] = step) -> Iterator[str]:
+    def lines(self, each_step: Callable[[Model, Data], object] | None = None) -> Iterator[str]:
         """Run the code; yields each statement after it was run.
 
         Args:
@@ -87,7 +87,7 @@ class CodeRun(ExitStack):
 
         def watched(model: Model, data: Data, nstep: int = 1) -> None:
             for _ in range(nstep):
-                each_step(model, data)
+                (each_step or step)(model, data)
 
         # The package as the code imports it: its Model is given, its steps are looked at.
         facade = ModuleType(statemachine.__name__)
@@ -95,7 +95,7 @@ class CodeRun(ExitStack):
             vars(statemachine),
             load=lambda *_args, **_options: self.model,
             make_data=make,
-            step=step if each_step is step else watched,
+            step=watched if each_step else step,
         )
 
         def imported(name: str, *args: Any, **kwargs: Any) -> Any:
@@ -110,7 +110,9 @@ class CodeRun(ExitStack):
                 run(self.names)
             yield source
 
-    def __call__(self, each_step: Callable[[Model, Data], object] = step) -> Mapping[str, Any]:
+    def __call__(
+        self, each_step: Callable[[Model, Data], object] | None = None
+    ) -> Mapping[str, Any]:
         """Run the code as `lines` does; its variables."""
         for _ in self.lines(each_step):
             pass

@@ -23,8 +23,12 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from typing import Any
 
+import numpy as np
+
 from ..installed import ENGINES
-from ..measures.text import milliseconds
+from ..interface import Array
+from ..measures import largest
+from ..measures.text import apart, milliseconds, short_time
 from ..page import Block, Heading, Page, Question, Table, Text, Verdict
 
 _CONDITION = re.compile(r"<!-- (?:if (?P<no>not )?(?P<name>\w+)|(?P<other>else)|end) -->")
@@ -177,6 +181,30 @@ def differences(
             title="Where they differ, and by how much",
         )
     ]
+
+
+def largest_gap(
+    left: Array, right: Array, slides: Sequence[bool], names: Sequence[str], time: Array
+) -> str:
+    """Where two runs are farthest apart: by how much, in which joint, and when.
+
+    Args:
+        left: (n, k) k joints at n moments [rad; of a slide, m].
+        right: The same of the other.
+        slides: Which of the joints are slides.
+        names: What to call them, "" where that needs not be told.
+        time: (n,) of the moments [s]; (0,) where it needs not be told.
+    """
+    gaps = np.abs(left - right)
+    if not gaps.size:
+        return "nothing touched"
+    size, place = largest(gaps.ravel())
+    row, joint = divmod(place, gaps.shape[1])
+    text = apart(size, slides[joint])
+    if text.startswith("below"):
+        return text
+    name = f"  {names[joint]}" if names[joint] else ""
+    return f"{text}{name} at {short_time(time[row])}" if len(time) else f"{text}{name}"
 
 
 def emulated(result: Any, *promises: str) -> str:
