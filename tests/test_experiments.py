@@ -16,8 +16,8 @@ import statemachine as sm
 from statemachine.errors import BadInputError, ModelError
 from statemachine.lessons import fingertip, in_turns, session
 from statemachine.lessons._falling import milestones, summed
-from statemachine.lessons._frames import random_qpos
 from statemachine.lessons.certificate import page
+from statemachine.lessons.fingertip import random_qpos
 from statemachine.lessons.speed import Speed
 from statemachine.models import models_dir
 from statemachine.page import Verdict

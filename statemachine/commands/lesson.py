@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
-from ..lessons import BESIDE, LESSONS, PATH
-from ..lessons.records import Lesson
+from ..lessons import BESIDE, LESSONS, PATH, Lesson
 from ._common import (
     BACKEND,
     MISSING,
@@ -238,7 +237,7 @@ def _compute(
     from ..lessons.session import page_of_lesson, take
 
     if options.json:
-        values |= lesson.whole
+        values |= {option.key: True for option in lesson.options if option.more}
     taken = on_each_backend(
         options,
         lesson.name,

@@ -210,6 +210,7 @@ class ExerciseJudge(ExitStack):
                 self._key = {n: (w, [*map(judge_of(n).right, w)]) for n, w in worlds.items()}
 
     def _judgement(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
+        """The verdict on a function; what somebody should look at, last."""
         if recording.refusal:
             kind, text = recording.refusal
             raise getattr(errors, kind, EngineError)(text)
@@ -220,35 +221,38 @@ class ExerciseJudge(ExitStack):
                 "own? Put it into this file"
             )
             return Judgement(name, True, False, (text,), judged=False)
+        judgement = None
+        if recording.forbidden:
+            judgement = Judgement(name, True, False, tuple(recording.forbidden))
+        else:
+            try:
+                judgement = judged(name, *self._key[name], recording.answers)
+            except Exception as error:  # what was recorded may have been made up
+                recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        judgement = judgement or _without_answers(copy, name, recording)
         looks = tuple(f"{LOOK}: it reads {other}" for other in others)
-        judgement = self._verdict(copy, name, recording)
         return replace(judgement, remarks=judgement.remarks + looks)
 
-    def _verdict(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
-        if recording.forbidden:
-            return Judgement(name, True, False, tuple(recording.forbidden))
-        try:
-            if judgement := judged(name, *self._key[name], recording.answers):
-                return judgement
-        except Exception as error:  # what was recorded may have been made up
-            recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        outcome = recording.outcome
-        if recording.broken:
-            text = f"what its process recorded is no record of a run ({recording.broken})"
-        elif not recording.began:
-            text = (
-                f"nothing could be judged: the judge itself {outcome.how}, twice. Your code was "
-                "not run: this machine may be busy, or out of memory; try again"
-            )
-        else:
-            # The innermost line of the student's file comes first in what is noted last.
-            last = recording.trace.rpartition("Timeout (")[2]
-            lines = re.findall(rf'File "{re.escape(str(copy.path))}", line (\d+)', last)
-            where = f"line {lines[0]}: " if lines else ""
-            what = "nothing could be judged: " if outcome.end == "clock" else ""
-            text = f"{where}{what}it {outcome.how}{_HINTS.get(outcome.end, '')}"
-        known = recording.broken or (recording.began and outcome.end != "clock")
-        return Judgement(name, True, False, (text,), judged=bool(known))
+
+def _without_answers(copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
+    """The verdict where there are fewer answers than worlds, by how the process ended."""
+    outcome = recording.outcome
+    known = recording.broken or (recording.began and outcome.end != "clock")
+    if recording.broken:
+        text = f"what its process recorded is no record of a run ({recording.broken})"
+    elif not recording.began:
+        text = (
+            f"nothing could be judged: the judge itself {outcome.how}, twice. Your code was "
+            "not run: this machine may be busy, or out of memory; try again"
+        )
+    else:
+        # The innermost line of the student's file comes first in what is noted last.
+        last = recording.trace.rpartition("Timeout (")[2]
+        lines = re.findall(rf'File "{re.escape(str(copy.path))}", line (\d+)', last)
+        where = f"line {lines[0]}: " if lines else ""
+        what = "" if known else "nothing could be judged: "
+        text = f"{where}{what}it {outcome.how}{_HINTS.get(outcome.end, '')}"
+    return Judgement(name, True, False, (text,), judged=bool(known))
 
 
 def _python_file(path: Path) -> Path:

@@ -13,9 +13,42 @@ open. Terminal, documentation and notebook show the same page.
 from __future__ import annotations
 
 import importlib
+from dataclasses import dataclass
 from typing import Any
 
-from .records import Lesson, Option
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a lesson: a flag of the command line, a key of `options`.
+
+    Attributes:
+        more: Whether it shows more of the lesson; JSON and documentation show all.
+    """
+
+    flag: str
+    default: Any
+    help: str
+    kind: type = str
+    choices: tuple[str, ...] | None = None
+    many: bool = False
+    more: bool = False
+
+    @property
+    def key(self) -> str:
+        """Its key in `options`."""
+        return self.flag.removeprefix("--").replace("-", "_")
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """An entry of the table of lessons; `on_path`: whether the guided path has it."""
+
+    name: str
+    question: str
+    model: str
+    options: tuple[Option, ...] = ()
+    on_path: bool = True
+
 
 # What depends on the robot has no default here: `fit` of the lesson's module gives it one.
 _JOINT = Option("--joint", None, "joint to write (default shoulder_lift, if there is one)")

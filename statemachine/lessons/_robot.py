@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import BadInputError
+from ..errors import BadInputError, check_name
 from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
+from ..kinematics import Kind
 from ..measures.readings import readings
 from ..runs.commands import is_servo, load_at_start, start_keyframe
 from ..runs.robot import carried_by, scalar_joint
+from ..witness import labels
 
 USUAL = "shoulder_lift"  # the arm's joint that lessons are about
 _VALUE = 0.8  # rad
@@ -100,40 +102,62 @@ def usual_value(model: Model, joint: str) -> float:
     return float(f"{start + shift:.3g}")
 
 
-@dataclass(frozen=True)
-class ReadPlace:
-    """The place on a robot that a lesson reads: a site, or a body where it has no sites.
+class Tip(NamedTuple):
+    """A place on a robot that is read: a site or a body.
 
     Attributes:
-        name: Its name.
-        array: Where its position is in a Data.
-        number: Its row there.
+        name: Its name, or "body 7" where it has none.
+        kind: "site" or "body".
+        number: Its id on the engine.
+        body: Id of the body that it is, or that carries it.
+        named: Whether the file names it.
     """
 
     name: str
-    array: str
+    kind: Kind
     number: int
+    body: int
+    named: bool
 
     @property
-    def typed(self) -> str:
-        """How its number is typed."""
-        kind = "site" if self.array == "site_xpos" else "body"
-        return f"model.{kind}_id({self.name!r})"
+    def array(self) -> str:
+        """Where its position is in a Data."""
+        return "site_xpos" if self.kind == "site" else "xpos"
 
     def read(self, data: Data) -> Array:
         """Where it is (3,) [m], by what was last computed."""
         return np.array(getattr(data, self.array)[self.number])
 
 
-def tip_of(model: Model, name: str) -> ReadPlace:
-    """A site by name, else a body of that name.
+def tips_of(model: Model, name: str | None) -> list[Tip]:
+    """The places of a robot that are asked for.
+
+    Args:
+        model: The robot.
+        name: A site, or a body; without one, the site gripperframe where there is one, else
+            every body that joints move and that carries no other.
 
     Raises:
-        UnknownNameError: There is neither.
+        UnknownNameError: There is no such site or body.
+        BadInputError: No name is given, and nothing moves.
     """
-    if name not in model.site_names and name in model.body_names:
-        return ReadPlace(name, "xpos", model.body_id(name))
-    return ReadPlace(name, "site_xpos", model.site_id(name))
+    sites = labels("site", model.site_names)
+    bodies = labels("body", model.body_names)
+    wanted = FINGERTIP if name is None and FINGERTIP in sites else name
+    if wanted is None:
+        parents = set(model.body_parentid.tolist())
+        moved = carried_by(model, model.jnt_bodyid.tolist())
+        leaves = [body for body in sorted(moved) if body not in parents]
+        if not leaves:
+            raise BadInputError(f"nothing in {model.path.name} is moved by a joint: name a --site")
+        return [Tip(bodies[k], "body", k, k, bool(model.body_names[k])) for k in leaves]
+    if wanted in sites:
+        site = sites.index(wanted)
+        named = bool(model.site_names[site])
+        return [Tip(wanted, "site", site, int(model.site_bodyid[site]), named)]
+    check_name("site or body", wanted, [*sites, *bodies])
+    body = bodies.index(wanted)
+    return [Tip(wanted, "body", body, body, bool(model.body_names[body]))]
 
 
 def usual_tip(model: Model, joint: str) -> str:

@@ -15,7 +15,7 @@ from ..page import Pipeline, Table, Traces
 from ..probes import conventions
 from ..runs.commands import hold_ctrl
 from ..runs.drive import Progress
-from ._robot import ReadPlace, read_derived, read_stored
+from ._robot import Tip, read_derived, read_stored
 
 _STORED = (*INPUTS, "time")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
@@ -113,7 +113,7 @@ def changes_by_call(model: Model, place: int, value: float) -> tuple[ArrayChange
     )
 
 
-def lag_of_steps(model: Model, tip: ReadPlace, steps: int, progress: Progress) -> Lag:
+def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Lag:
     """Compare what each step of a command leaves with a forward before it and one after it."""
     times: list[float] = []
     distances: list[float] = []

@@ -11,13 +11,12 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import BadInputError, ModelError, UnknownNameError
 from ..installed import WITNESS
-from ..interface import Array, Model, forward, make_data
+from ..interface import Array, JointType, Model, forward, make_data
 from ..interface.checks import as_count
 from ..kinematics import Kind, Kinematics, shared_joints
 from ..rotations import Placement, angle_between, matrix_from_quat
@@ -25,9 +24,10 @@ from ..runs.drive import Progress, silent
 from ..runs.provenance import Provenance, provenance
 from ..runs.robot import carried_by
 from ..witness import labels
-from ._frames import Tip, random_qpos, slots, tips_of
+from ._robot import Tip, tips_of
 
 _MOST = 1_000_000
+_WIDE = 100.0  # a range beyond this [m or rad] is no limit
 _TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
 _SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
 
@@ -156,36 +156,35 @@ def certify(
     tips = tips_of(model, site)
     if witness_frame is not None and len(tips) > 1:
         raise BadInputError("--witness-frame names one frame: say which with --site")
-    asked, reason = _asked(model, tips, witness, witness_frame)
-    configurations = random_qpos(model, asked.joints, wanted, seed)
-    ours = _engine_poses(model, configurations, asked.tips, progress)
-    theirs = configurations[:, slots(model, asked.joints)]
+    known, asked, reason = _asked(model, tips, witness, witness_frame)
+    joints = shared_joints(known, model.joint_names)
+    configurations = random_qpos(model, joints, wanted, seed)
+    ours = _engine_poses(model, configurations, asked, progress)
+    theirs = configurations[:, slots(model, joints)]
     gaps = [
-        _gap(model, tip, asked.kinematics, frame, Placement(ours.pos[:, k], ours.mat[:, k]), theirs)
-        for k, (tip, frame) in enumerate(zip(asked.tips, asked.frames, strict=True))
+        _gap(
+            model,
+            tip,
+            known,
+            witness_frame or tip.name,
+            Placement(ours.pos[:, k], ours.mat[:, k]),
+            theirs,
+        )
+        for k, tip in enumerate(asked)
     ]
     gaps.sort(key=lambda gap: -gap.worst)
     return Certificate(
         **vars(gaps[0]),
-        witness_file="/".join(asked.kinematics.path.parts[-2:]),
+        witness_file="/".join(known.path.parts[-2:]),
         poses=len(configurations),
         tolerance=_TOLERANCE,
-        provenance=provenance(model, seed, **{WITNESS: asked.kinematics.version}),
-        grade=asked.kinematics.grade,
+        provenance=provenance(model, seed, **{WITNESS: known.version}),
+        grade=known.grade,
         reason=reason,
-        prepared=asked.kinematics.prepared,
+        prepared=known.prepared,
         tips=tuple(gaps),
-        left_out=tuple(tip.name for tip in tips if tip not in asked.tips),
+        left_out=tuple(tip.name for tip in tips if tip not in asked),
     )
-
-
-class _Asked(NamedTuple):
-    """A witness, the engine's joints that it has, and the tips with their frames there."""
-
-    kinematics: Kinematics
-    joints: list[int]
-    tips: list[Tip]
-    frames: list[tuple[str, Kind]]
 
 
 def _asked(
@@ -193,25 +192,27 @@ def _asked(
     tips: list[Tip],
     witness: str | os.PathLike[str] | None,
     witness_frame: str | None,
-) -> tuple[_Asked, str]:
-    """The witness to ask, and why it is one that has not read the file itself."""
+) -> tuple[Kinematics, list[Tip], str]:
+    """The witness to ask, what it is asked for, and why it has not read the file itself."""
     if witness is not None:
         known = Kinematics(witness)
         if len(tips) > 1:  # another file need not have all of them
             known_bodies = set(known.body_names)
             tips = [tip for tip in tips if tip.name in known_bodies and tip.named] or tips
-        return _matched(model, tips, known, witness_frame), ""
+        return _matched(model, tips, known, witness_frame), tips, ""
     try:
-        return _matched(model, tips, Kinematics(model.path), witness_frame), ""
+        return _matched(model, tips, Kinematics(model.path), witness_frame), tips, ""
     except (ModelError, BadInputError, UnknownNameError) as error:
         if witness_frame is not None or model.compiled is None:
             raise
         reason = str(error)
-    return _matched(model, tips, Kinematics.same_reading(model), None), reason
+    return _matched(model, tips, Kinematics.same_reading(model), None), tips, reason
 
 
-def _matched(model: Model, tips: list[Tip], known: Kinematics, witness_frame: str | None) -> _Asked:
-    """The tips and the joints of the engine, found in what the witness has read."""
+def _matched(
+    model: Model, tips: list[Tip], known: Kinematics, witness_frame: str | None
+) -> Kinematics:
+    """A witness with its joints in the model's order; raises if it lacks what a tip needs."""
     joints = shared_joints(known, model.joint_names)
     bodies_agree = known.body_names == tuple(labels("body", model.body_names))
     for tip in tips:
@@ -223,33 +224,28 @@ def _matched(model: Model, tips: list[Tip], known: Kinematics, witness_frame: st
                 )
         if not (tip.named or bodies_agree or witness_frame):
             raise BadInputError(f"{tip.name} has no name to find it by in {known.path.name}")
+        _frame(known, witness_frame or tip.name, tip.kind)
     names = [model.joint_names[joint] for joint in joints]
-    if tuple(names) != known.joint_names:
-        known = Kinematics(known.path, joint_names=names)
-    return _Asked(
-        known, joints, tips, [_frame(known, witness_frame or t.name, t.kind) for t in tips]
-    )
+    return known if tuple(names) == known.joint_names else Kinematics(known.path, joint_names=names)
 
 
-def _frame(kinematics: Kinematics, name: str, kind: Kind) -> tuple[str, Kind]:
-    """A site of an MJCF, or a body: of a URDF, a link."""
-    if kind == "site" and name in kinematics.site_names:
-        return name, "site"
-    if name in kinematics.body_names:
-        return name, "body"
-    kinematics.definition(name, "site")  # there, or no such name
-    return name, "site"
+def _frame(kinematics: Kinematics, name: str, kind: Kind) -> Kind:
+    """What a name is to the witness: a site of an MJCF, or a body; of a URDF, a link."""
+    if name in kinematics.body_names and not (kind == "site" and name in kinematics.site_names):
+        return "body"
+    kinematics.definition(name, "site")  # raises if there is none
+    return "site"
 
 
 def _gap(
     model: Model,
     tip: Tip,
     kinematics: Kinematics,
-    frame: tuple[str, Kind],
+    name: str,
     ours: Placement,
     qpos: Array,
 ) -> TipGap:
-    name, kind = frame
+    kind = _frame(kinematics, name, tip.kind)
     theirs = kinematics.poses(qpos, name, kind)
     offset = _declared_offset(model, tip, kinematics, name, kind) or _steady_offset(ours, theirs)
     moved = np.linalg.norm(ours.pos - theirs.pos, axis=1)
@@ -321,3 +317,38 @@ def _steady_offset(ours: Placement, theirs: Placement) -> Offset | None:
     if spread > _SAME_FRAME:
         return None
     return Offset(float(np.linalg.norm(shift[0])), float(angle_between(np.eye(3), turn[0])))
+
+
+def random_qpos(model: Model, joints: Sequence[int], count: int, seed: int) -> Array:
+    """(count, nq): the default pose, then uniform within limits; without, ±π rad and ±1 m.
+
+    Args:
+        model: The robot.
+        joints: Ids of those that move; the others stay where they are.
+        count: How many.
+        seed: Of the random poses.
+    """
+    random = np.random.default_rng(seed)
+    with make_data(model) as data:
+        drawn = np.tile(data.qpos, (count, 1))
+    for joint in joints:
+        place, kind = int(model.jnt_qposadr[joint]), JointType(int(model.jnt_type[joint]))
+        entries = drawn[1:, place : place + kind.nq]
+        if kind in (JointType.HINGE, JointType.SLIDE):
+            low, high = model.jnt_range[joint]
+            if not model.jnt_limited[joint] or high - low > _WIDE:
+                high = np.pi if kind == JointType.HINGE else 1.0
+                low = -high
+            entries[:] = random.uniform(low, high, entries.shape)
+            continue
+        if kind == JointType.FREE:
+            entries[:, :3] = random.uniform(-1, 1, (count - 1, 3))
+        quat = random.normal(size=(count - 1, 4))
+        entries[:, -4:] = quat / np.linalg.norm(quat, axis=1, keepdims=True)
+    return drawn
+
+
+def slots(model: Model, joints: Sequence[int]) -> list[int]:
+    """Slots of qpos that belong to these joints, in their order."""
+    starts, kinds = model.jnt_qposadr.tolist(), model.jnt_type.tolist()
+    return [starts[j] + k for j in joints for k in range(JointType(kinds[j]).nq)]

@@ -18,7 +18,7 @@ from ..measures.text import count, millimetres, short_time, vector
 from ..page import Table
 from ..runs.drive import Progress, steps_in
 from ..runs.provenance import provenance
-from ._robot import coordinate, tip_of, usual_tip, with_joint
+from ._robot import coordinate, tips_of, usual_tip, with_joint
 from ._stages import (
     ArrayChanges,
     Lag,
@@ -50,14 +50,14 @@ def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The four readings."""
     slot = coordinate(model, options["joint"]).slot  # or says what is wrong with it
-    tip = tip_of(model, options["site"])
+    tip = tips_of(model, options["site"])[0]
     read = f"data.{tip.array}[tip]"
     value = as_scalar(options["value"], "value")
     return f"""\
 import statemachine as sm
 
 model = {load}
-tip = {tip.typed}
+tip = model.{tip.kind}_id({tip.name!r})
 slot = {slot}
 data = sm.make_data(model)
 print(1, {read}.round(4))
@@ -110,7 +110,7 @@ class Forward(LessonResult):
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forward:
     """Read the fingertip at each print; then what else was asked for."""
     model, joint, value = play.model, options["joint"], options["value"]
-    place, tip = coordinate(model, joint).place, tip_of(model, options["site"])
+    place, tip = coordinate(model, joint).place, tips_of(model, options["site"])[0]
     steps = _steps(model, options)
     read = [
         (tip.read(play.names["data"]), play.names["data"].time)

@@ -20,8 +20,7 @@ from ..measures.text import count, degrees, millimetres
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import provenance
 from ..runs.robot import body_pairs, command, is_the_arm
-from ._restore import of_its_own, through_us, ways_back
-from ._two_runs import BREAKS, Broken, broken_table, growth
+from ._two_runs import BREAKS, Broken, broken_table, growth, of_its_own, through_us, ways_back
 from .session import CodeRun, Course, LessonResult
 from .template import by_engine, differences
 

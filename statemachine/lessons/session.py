@@ -22,8 +22,7 @@ from ..probes.calls import CallRecording, record, recorded_engines, statements
 from ..runs.drive import Progress, silent, steps_in
 from ..runs.provenance import Provenance
 from ..runs.robot import is_the_arm
-from . import module, template
-from .records import Lesson
+from . import Lesson, module, template
 
 
 @dataclass(frozen=True, eq=False)

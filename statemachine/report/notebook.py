@@ -14,9 +14,8 @@ from typing import Any
 from ..backends import load
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
-from ..lessons import LESSONS, module
+from ..lessons import LESSONS, Lesson, module
 from ..lessons.pictures import with_picture
-from ..lessons.records import Lesson
 from ..lessons.session import fitted, page_of_lesson, take
 from ..page import LETTERS, Code, Page, Printed, Question, Text
 from .markdown import answer, asked, block_as_markdown

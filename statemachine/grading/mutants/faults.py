@@ -21,6 +21,7 @@ from ...errors import MissingEngineError
 from ...installed import require
 from ...interface import INPUTS, Array, Data, JointType, read_only
 from ...rotations import matrix_from_quat, xyzw_from_wxyz
+from . import MUTANTS
 
 Patcher = Any  # what has setattr(target, name, value), as pytest's MonkeyPatch
 Fault = Callable[[Patcher], None]
@@ -263,19 +264,5 @@ gains_doubled = scaled(
 # of the SO-101, more than its weight and less than its servos.
 motor_left_on = scaled(16, lambda raw: raw.dof_frictionloss)
 
-FAULTS: dict[str, Fault] = {
-    "xyzw": xyzw,
-    "com-for-frame": com_for_frame,
-    "joints-shifted": joints_shifted,
-    "degrees": degrees,
-    "no-forward": no_forward,
-    "forward-steps": forward_steps,
-    "step-and-forward": step_and_forward,
-    "one-step-short": one_step_short,
-    "motor-left-on": motor_left_on,
-    "gains-doubled": gains_doubled,
-    "gravity-up": gravity_up,
-    "spin-in-world": spin_in_world,
-    "reset-keeps-ctrl": reset_keeps_ctrl,
-    "no-replay": no_replay,
-}
+# Each stands above under its name.
+FAULTS: dict[str, Fault] = {name: globals()[name.replace("-", "_")] for name in MUTANTS}

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import json
 import os
-import traceback
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     from statemachine import Data, Model
 
 SCENE = "so101/scene_box"
-_LONGEST = 300  # characters of what an error says
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -79,11 +77,11 @@ def data(model: Model) -> Iterator[Data]:
 
 
 class PytestRecorder:
-    """Writes down what was found, what began and how it ended.
+    """Writes down which tests there are, and pytest's report of each as it comes.
 
-    Lines: {"ready": true} once the fault is in, {"tests": names}, {"began": name},
-    {"failed": name, "why": …} (of `IMPORT` for a file that cannot be imported), {"skipped": name}
-    and {"ended": name}.
+    Lines: {"ready": true} once the fault is in, {"tests": names}, and of each report {"test": name,
+    "when": "setup", "call" or "teardown", "outcome", "text"}; of a file that cannot be imported
+    the name is `IMPORT`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -97,44 +95,15 @@ class PytestRecorder:
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         self._write(tests=[_name(item.nodeid) for item in items])
 
-    def pytest_exception_interact(self, node: Any, call: Any, report: Any) -> None:
-        if isinstance(report, pytest.CollectReport):
-            error = call.excinfo.value
-            self._write(failed=IMPORT, why=_said(error.__cause__ or error, node.path))
-
-    def pytest_runtest_logstart(self, nodeid: str) -> None:
-        self._write(began=_name(nodeid))
-
-    @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_makereport(
-        self, item: pytest.Item, call: pytest.CallInfo[None]
-    ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-        report = yield
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         if report.failed:
-            why = _said(call.excinfo.value, item.path) if call.excinfo else str(report.longrepr)
-            self._write(failed=_name(item.nodeid), why=why)
-        elif report.skipped:
-            self._write(skipped=_name(item.nodeid))
-        return report
+            self._write(test=IMPORT, when="collect", outcome="failed", text=report.longreprtext)
 
-    def pytest_runtest_logfinish(self, nodeid: str) -> None:
-        self._write(ended=_name(nodeid))
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        facts = {"when": report.when, "outcome": report.outcome, "text": report.longreprtext}
+        self._write(test=_name(report.nodeid), **facts)
 
 
 def _name(nodeid: str) -> str:
     """A test's name within its file."""
     return nodeid.partition("::")[2]
-
-
-def _said(error: BaseException, path: Path) -> str:
-    """An error in one line, with the last line of the student's file that led to it."""
-    text = next((line.strip() for line in str(error).splitlines() if line.strip()), "")[:_LONGEST]
-    if isinstance(error, pytest.FixtureLookupError):
-        return f"there is no fixture {error.argname!r}; this command gives model, data and backend"
-    if isinstance(error, SyntaxError):
-        return f"line {error.lineno}: {error.msg}"
-    if not isinstance(error, AssertionError | pytest.fail.Exception):
-        text = f"{type(error).__name__}: {text}".removesuffix(": ")
-    frames = traceback.extract_tb(error.__traceback__)
-    lines = [frame.lineno for frame in frames if frame.filename == str(path)]
-    return f"line {lines[-1]}: {text}" if lines else text

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
 import sys
 import tempfile
 import threading
@@ -40,6 +41,10 @@ _TIMES, _AND, _CLOCK_AND = 5.0, 15.0, 120.0
 _RECORD_MOST = 10_000_000  # bytes
 _PYTEST_FAILS = "INTERNALERROR>"  # how pytest's report of an error of its own begins, on stdout
 _LONGEST = 300  # characters of what was said last
+# What stands between the errors of one report, of which the last is the one of the test.
+# Where the error itself stands, as pytest writes it; the first that fits counts.
+_ERRORS = (r"^E   (\S.*)", r"^E +(\S.*)", r"^ +\| (\w+Group: .*)", r"^(\S.*)")
+_CHAINED = re.compile(r"^(?:The above exception was|During handling of the above) .*", re.MULTILINE)
 _OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
 
@@ -220,7 +225,7 @@ def _run(
         record.touch()
         # -P: what lies beside the file must not pass for a module of pytest's.
         command = [sys.executable, "-P", "-m", "pytest", "-c", str(settings), "--rootdir", folder]
-        command += ["--noconftest", "--tb=no", "-q", "-p", "no:cacheprovider"]
+        command += ["--noconftest", "--tb=short", "--no-summary", "-q", "-p", "no:cacheprovider"]
         command += ["-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)]
         command += [os.path.join(os.curdir, path.name)]  # brackets in a whole path confuse pytest
         env = _environment() | ({FAULT: fault} if fault else {})  # where no test looks for it
@@ -234,7 +239,7 @@ def _run(
             writable=folder,
             stop=stop,
         )
-        return _read(record, outcome)
+        return _read(record, outcome, path.name)
 
 
 def _environment() -> dict[str, str]:
@@ -251,11 +256,11 @@ def _environment() -> dict[str, str]:
     }
 
 
-def _read(record: Path, outcome: sandbox.ProcessOutcome) -> _Record:
+def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> _Record:
     if not outcome.started:  # of which no test can be the reason
         raise EngineError(f"pytest stopped before the tests: it {_end(outcome)}")
     tests: list[str] | None = None
-    running, ended = "", 0
+    ended = 0
     skipped: set[str] = set()
     failures: dict[str, str] = {}
     for line in content(record, _RECORD_MOST).splitlines():
@@ -268,22 +273,31 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome) -> _Record:
                 pass
             case {"tests": [*names]} if all(isinstance(name, str) for name in names):
                 tests = names
-            case {"began": str(name)}:
-                running = name
-            case {"failed": str(name), "why": str(why)}:
-                failures.setdefault(name, why)  # the test itself, before its teardown
-            case {"skipped": str(name)}:
-                skipped.add(name)
-            case {"ended": str()}:
-                ended += 1
+            case {"test": str(name), "when": str(when), "outcome": outcome_of, "text": str(text)}:
+                ended += when == "teardown"
+                if outcome_of == "failed":
+                    failures.setdefault(name, _said(text, file))  # the test before its teardown
+                elif outcome_of == "skipped":
+                    skipped.add(name)
             case _:
                 raise BadInputError("the tests wrote into the record of what they do")
     if tests is None:
         failures.setdefault(IMPORT, f"it {_end(outcome)}")
     elif IMPORT not in failures and ended < len(tests):  # one ended them all
-        failures.setdefault(running or tests[0], _end(outcome))
+        failures.setdefault(tests[ended], _end(outcome))
     left = tuple(test for test in tests or () if test not in skipped)
     return _Record(outcome, left, len(skipped), failures)
+
+
+def _said(text: str, file: str) -> str:
+    """The error in one of pytest's reports, in one line, with the last line of the file there."""
+    last = _CHAINED.split(text)[-1]
+    lines = re.findall(rf'{re.escape(file)}(?::|"?, line )(\d+)', last)
+    found = [match for pattern in _ERRORS for match in re.findall(pattern, last, re.MULTILINE)]
+    words = re.sub(r"^(?:AssertionError: |Failed: |(?:\w+\.)+(?=\w+:))", "", [*found, ""][0])
+    if re.fullmatch(r"fixture '.*' not found", words):
+        words += "; this command gives model, data and backend"
+    return (f"line {lines[-1]}: " if lines else "") + words[:_LONGEST]
 
 
 def _end(outcome: sandbox.ProcessOutcome) -> str:
