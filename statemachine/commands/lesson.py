@@ -237,7 +237,7 @@ def _compute(
     from ..lessons.session import page_of_lesson, take
 
     if options.json:
-        values |= {option.key: True for option in lesson.options if option.more}
+        values |= lesson.all_shown
     taken = on_each_backend(
         options,
         lesson.name,

@@ -49,6 +49,11 @@ class Lesson:
     options: tuple[Option, ...] = ()
     on_path: bool = True
 
+    @property
+    def all_shown(self) -> dict[str, Any]:
+        """The options that show all of it."""
+        return {option.key: True for option in self.options if option.more}
+
 
 # What depends on the robot has no default here: `fit` of the lesson's module gives it one.
 _JOINT = Option("--joint", None, "joint to write (default shoulder_lift, if there is one)")
