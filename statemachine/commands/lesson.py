@@ -184,7 +184,7 @@ def _path(options: argparse.Namespace, reader: Any) -> int:
                 reader.go_on(f"lesson {number}: {lesson.question}")
             if reader:
                 reader.lesson = lesson.name
-            page, results = _compute(options, lesson, lesson.model, {})
+            page, results = _compute(options, lesson, lesson.model, lesson.defaults)
             everything[lesson.name] = results
             code = code if page.holds else SAYS_NO
             if not options.json:
@@ -247,7 +247,7 @@ def _compute(
         ),
     )
     page = page_of_lesson(lesson, taken)
-    if model == lesson.model and values == {each.key: each.default for each in lesson.options}:
+    if model == lesson.model and values == lesson.defaults:
         page = with_picture(page, lesson.name)
     if not options.calls:
         return page, {name: each.result for name, each in taken.items()}

@@ -50,6 +50,11 @@ class Lesson:
     on_path: bool = True
 
     @property
+    def defaults(self) -> dict[str, Any]:
+        """Its options where nobody sets one."""
+        return {option.key: option.default for option in self.options}
+
+    @property
     def all_shown(self) -> dict[str, Any]:
         """The options that show all of it."""
         return {option.key: True for option in self.options if option.more}

@@ -210,7 +210,7 @@ def take(
 
 def fitted(lesson: Lesson, model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
     """All options of a lesson; what is left open is what the Model suggests."""
-    values = {option.key: option.default for option in lesson.options} | dict(options)
+    values = lesson.defaults | dict(options)
     fit = getattr(module(lesson.name), "fit", None)
     return fit(model, values) if fit else values
 
