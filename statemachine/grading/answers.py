@@ -67,7 +67,7 @@ def answer_of(result: Any, watch: StudentWatch, changed: dict[str, Any]) -> Answ
     if isinstance(result, Iterator):
         result = tuple(islice(result, _MOST))
     every = islice(result, _MOST) if isinstance(result, (tuple, list)) or _rows(result) else ()
-    items = [list(islice(each, _MOST)) if isinstance(each, Iterator) else each for each in every]
+    items = [list(islice(part, _MOST)) if isinstance(part, Iterator) else part for part in every]
     if type(result) in (tuple, list):
         result = type(result)(items)
     items = items[:100]
@@ -87,9 +87,9 @@ def _rows(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.ndim > 0
 
 
-def _same(one: Any, two: Any) -> bool:
-    arrays = isinstance(one, np.ndarray) and isinstance(two, np.ndarray)
-    return one is two or (arrays and bool(np.may_share_memory(one, two)))
+def _same(left: Any, right: Any) -> bool:
+    arrays = isinstance(left, np.ndarray) and isinstance(right, np.ndarray)
+    return left is right or (arrays and bool(np.may_share_memory(left, right)))
 
 
 def _live(value: Any, datas: Sequence[Any]) -> str:
@@ -134,28 +134,28 @@ def encode(value: Any, depth: int = 0) -> Any:
             return {"array": [array.dtype.str, list(array.shape), data]}
     elif depth < _DEEPEST:
         if type(value) in _RECORDS.values():
-            parts = {name: encode(each, depth + 1) for name, each in vars(value).items()}
+            parts = {name: encode(item, depth + 1) for name, item in vars(value).items()}
             return {type(value).__name__: parts}
         if isinstance(value, slice):
             ends = (value.start, value.stop, value.step)
             return {"slice": [encode(part, depth + 1) for part in ends]}
         if isinstance(value, dict) and len(value) <= _MOST:
             named = [(k[:_LONGEST] if type(k) is str else kind(k), v) for k, v in value.items()]
-            return {"dict": [[name, encode(each, depth + 1)] for name, each in named]}
+            return {"dict": [[name, encode(item, depth + 1)] for name, item in named]}
         if isinstance(value, (tuple, list)) and len(value) <= _MOST:
-            items = [encode(each, depth + 1) for each in islice(value, _MOST)]
+            items = [encode(item, depth + 1) for item in islice(value, _MOST)]
             return {"tuple": items} if isinstance(value, tuple) else items
     return {"Thing": {"text": kind(value)}}
 
 
-def decode(found: Any) -> Answer:
+def decode(record: Any) -> Answer:
     """The answer that `encode` was given.
 
     Raises:
         ValueError: It was given none.
     """
     try:
-        answer = _decoded(found)
+        answer = _decoded(record)
     except (KeyError, TypeError, OverflowError, RecursionError) as error:
         raise ValueError(f"{type(error).__name__}: {error}") from None
     if not isinstance(answer, Answer):
@@ -163,12 +163,12 @@ def decode(found: Any) -> Answer:
     return answer
 
 
-def _decoded(found: Any) -> Any:
-    if found is None or isinstance(found, (bool, int, float, str)):
-        return found
-    if isinstance(found, list):
-        return [_decoded(each) for each in found]
-    ((name, content),) = dict(found).items()
+def _decoded(record: Any) -> Any:
+    if record is None or isinstance(record, (bool, int, float, str)):
+        return record
+    if isinstance(record, list):
+        return [_decoded(item) for item in record]
+    ((name, content),) = dict(record).items()
     if name == "array":
         return _array(*content)
     if name == "slice":
@@ -177,8 +177,8 @@ def _decoded(found: Any) -> Any:
     if name == "tuple":
         return tuple(map(_decoded, content))
     if name == "dict":
-        return {key: _decoded(each) for key, each in content}
-    values = {key: _decoded(each) for key, each in dict(content).items()}
+        return {key: _decoded(item) for key, item in content}
+    values = {key: _decoded(item) for key, item in dict(content).items()}
     for key, hint in get_type_hints(_RECORDS[name]).items():
         if not _is(values[key], hint):
             raise ValueError(f"{key} is no {hint}")
@@ -194,7 +194,7 @@ def _is(value: Any, hint: Any) -> bool:
         return False
     if isinstance(value, np.ndarray):
         return value.dtype == np.float64 and value.ndim == 1
-    return origin is not tuple or all(_is(each, get_args(hint)[0]) for each in value)
+    return origin is not tuple or all(_is(item, get_args(hint)[0]) for item in value)
 
 
 def _array(dtype: str, shape: list[int], data: str) -> Any:
@@ -202,7 +202,7 @@ def _array(dtype: str, shape: list[int], data: str) -> Any:
     if kind.kind not in "biuf" or kind.itemsize > 8 or kind.shape:
         raise ValueError("an array of no numbers")
     content = base64.b64decode(data, validate=True)
-    negative = any(each < 0 for each in shape)
+    negative = any(size < 0 for size in shape)
     if negative or len(shape) > 16 or math.prod(shape) * kind.itemsize != len(content):
         raise ValueError("an array of another size")
     array = np.frombuffer(content, kind).reshape(shape)

@@ -69,19 +69,23 @@ class ClassEntry:
     @property
     def judged(self) -> bool:
         """Whether there is a verdict on each function, or nothing to judge."""
-        whole = bool(self.functions) and all(each.judged for each in self.functions)
-        return whole or self.refusal == NOTHING
+        complete = bool(self.functions) and all(judgement.judged for judgement in self.functions)
+        return complete or self.refusal == NOTHING
 
     @property
     def looks(self) -> tuple[str, ...]:
         """What somebody should look at, each once."""
-        remarks = (text for each in self.functions for text in each.remarks)
+        remarks = (text for judgement in self.functions for text in judgement.remarks)
         return tuple(dict.fromkeys(text for text in remarks if text.startswith(LOOK)))
 
     @property
     def reasons(self) -> str:
         """What is not right, in a line with a few words for each function; "" if all is."""
-        words = {each.function: few_words(each) for each in self.functions if not each.passed}
+        words = {
+            judgement.function: few_words(judgement)
+            for judgement in self.functions
+            if not judgement.passed
+        }
         if len(words) == len(JUDGES) and len(set(words.values())) == 1:
             return next(iter(words.values()))  # of the file, and not of a function
         texts = [f"{name.removeprefix('demo_')}: {text}" for name, text in words.items()]
@@ -98,9 +102,16 @@ def rows_of(entries: Iterable[ClassEntry]) -> Iterator[tuple[object, ...]]:
     """The table: its head, and a row a submission; details have a line for each remark."""
     yield _HEAD
     for entry in entries:
-        words = {each.function: verdict_word(each) for each in entry.functions}
-        remarks = [f"{each.function}: {text}" for each in entry.functions for text in each.remarks]
-        if len(entry.functions) > 1 and len({each.remarks for each in entry.functions}) == 1:
+        words = {judgement.function: verdict_word(judgement) for judgement in entry.functions}
+        remarks = [
+            f"{judgement.function}: {text}"
+            for judgement in entry.functions
+            for text in judgement.remarks
+        ]
+        if (
+            len(entry.functions) > 1
+            and len({judgement.remarks for judgement in entry.functions}) == 1
+        ):
             remarks = list(entry.functions[0].remarks)  # of the file, and not of a function
         yield (
             entry.name,
@@ -147,16 +158,16 @@ def read(table: Path) -> dict[tuple[str, str], ClassEntry]:
             f"{table.name} is there and has not the columns of a table of grades "
             f"({', '.join(_HEAD)}): name another file, or remove it"
         )
-    found = {}
+    entries = {}
     for row in rows[1:]:
         cells = dict(zip(_HEAD, row, strict=False))
-        whole = len(row) == len(_HEAD) and all(cells[name] in _WORDS for name in JUDGES)
-        if not whole or not cells["sha256"]:
+        complete = len(row) == len(_HEAD) and all(cells[name] in _WORDS for name in JUDGES)
+        if not complete or not cells["sha256"]:
             continue  # judged again
         entry = ClassEntry(cells["file"], cells["sha256"], _judgements(cells), "",
                            cells["made_with"], tests=cells["tests"])  # fmt: skip
-        found[entry.sha256, entry.made_with] = entry
-    return found
+        entries[entry.sha256, entry.made_with] = entry
+    return entries
 
 
 def _judgements(cells: Mapping[str, str]) -> tuple[Judgement, ...]:
@@ -164,8 +175,8 @@ def _judgements(cells: Mapping[str, str]) -> tuple[Judgement, ...]:
     for cell in cells["details"].split("\n"):
         line = cell.removeprefix("'")
         name, _, text = line.partition(": ")
-        for each in [name] if name in remarks else remarks if line else ():
-            remarks[each].append(text if each == name else line)
+        for function in [name] if name in remarks else remarks if line else ():
+            remarks[function].append(text if function == name else line)
     return tuple(
         Judgement(
             name,

@@ -68,29 +68,31 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
     Raises:
         BadInputError: A path is not there, or nothing is found at all.
     """
-    found: dict[Path, Submission] = {}
-    for each in map(Path, paths):
-        if is_one_students(each):
-            name = each.resolve().name if len(paths) == 1 else each.as_posix()
-            found[each] = replace(_in_entry(each)[0], name=name)
-        elif each.is_dir():
-            before = "" if len(paths) == 1 else f"{each.as_posix()}/"
-            for entry in sorted(each.iterdir()):
+    by_place: dict[Path, Submission] = {}
+    for path in map(Path, paths):
+        if is_one_students(path):
+            name = path.resolve().name if len(paths) == 1 else path.as_posix()
+            by_place[path] = replace(_in_entry(path)[0], name=name)
+        elif path.is_dir():
+            before = "" if len(paths) == 1 else f"{path.as_posix()}/"
+            for entry in sorted(path.iterdir()):
                 if not _skipped(entry):
-                    for one in _in_entry(entry):
-                        found.setdefault(entry, replace(one, name=before + one.name))
-        elif each.is_file():
-            found.setdefault(each, Submission(each.as_posix(), each))
+                    for submission in _in_entry(entry):
+                        by_place.setdefault(
+                            entry, replace(submission, name=before + submission.name)
+                        )
+        elif path.is_file():
+            by_place.setdefault(path, Submission(path.as_posix(), path))
         else:
-            raise BadInputError(f"there is no file or folder {each}")
-    if not found:
+            raise BadInputError(f"there is no file or folder {path}")
+    if not by_place:
         raise BadInputError(f"no Python files in {', '.join(map(str, paths))}")
-    return list(found.values())
+    return list(by_place.values())
 
 
 def not_looked_at(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
     """Names of the files in class folders that nobody hands in."""
-    folders = [each for each in map(Path, paths) if each.is_dir() and not is_one_students(each)]
+    folders = [path for path in map(Path, paths) if path.is_dir() and not is_one_students(path)]
     return [
         entry.name
         for folder in folders
@@ -127,10 +129,10 @@ def submission_in(folder: Path) -> Path:
     Raises:
         BadInputError: There is none, or more than one.
     """
-    (found,) = _in_entry(folder)
-    if found.path is None:
-        raise BadInputError(found.refusal)
-    return found.path
+    (submission,) = _in_entry(folder)
+    if submission.path is None:
+        raise BadInputError(submission.refusal)
+    return submission.path
 
 
 def _in_entry(entry: Path) -> list[Submission]:
@@ -159,11 +161,11 @@ def _in_entry(entry: Path) -> list[Submission]:
     return [Submission(entry.name, None, text, entry)]
 
 
-def enrolled(found: Sequence[Submission], roster: Path) -> list[Submission]:
+def enrolled(submitted: Sequence[Submission], roster: Path) -> list[Submission]:
     """The submissions of the students on a roster, and after them those of nobody on it.
 
     Args:
-        found: All submissions. Each is the student's whose row has its name or the words of its
+        submitted: All submissions. Each is the student's whose row has its name or the words of its
             name (a name, a number) in any order.
         roster: A CSV file with a row for each student, who is called what is in the first cell.
 
@@ -177,18 +179,24 @@ def enrolled(found: Sequence[Submission], roster: Path) -> list[Submission]:
         cells = [list(filter(None, map(str.strip, row))) for row in rows]
     except (OSError, UnicodeError, csv.Error) as error:
         raise BadInputError(f"the roster {roster.name} cannot be read: {error}") from None
-    left, done = list(found), []
+    left, done = list(submitted), []
     for row in filter(None, cells):
         if row is cells[0] and _HEADINGS & set(map(str.casefold, row)):
             continue
-        theirs = [each for each in left if {each.name, Path(each.name).stem} & set(row)]
+        theirs = [
+            submission
+            for submission in left
+            if {submission.name, Path(submission.name).stem} & set(row)
+        ]
         keys = [words for cell in row if len(cell) > 2 and (words := _words(cell))]
-        theirs = theirs or [each for each in left if any(key <= _words(each.name) for key in keys)]
+        theirs = theirs or [
+            submission for submission in left if any(key <= _words(submission.name) for key in keys)
+        ]
         if len(theirs) == 1:
             left.remove(theirs[0])
             done.append(replace(theirs[0], student=row[0]))
         else:
-            names = ", ".join(each.name for each in theirs)
+            names = ", ".join(submission.name for submission in theirs)
             refusal = f"{len(theirs)} may be theirs: {names}" if theirs else NOTHING
             done.append(Submission(row[0], None, refusal, student=row[0]))
     return done + left
@@ -199,7 +207,7 @@ def _words(name: str) -> frozenset[str]:
 
 
 def judge_all(
-    found: Sequence[Submission],
+    submitted: Sequence[Submission],
     backend: str,
     *,
     time_limit: float = TIME_LIMIT,
@@ -211,7 +219,7 @@ def judge_all(
     """Judge every submission, several at once.
 
     Args:
-        found: What to judge.
+        submitted: What to judge.
         backend: The engine to run them on.
         time_limit: What each function may compute [s].
         jobs: How many files are judged at once; each takes a process a function. By default one
@@ -228,21 +236,23 @@ def judge_all(
     jobs = checked_jobs(jobs, processors=2)
     before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
-    in_order = _compared(found)
-    own = {each.path: each.own for each in found if each.path}
+    in_order = _compared(submitted)
+    own = {submission.path: submission.own for submission in submitted if submission.path}
     with ExerciseJudge(backend, time_limit, own=own) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
         made_with = f"{backend}, {versions}, {time_limit:g} s"
         work: dict[str, Callable[[], ClassEntry]] = {}
-        for each in found:
-            content = digest(each.own)
-            entry = ClassEntry(each.name, content, (), each.refusal, made_with)
+        for submission in submitted:
+            content = digest(submission.own)
+            entry = ClassEntry(submission.name, content, (), submission.refusal, made_with)
             known = before.get((content, made_with), entry)
             if known.judged:
-                entry = entries[each.name] = replace(known, name=each.name)
-            file = each.named(_PREDICTIONS)
-            entry = replace(entry, student=each.student, predictions=score(file) if file else "")
-            work[each.name] = partial(_entry, judge, each, entry, tests)
+                entry = entries[submission.name] = replace(known, name=submission.name)
+            file = submission.named(_PREDICTIONS)
+            entry = replace(
+                entry, student=submission.student, predictions=score(file) if file else ""
+            )
+            work[submission.name] = partial(_entry, judge, submission, entry, tests)
 
         def ended(name: str, entry: ClassEntry) -> None:
             entries[name] = entry
@@ -254,7 +264,7 @@ def judge_all(
             jobs,
             ended,
             stop=judge.stop.set,
-            progress=lambda waiting: progress(1 - waiting / len(found)),
+            progress=lambda waiting: progress(1 - waiting / len(submitted)),
         )
     done = in_order(entries)
     if table is not None:
@@ -280,17 +290,17 @@ def _entry(
 def _caught(file: Path, backend: str) -> str:
     """How many faults a student's tests catch, and which they do not."""
     try:
-        found = examine(file, backend)
+        examination = examine(file, backend)
     except StateMachineError as error:
         return str(error)
-    if found.failures:
-        return f"{found.failures[0].test} fails on the arm without a fault"
-    missed = ", ".join(mutant.name for mutant in found.survivors)
-    return f"{found.caught} of {len(found.trials)}" + f"; not {missed}" * bool(missed)
+    if examination.failures:
+        return f"{examination.failures[0].test} fails on the arm without a fault"
+    missed = ", ".join(mutant.name for mutant in examination.survivors)
+    return f"{examination.caught} of {len(examination.trials)}" + f"; not {missed}" * bool(missed)
 
 
 def _compared(
-    found: Sequence[Submission],
+    submitted: Sequence[Submission],
 ) -> Callable[[Mapping[str, ClassEntry]], list[ClassEntry]]:
     """Puts entries in the order of the submissions, each with those that are like it.
 
@@ -302,13 +312,15 @@ def _compared(
     def in_order(entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
         done = []
         first: dict[str, str] = {}
-        for each in (each for each in found if each.name in entries):
-            entry, same = entries[each.name], ""
-            if any(judged.written for judged in entry.functions) and code(each.path):
-                same = first.setdefault(code(each.path), each.name)
-            others = [(alike(each.path, o.path), o.name) for o in found if o is not each]
+        for submission in (submission for submission in submitted if submission.name in entries):
+            entry, same = entries[submission.name], ""
+            if any(judged.written for judged in entry.functions) and code(submission.path):
+                same = first.setdefault(code(submission.path), submission.name)
+            others = [
+                (alike(submission.path, o.path), o.name) for o in submitted if o is not submission
+            ]
             part, name = max(others, key=lambda other: other[0], default=(0.0, ""))
-            same = "" if same == each.name else same
+            same = "" if same == submission.name else same
             done.append(replace(entry, same_as=same, alike=f"{part:.0%} {name}" if part else ""))
         return done
 

@@ -185,7 +185,7 @@ class ExerciseJudge(ExitStack):
         self, copy: _Copy, folder: Path, progress: Callable[[float], None]
     ) -> tuple[Judgement, ...]:
         """All functions at once, so that the slowest decides how long it takes."""
-        stop, found = threading.Event(), dict[str, Any]()
+        stop, recordings = threading.Event(), dict[str, Any]()
         work: dict[str, Callable[[], Any]] = {
             name: partial(_recorded, copy, name, self.backend, self.limits, folder / name, stop)
             for name in JUDGES
@@ -198,8 +198,8 @@ class ExerciseJudge(ExitStack):
                 stop.set()
             progress(1 - left / len(work))
 
-        in_parallel(work, len(work), found.__setitem__, stop.set, waiting)
-        return tuple(self._judgement(copy, name, found[name]) for name in JUDGES)
+        in_parallel(work, len(work), recordings.__setitem__, stop.set, waiting)
+        return tuple(self._judgement(copy, name, recordings[name]) for name in JUDGES)
 
     def _work_out(self) -> None:
         """For each function what it is called on, and what is right there; once."""
@@ -293,9 +293,9 @@ class _Copy:
     def others(self, reads: Iterable[str]) -> dict[str, bool]:
         """Files that are not its own, by name; whether it may not be judged for that."""
         others = {}
-        for each in map(Path, reads):
-            beside = each.is_relative_to(self.folder)
-            file = self.before / each.relative_to(self.folder) if beside else each
+        for path in map(Path, reads):
+            beside = path.is_relative_to(self.folder)
+            file = self.before / path.relative_to(self.folder) if beside else path
             if file.exists():
                 here = file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file
                 others[here.as_posix()] = beside or has_solutions(file)

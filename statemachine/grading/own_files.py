@@ -36,7 +36,7 @@ def _start(file: Path) -> bytes:
 
 def in_folder(folder: Path) -> dict[str, Path]:
     """All that one student handed in, by name within the folder; not what tools left there."""
-    return {each.relative_to(folder).as_posix(): each for each in sorted(_plain(folder))[:_MOST]}
+    return {file.relative_to(folder).as_posix(): file for file in sorted(_plain(folder))[:_MOST]}
 
 
 def _plain(folder: Path) -> Iterator[Path]:
@@ -54,13 +54,13 @@ def _plain(folder: Path) -> Iterator[Path]:
 def named_by(file: Path) -> dict[str, Path]:
     """A file and what it names beside it, but for files that hold somebody's functions."""
     own, waiting = {file.name: file}, [file]
-    beside = [each for each in file.parent.iterdir() if not each.name.startswith(".")]
+    beside = [entry for entry in file.parent.iterdir() if not entry.name.startswith(".")]
     while waiting:
         words = set(re.findall(r"\w+", _start(waiting.pop()).decode("utf-8", "replace")))
-        for each in (each for each in beside if each.stem in words):
-            package = in_folder(each) if (each / "__init__.py").is_file() else {}
-            files = {f"{each.name}/{name}": inside for name, inside in package.items()}
-            for name, other in (files or {each.name: each}).items():
+        for entry in (entry for entry in beside if entry.stem in words):
+            package = in_folder(entry) if (entry / "__init__.py").is_file() else {}
+            files = {f"{entry.name}/{name}": inside for name, inside in package.items()}
+            for name, other in (files or {entry.name: entry}).items():
                 fits = other.is_file() and other.stat().st_size <= LARGEST
                 if name not in own and fits and not has_solutions(other):
                     own[name] = other
@@ -70,10 +70,10 @@ def named_by(file: Path) -> dict[str, Path]:
 
 def digest(files: Mapping[str, Path]) -> str:
     """Of names and contents; "" where there is none, or one is too large to be judged."""
-    whole = hashlib.sha256()
+    sha = hashlib.sha256()
     for name, file in files.items():
         text, start = os.fsencode(name), _start(file)
         if len(start) > LARGEST:
             return ""
-        whole.update(b"%d %d " % (len(text), len(start)) + text + start)
-    return whole.hexdigest() if files else ""
+        sha.update(b"%d %d " % (len(text), len(start)) + text + start)
+    return sha.hexdigest() if files else ""

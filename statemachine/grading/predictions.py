@@ -21,8 +21,10 @@ def answers_in(file: Path) -> dict[str, dict[str, Any]]:
         record = json.loads(file.read_text(encoding="utf-8"))
         if record["kind"] != KIND:
             raise ValueError("another kind of file")
-        answers = {f"{each['lesson']}: {each['question']}": each for each in record["answers"]}
-        if not all(isinstance(each["right"], bool) for each in answers.values()):
+        answers = {
+            f"{answer['lesson']}: {answer['question']}": answer for answer in record["answers"]
+        }
+        if not all(isinstance(answer["right"], bool) for answer in answers.values()):
             raise ValueError("an answer is neither right nor wrong")
     except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise BadInputError(

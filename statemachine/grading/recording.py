@@ -100,8 +100,8 @@ def record(
         "nonce": nonce,
     }
     job.write_text(json.dumps(facts), encoding="utf-8")
-    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
-    environment = {**kept, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+    passed_on = {name: os.environ[name] for name in _KEPT if name in os.environ}
+    environment = {**passed_on, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     outcome = sandbox.run(
         [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
         cpu=limits.cpu,
@@ -134,29 +134,29 @@ def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
     """
     if nonce.encode() not in line[:100]:
         return
-    found = json.loads(line)
-    if not isinstance(found, dict) or found.get("nonce") != nonce:
+    facts = json.loads(line)
+    if not isinstance(facts, dict) or facts.get("nonce") != nonce:
         return
-    match found["stage"]:
+    match facts["stage"]:
         case "refused" if not recording.began:
-            recording.refusal = _text(found["kind"]), _text(found["text"])
+            recording.refusal = _text(facts["kind"]), _text(facts["text"])
         case "running" if not recording.began:
             recording.began = True
         case "forbidden" | "reads" as kind if recording.began:
-            getattr(recording, kind).append(_text(found["text"]))
+            getattr(recording, kind).append(_text(facts["text"]))
         case "answer" if recording.began:
-            recording.answers.append(decode(found["answer"]))
+            recording.answers.append(decode(facts["answer"]))
         case "fault" if recording.began:
-            written = found["written"] is True
-            recording.answers.append(FaultError(_text(found["text"]), written))
+            written = facts["written"] is True
+            recording.answers.append(FaultError(_text(facts["text"]), written))
         case _:
             raise ValueError("a line in the wrong place")
 
 
-def _text(found: Any) -> str:
-    if not isinstance(found, str):
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
         raise TypeError("no text")
-    return " ".join(found.split())[:_TEXT_MOST]
+    return " ".join(value.split())[:_TEXT_MOST]
 
 
 def content(file: Path, most: int) -> bytes:

@@ -32,8 +32,10 @@ def shape_of(path: Path | None) -> Counter[tuple[str, ...]]:
     }
     names = [name for name in JUDGES if name in defined]
     for name in names:  # which grows meanwhile
-        called = (each.id for each in ast.walk(defined[name]) if isinstance(each, ast.Name))
-        names += [each for each in dict.fromkeys(called) if each in defined and each not in names]
+        called = (inner.id for inner in ast.walk(defined[name]) if isinstance(inner, ast.Name))
+        names += [
+            inner for inner in dict.fromkeys(called) if inner in defined and inner not in names
+        ]
     text = "".join(ast.dump(defined[name]) for name in names)
     kinds = re.findall(r"\b[A-Z]\w+(?=\()", text)
     return Counter(zip(*(kinds[k:] for k in range(_RUN)), strict=False))

@@ -165,14 +165,19 @@ def usual_tip(model: Model, joint: str) -> str:
     if FINGERTIP in model.site_names:
         return FINGERTIP
     carried = carried_by_joint(model, joint)
-    bodies = list(enumerate(model.body_names))[1:]  # without the world
     sites = list(zip(model.site_bodyid.tolist(), model.site_names, strict=True))
-    for places in (sites, bodies):
-        for inside in (True, False):
-            names = [name for body, name in places if name and (body in carried) is inside]
-            if names and (inside or places is bodies):
-                return names[-1]
-    raise BadInputError(f"{model.path.name} names no site and no body, and this lesson reads one")
+    bodies = list(enumerate(model.body_names))[1:]  # without the world
+    places = (
+        *bodies,
+        *((b, n) for b, n in bodies if b in carried),
+        *((b, n) for b, n in sites if b in carried),
+    )
+    names = [name for _, name in places if name]
+    if not names:
+        raise BadInputError(
+            f"{model.path.name} names no site and no body, and this lesson reads one"
+        )
+    return names[-1]
 
 
 def with_joint(model: Model, options: Mapping[str, Any], servos: bool = False) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...
         reset(model, data, keyframe=key)
         start = SavePoint("start", "", model, data.qpos.copy(), data.qvel.copy(), ctrl, 0)
     driver, middle = InterfaceDriver(model, 0), replace(start, run_in=steps)
-    whole, again = (driver.run(start, steps).future for _ in range(2))
+    first_run, again = (driver.run(start, steps).future for _ in range(2))
     rest = driver.run(middle, steps).future
     states, arrays = (
         driver.futures(middle, steps, way)
@@ -116,8 +116,8 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...
         data.ctrl = ctrl
         anew = driver.drive(data, start, steps)
     return (
-        WayBack("reset to the keyframe", driver.off(anew, whole)),
-        WayBack("a new Data, same keyframe", driver.off(again, whole)),
+        WayBack("reset to the keyframe", driver.off(anew, first_run)),
+        WayBack("a new Data, same keyframe", driver.off(again, first_run)),
         WayBack("set_state, against going on", driver.off(states[ITSELF], rest)),
         WayBack("set_state, done twice", driver.off(states[FRESH], states[ITSELF])),
         WayBack("qpos, qvel, ctrl put back", driver.off(arrays[FRESH], rest)),

@@ -29,14 +29,14 @@ _ROWS: Mapping[str, Callable[[Certificate], str]] = {
 def page(results: Mapping[str, Certificate]) -> Page:
     """Frames first, then the differences."""
     first = next(iter(results.values()))
-    one = len(first.tips) == 1
+    single = len(first.tips) == 1
     same_site = all(result.site == first.site for result in results.values())
     apart = {"default pose": lambda a, b: f"{math.dist(a.default_pose, b.default_pose):.1e} m"}
     blocks = {
         "prepared": Items(first.prepared),
         "tips": by_engine(results, _ROWS, "Engine against witness")
-        if one
-        else [_tips(*each) for each in results.items()],
+        if single
+        else [_tips(*entry) for entry in results.items()],
         "differences": differences(results, apart) if same_site else [],
     }
     return template.page("certificate", results, {n: _slots(r) for n, r in results.items()}, blocks)

@@ -147,10 +147,11 @@ def certify(
             that the model has not, or nothing moves.
     """
     wanted = as_count(poses, "poses")
-    if wanted > _MOST:
-        raise BadInputError(f"poses must be at most {_MOST:,}; got {wanted:,}")
-    if wanted < 2:
-        raise BadInputError("poses must be at least 2: one cannot tell a frame from a joint")
+    if not 2 <= wanted <= _MOST:
+        raise BadInputError(
+            f"poses must be from 2, as one cannot tell a frame from a joint, to {_MOST:,}; "
+            f"got {wanted:,}"
+        )
     if seed < 0:
         raise BadInputError(f"seed must not be negative; got {seed}")
     tips = tips_of(model, site)

@@ -92,9 +92,9 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
     walls = in_turns(ways, _TIMES, part_of(progress, 0.0, 0.5))
     costs = {name: statistics.median(times) for name, times in walls.items()}
     several = (data, other, *extra)
-    shared = all(getattr(each.raw, "model", None) is model.raw for each in several)
-    for each in extra:
-        each.close()
+    shared = all(getattr(world.raw, "model", None) is model.raw for world in several)
+    for world in extra:
+        world.close()
     shares = [part_of(progress, 0.5 + 0.25 * k / worlds, 0.25 / worlds) for k in range(worlds)]
     singly = [_in_turn(model, [k], worlds, shares[k])[0] for k in range(worlds)]
     together = _in_turn(model, range(worlds), worlds, part_of(progress, 0.75, 0.25))
@@ -137,7 +137,9 @@ def _arrays(model: Model) -> dict[str, bytes]:
     fields = {name: getattr(model, name) for name in vars(model)}
     raw = [name for name in dir(model.raw) if not name.startswith("_")]
     fields |= {f"raw.{name}": getattr(model.raw, name) for name in raw}
-    return {name: each.tobytes() for name, each in fields.items() if isinstance(each, np.ndarray)}
+    return {
+        name: array.tobytes() for name, array in fields.items() if isinstance(array, np.ndarray)
+    }
 
 
 def slots(result: Objects) -> dict[str, Any]:

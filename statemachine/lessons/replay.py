@@ -141,10 +141,10 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
     first, second = _poses(runs, nstep)
     broken, finer = [], None
     if way is None:
-        for each, share in zip(BREAKS, shares[1:], strict=True):
-            with CodeRun(code(model, {**options, "break": each}, "sm.load()"), model) as other:
+        for fault, share in zip(BREAKS, shares[1:], strict=True):
+            with CodeRun(code(model, {**options, "break": fault}, "sm.load()"), model) as other:
                 courses = other.follow(lambda _model, _data: None, 2 * nstep, share)
-            broken.append(Broken.of(each, *_poses(courses, nstep)))
+            broken.append(Broken.of(fault, *_poses(courses, nstep)))
         finer = _finer(model, options, first[-1])
     touches = runs[0].looks
     gap = first - second

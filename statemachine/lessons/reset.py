@@ -215,17 +215,18 @@ def tables(results: Mapping[str, Reset]) -> dict[str, Any]:
 
 
 def _keyframe(number: int, scenes: Mapping[str, KeyframeScene]) -> Table:
-    each, first = list(scenes.values()), next(iter(scenes.values()))
-    pairs = dict.fromkeys(pair for scene in each for pair in scene.contacts)
+    columns, first = list(scenes.values()), next(iter(scenes.values()))
+    pairs = dict.fromkeys(pair for scene in columns for pair in scene.contacts)
     rows = [
-        (pair, *(count(scene.contacts.get(pair, 0), "contact") for scene in each)) for pair in pairs
+        (pair, *(count(scene.contacts.get(pair, 0), "contact") for scene in columns))
+        for pair in pairs
     ]
     after = f"of the next {first.nstep} steps: "
     if first.body is not None:
         rows += [
-            (f"{after}the robot touches the {first.body}", *(str(s.robot_steps) for s in each)),
-            (f"{after}the world touches it", *(str(s.world_steps) for s in each)),
-            ("its height changes meanwhile by", *(millimetres(s.rise) for s in each)),
+            (f"{after}the robot touches the {first.body}", *(str(s.robot_steps) for s in columns)),
+            (f"{after}the world touches it", *(str(s.world_steps) for s in columns)),
+            ("its height changes meanwhile by", *(millimetres(s.rise) for s in columns)),
         ]
     return Table(
         ("what touches", *scenes),

@@ -25,8 +25,8 @@ _BULK, _AGAIN, _LOOP, _OWN = "in bulk", "in bulk again", "step by step", "as it 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The same steps by the clock, both ways, once."""
     steps = as_count(options["steps"], "steps")
-    whole, rest = divmod(steps, _MOST)
-    bulk = f"[{steps}]" if not whole else f"[{_MOST}] * {whole}" + f" + [{rest}]" * bool(rest)
+    full, rest = divmod(steps, _MOST)
+    bulk = f"[{steps}]" if not full else f"[{_MOST}] * {full}" + f" + [{rest}]" * bool(rest)
     return f"""\
 import time
 import statemachine as sm

@@ -209,4 +209,4 @@ def largest_gap(
 
 def emulated(result: Any, *promises: str) -> str:
     """Which promises that a page speaks of are kept by this interface, and not by the engine."""
-    return ", ".join(each for each in promises if each in result.provenance.emulated)
+    return ", ".join(promise for promise in promises if promise in result.provenance.emulated)

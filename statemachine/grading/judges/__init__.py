@@ -71,15 +71,15 @@ def judged(
             if isinstance(answer, FaultError):
                 raise answer
             with np.errstate(all="ignore"):
-                found = judge_of(function).judge(answer, world, right, rights[0])
+                verdict = judge_of(function).judge(answer, world, right, rights[0])
         except FaultError as fault:
-            found = [str(fault)]
+            verdict = [str(fault)]
             if not fault.written:
-                return Judgement(function, False, False, tuple(found))
-        if not isinstance(found, str):
+                return Judgement(function, False, False, tuple(verdict))
+        if not isinstance(verdict, str):
             where = f"{world.where}: " if world.where else ""
-            return Judgement(function, True, False, tuple(where + text for text in found))
-        passed.append(found)
+            return Judgement(function, True, False, tuple(where + text for text in verdict))
+        passed.append(verdict)
     if len(passed) < len(worlds):
         return None
     also = f"; right in {len(worlds) - 1} other case{'s' * (len(worlds) > 2)}"

@@ -27,10 +27,10 @@ def parts(value: Any, number: int, what: str) -> list[Any]:
         FaultError: It has another number of them, or none.
     """
     several = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.shape)
-    found = list(value) if several else []
-    if not several or len(found) != number:
+    items = list(value) if several else []
+    if not several or len(items) != number:
         raise FaultError(f"it returns {kind(value)}, where {what} should be")
-    return found
+    return items
 
 
 def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
@@ -67,14 +67,14 @@ def grain(values: Array) -> float:
     return 0.0
 
 
-def near(one: Array, two: Array, tolerance: float) -> bool:
+def near(left: Array, right: Array, tolerance: float) -> bool:
     """Whether no number is farther apart; NaN is far from everything."""
-    return one.shape == two.shape and bool((abs(one - two) <= tolerance).all())
+    return left.shape == right.shape and bool((abs(left - right) <= tolerance).all())
 
 
-def same_bits(one: Array, two: Array) -> bool:
+def same_bits(left: Array, right: Array) -> bool:
     """Whether all numbers are equal."""
-    return one.shape == two.shape and bool((one == two).all())
+    return left.shape == right.shape and bool((left == right).all())
 
 
 def owner(model: Model, place: int) -> str:
@@ -88,7 +88,7 @@ def listed(values: Array, digits: int = 4) -> str:
     return "[" + " ".join(f"{v + 0.0:.{digits}g}" for v in values.tolist()) + "]"
 
 
-def told_apart(one: T, two: T, text: Callable[[T, int], str]) -> str:
+def told_apart(left: T, right: T, text: Callable[[T, int], str]) -> str:
     """'x where y' with as many digits as it takes to tell them apart, four at least."""
-    digits = next((d for d in range(4, 17) if text(one, d) != text(two, d)), 17)
-    return f"{text(one, digits)} where {text(two, digits)}"
+    digits = next((d for d in range(4, 17) if text(left, d) != text(right, d)), 17)
+    return f"{text(left, digits)} where {text(right, digits)}"

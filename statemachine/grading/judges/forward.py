@@ -81,8 +81,8 @@ def judge(answer: Answer, world: ExerciseWorld, right: Tips, course: Tips) -> li
     tolerance = _SINGLE if short == "float32" else TOLERANCE
     given = np.array(
         [
-            numbers(each, (3,), f"reading {k}")
-            for k, each in enumerate(parts(answer.result, 4, "four positions"), start=1)
+            numbers(reading, (3,), f"reading {k}")
+            for k, reading in enumerate(parts(answer.result, 4, "four positions"), start=1)
         ]
     )
     if passed := [run.end.time - run.start.time for run in answer.runs]:
@@ -137,61 +137,63 @@ def _why(
     k: int, given: Array, world: ExerciseWorld, tips: Tips, course: Tips, answer: Answer
 ) -> str:
     """What reading k is, as far as the run shows it."""
-    right, found = tips.readings[k], given[k]
-    away = f"{rounded(float(np.linalg.norm(found - right)), 'm')} away"
+    right, reading = tips.readings[k], given[k]
+    away = f"{rounded(float(np.linalg.norm(reading - right)), 'm')} away"
     fresh, old, new = tips.readings[0], tips.readings[1], tips.readings[3]
-    slack = TOLERANCE + grain(found)
+    slack = TOLERANCE + grain(reading)
     never = "" if answer.forwards else ", which was never called"
     place = address(world.model)
-    early = any(ANGLE in each.qpos[place : place + 1] for each in answer.forwards[:1])
-    apart = told_apart(found, right, lambda place, digits: f"{vector(place, digits)} m")
+    early = any(ANGLE in inputs.qpos[place : place + 1] for inputs in answer.forwards[:1])
+    apart = told_apart(reading, right, lambda place, digits: f"{vector(place, digits)} m")
     return reason(
-        (not np.isfinite(found).all(), f"you return {vector(found)} m"),
+        (not np.isfinite(reading).all(), f"you return {vector(reading)} m"),
         (
-            world.where and near(found, course.readings[k], slack),
+            world.where and near(reading, course.readings[k], slack),
             "that belongs to the course's own scene, not to the model that you got",
         ),
         (
-            grain(found) and near(found, right, slack),
+            grain(reading) and near(reading, right, slack),
             f"it was rounded, {away}: return what you read as it is",
         ),
         (
-            k and near(found, fresh, TOLERANCE),
+            k and near(reading, fresh, TOLERANCE),
             f"derived values were read before any forward{never}: still at the origin, {away}",
         ),
         *(
             (
-                k and near(found, places[k], slack),
+                k and near(reading, places[k], slack),
                 f"that is the place of {name}, {away}; {TIP!r} is asked for",
             )
             for name, places in tips.others.items()
         ),
         (
-            k < 3 and near(found, new, TOLERANCE) and early,
+            k < 3 and near(reading, new, TOLERANCE) and early,
             f"qpos was written before the first forward: that is the new pose, {away}",
         ),
         (
-            k < 3 and near(found, new, TOLERANCE),
+            k < 3 and near(reading, new, TOLERANCE),
             f"forward was called before it was read: that is the new pose already, {away}",
         ),
         (
-            k == 0 and near(found, old, TOLERANCE),
+            k == 0 and near(reading, old, TOLERANCE),
             f"forward was called before it: a new Data has nothing derived yet; you are {away}",
         ),
-        (text := next(_poses(found, world.model, answer, away), "") if k == 3 else "", text),
+        (text := next(_poses(reading, world.model, answer, away), "") if k == 3 else "", text),
         (True, f"you return {apart} is expected, {away}"),
     )
 
 
-def _poses(found: Array, model: Model, answer: Answer, away: str) -> Iterator[str]:
+def _poses(reading: Array, model: Model, answer: Answer, away: str) -> Iterator[str]:
     """What the last reading is, if it belongs to one of the poses that forward met."""
     place, lift = address(model), f"{LIFT} is at qpos[{address(model)}]"
     with make_data(model) as data:
         start = Inputs(0, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy(), data.time)
-        for met in reversed([each for each in answer.forwards if each.qpos.shape == (model.nq,)]):
+        for met in reversed(
+            [inputs for inputs in answer.forwards if inputs.qpos.shape == (model.nq,)]
+        ):
             data.qpos[:] = met.qpos
             forward(model, data)
-            if not near(data.site_xpos[model.site_id(TIP)], found, TOLERANCE):
+            if not near(data.site_xpos[model.site_id(TIP)], reading, TOLERANCE):
                 continue
             angle, others = float(met.qpos[place]), _written(start, met)["qpos"]
             if angle != start.qpos[place] and angle != ANGLE:
@@ -213,12 +215,14 @@ def _unmoved(start: Inputs, answer: Answer, model: Model, away: str) -> str:
     """Why the last reading is the old pose, by what was written and when."""
     place = address(model)
     old = f"that is the old pose, {away}"
-    states = [each for each in (*answer.forwards, *answer.ends) if each.qpos.shape == (model.nq,)]
+    states = [
+        inputs for inputs in (*answer.forwards, *answer.ends) if inputs.qpos.shape == (model.nq,)
+    ]
     written = [
         (name, entry)
         for name in ("qpos", "ctrl", "qvel")
-        for each in states
-        for entry in _written(start, each)[name]
+        for inputs in states
+        for entry in _written(start, inputs)[name]
     ]
     name, entry = [*written, ("qpos", place)][0]
     what = {
@@ -228,11 +232,11 @@ def _unmoved(start: Inputs, answer: Answer, model: Model, away: str) -> str:
     }[name]
     return reason(
         (
-            any(each.qpos[place] == ANGLE for each in answer.forwards),
+            any(inputs.qpos[place] == ANGLE for inputs in answer.forwards),
             f"it was read before the second forward: {old}",
         ),
         (
-            any(each.qpos[place] != start.qpos[place] for each in states),
+            any(inputs.qpos[place] != start.qpos[place] for inputs in states),
             f"derived values were read before forward: {old}",
         ),
         (written, f"you wrote {name}[{entry}], {what}: {old}; {LIFT} is at qpos[{place}]"),

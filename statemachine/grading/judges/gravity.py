@@ -72,8 +72,8 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
 def right(world: ExerciseWorld) -> Fall:
     """The fall, with servos and without."""
     model, (seconds,) = world.model, world.arguments
-    each, dof = round(1 / model.timestep), int(model.jnt_dofadr[model.joint_id(LIFT)])
-    size = (2, (seconds + 1) * each + 1)
+    rate, dof = round(1 / model.timestep), int(model.jnt_dofadr[model.joint_id(LIFT)])
+    size = (2, (seconds + 1) * rate + 1)
     qpos, speed, time = np.empty((*size, model.nq)), np.empty(size), np.empty(size[1])
     for limp, variant in enumerate((model, model.replace(actuation=False))):
         with make_data(variant) as data:
@@ -81,7 +81,7 @@ def right(world: ExerciseWorld) -> Fall:
                 if k:
                     step(variant, data)
                 qpos[limp, k], speed[limp, k], time[k] = data.qpos, data.qvel[dof], data.time
-    marks = np.arange(seconds + 1) * each
+    marks = np.arange(seconds + 1) * rate
     return Fall(address(model), np.degrees(qpos), speed, time, marks)
 
 
@@ -91,8 +91,8 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall, course: Fall) -> li
     pair = parts(answer.result, 2, "(on, off), two lists of degrees,")
     size = len(right.marks)
     given = [
-        numbers(each, (size,), f"{name}, one number at each of 0 … {size - 1} s")
-        for name, each in zip(_NAMES, pair, strict=True)
+        numbers(trace, (size,), f"{name}, one number at each of 0 … {size - 1} s")
+        for name, trace in zip(_NAMES, pair, strict=True)
     ]
     remarks += _command(answer)
     falls = [right.degrees(limp) for limp in (False, True)]
@@ -189,11 +189,11 @@ def _mistakes(
     how = "still on" if limp else "off already"
     yield fall.degrees(not limp), f"the servos were {how} in this run"
     for nstep in dict.fromkeys(run.nstep for run in answer.runs):
-        each = nstep // (len(marks) - 1)
-        if each != marks[1] and (len(marks) - 1) * each < len(angles):
+        rate = nstep // (len(marks) - 1)
+        if rate != marks[1] and (len(marks) - 1) * rate < len(angles):
             yield (
-                angles[np.arange(len(marks)) * each, place],
-                f"you took {count(each, 'step')} for a second, and at "
+                angles[np.arange(len(marks)) * rate, place],
+                f"you took {count(rate, 'step')} for a second, and at "
                 f"{model.timestep * 1e3:g} ms a step a second has {marks[1]}: "
                 "round(1 / model.timestep)",
             )
@@ -217,19 +217,19 @@ def _late(given: Array, limp: bool, world: ExerciseWorld, fall: Fall, answer: An
     marks, timestep = fall.marks, world.model.timestep
     trace = fall.angles[int(limp), :, fall.place]
     slack = _SAME + grain(given)
-    found = [
+    offsets = [
         late
         for late in range(1 - int(marks[1]), int(marks[1]) + 1)
         if late and near(given[1:], trace[marks[1:] + late], slack)
     ]
     # Where the arm rests it is the same at many moments: then what was stepped tells.
     taken = {run.nstep - int(marks[-1]) for run in answer.runs}
-    if len(found) > 1:
-        found = [late for late in found if late in taken]
-    if len(found) != 1 or max(taken) < found[0]:
+    if len(offsets) > 1:
+        offsets = [late for late in offsets if late in taken]
+    if len(offsets) != 1 or max(taken) < offsets[0]:
         return ""
-    word = "later" if found[0] > 0 else "earlier"
-    return f": that is the arm {abs(found[0]) * timestep:g} s {word} (the first is at 0 s)"
+    word = "later" if offsets[0] > 0 else "earlier"
+    return f": that is the arm {abs(offsets[0]) * timestep:g} s {word} (the first is at 0 s)"
 
 
 def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) -> str:

@@ -79,7 +79,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start, _course: Start) ->
     if not isinstance(same, bool):
         return [f"same: True or False is asked for; got {kind(same)}"]
     remarks = _memory(answer)
-    shorts = [(name, short_float(each)) for name, each in zip(_COUNT, copies, strict=True)]
+    shorts = [(name, short_float(end_copy)) for name, end_copy in zip(_COUNT, copies, strict=True)]
     remarks += [
         (
             f"{name} is {short}, which forgets digits: qpos is float64, and every bit counts "
@@ -88,14 +88,14 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start, _course: Start) ->
         for name, short in [pair for pair in shorts if pair[1]][:1]
     ]
     ends = [
-        numbers(each, (world.model.nq,), f"{name}, qpos at the end")
-        for name, each in zip(_COUNT, copies, strict=True)
+        numbers(end_copy, (world.model.nq,), f"{name}, qpos at the end")
+        for name, end_copy in zip(_COUNT, copies, strict=True)
     ]
     remarks += _runs(answer.runs, world, right)
     if remarks:
         return remarks
-    one, two = answer.runs
-    apart = float(abs(one.end.qpos - two.end.qpos).max())
+    first, second = answer.runs
+    apart = float(abs(first.end.qpos - second.end.qpos).max())
     if apart and world.nudge is None:
         return [
             (
@@ -103,7 +103,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start, _course: Start) ->
                 "of the first was left over. sm.reset clears all, or use a new Data"
             )
         ]
-    if bool(same) != same_bits(one.end.qpos, two.end.qpos):
+    if bool(same) != same_bits(first.end.qpos, second.end.qpos):
         unlike = (
             f"the two runs ended {apart:.1e} apart and you call them equal: nearly is not "
             "equal. np.array_equal compares every bit; np.allclose, round, or a comparison "
@@ -111,7 +111,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start, _course: Start) ->
         )
         alike = "both runs ended in the same bits and you call them different"
         return [unlike if same else alike]
-    if remarks := _ends(ends, (one, two)):
+    if remarks := _ends(ends, (first, second)):
         return remarks
     return f"two runs of {nstep} steps end in the same bits"
 
@@ -179,7 +179,7 @@ def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str
         "qpos": float(abs(run.start.qpos - start.qpos).max()),
         "qvel": float(abs(run.start.qvel - start.qvel).max()),
     }
-    name = max(gaps, key=lambda each: gaps[each])
+    name = max(gaps, key=lambda array: gaps[array])
     moved = run.start.qpos[abs(run.start.qpos - start.qpos) > _START]
     elsewhere = not (gaps["qpos"] <= _START and gaps["qvel"] <= _START)
     misplaced = bool(elsewhere and moved.size and np.isin(moved, ctrl).all())

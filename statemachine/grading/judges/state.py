@@ -59,7 +59,11 @@ def judge(
     remarks += _clock(time, right.time, course.time, world.model, bool(answer.runs))
     if remarks:
         return remarks
-    frees = [name for name, (one, two) in right.slots.items() if one[1] - one[0] != two[1] - two[0]]
+    frees = [
+        name
+        for name, (positions, velocities) in right.slots.items()
+        if positions[1] - positions[0] != velocities[1] - velocities[0]
+    ]
     return f"all {len(right.slots)} joints, {', '.join(frees)} with 7 and 6 numbers"
 
 
@@ -88,7 +92,7 @@ def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> 
             continue
         pair = parts(slots[name], 2, f"{name}: (slice of qpos, slice of qvel)")
         totals = (model.nq, model.nv)
-        given = [_slot(each, name, total) for each, total in zip(pair, totals, strict=True)]
+        given = [_slot(value, name, total) for value, total in zip(pair, totals, strict=True)]
         for which, array in enumerate(("qpos", "qvel")):
             if given[which] != right[which]:
                 start, stop = given[which]

@@ -31,12 +31,12 @@ Instead = Callable[..., Any]
 
 def _adapters() -> list[ModuleType]:
     """The modules of the backends whose engine is here."""
-    found = []
+    adapters = []
     for name in rooms_with("backend"):
         with suppress(MissingEngineError):
             require(name)
-            found.append(room(name).backend())
-    return found
+            adapters.append(room(name).backend())
+    return adapters
 
 
 def reading(name: str) -> Callable[[Callable[[Data, Array], Array]], Fault]:
@@ -102,12 +102,12 @@ def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Fa
 
     def looking(data: Data, right: Callable[[], None]) -> None:
         arrays = [getattr(data, name) for name in INPUTS]
-        kept = [array.copy() for array in arrays]
+        before = [array.copy() for array in arrays]
         into(data)
         try:
             right()
         finally:
-            for array, values in zip(arrays, kept, strict=True):
+            for array, values in zip(arrays, before, strict=True):
                 array[:] = values
 
     def fault(patch: Patcher) -> None:

@@ -265,10 +265,10 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> _Record:
     failures: dict[str, str] = {}
     for line in content(record, _RECORD_MOST).splitlines():
         try:
-            found = json.loads(line)
+            facts = json.loads(line)
         except (ValueError, RecursionError):
-            found = None
-        match found:
+            facts = None
+        match facts:
             case {"ready": True}:
                 pass
             case {"tests": [*names]} if all(isinstance(name, str) for name in names):
@@ -293,8 +293,8 @@ def _said(text: str, file: str) -> str:
     """The error in one of pytest's reports, in one line, with the last line of the file there."""
     last = _CHAINED.split(text)[-1]
     lines = re.findall(rf'{re.escape(file)}(?::|"?, line )(\d+)', last)
-    found = [match for pattern in _ERRORS for match in re.findall(pattern, last, re.MULTILINE)]
-    words = re.sub(r"^(?:AssertionError: |Failed: |(?:\w+\.)+(?=\w+:))", "", [*found, ""][0])
+    errors = [match for pattern in _ERRORS for match in re.findall(pattern, last, re.MULTILINE)]
+    words = re.sub(r"^(?:AssertionError: |Failed: |(?:\w+\.)+(?=\w+:))", "", [*errors, ""][0])
     if re.fullmatch(r"fixture '.*' not found", words):
         words += "; this command gives model, data and backend"
     return (f"line {lines[-1]}: " if lines else "") + words[:_LONGEST]
