@@ -418,7 +418,7 @@ def test_forward_computes_what_it_shows(asked: tuple[str, ...], backend: str) ->
 
 
 def test_what_a_lesson_shows_when_it_is_asked_for_all() -> None:
-    assert LESSONS["forward"].whole == {"arrays": True, "lag": True}
+    assert LESSONS["forward"].all_shown == {"arrays": True, "lag": True}
     assert LESSONS["time"].whole == {}
 
 

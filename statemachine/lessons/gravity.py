@@ -328,8 +328,9 @@ def _apart(runs: str, touched: bool | None, left: Gravity, right: Gravity) -> st
     touches = [time for run in pair for time in run.touches.values()]
     first = round(min(touches) / timestep) if touches else steps
     rows = {None: slice(None), False: slice(first + 1), True: slice(first, None)}[touched]
-    paths = [run.path[rows, None] for run in pair]
-    return largest_gap(*paths, [left.slide], [""], (np.arange(steps) * timestep)[rows])
+    time = np.arange(steps) * timestep
+    paths = pair[0].path[rows, None], pair[1].path[rows, None]
+    return largest_gap(*paths, [left.slide], [""], time[rows])
 
 
 def _ends_apart(label: str, left: Gravity, right: Gravity) -> str:
