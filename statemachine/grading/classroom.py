@@ -5,9 +5,9 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 
 from ..errors import BadInputError, StateMachineError
@@ -236,7 +236,7 @@ def judge_all(
     jobs = checked_jobs(jobs, processors=2)
     before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
-    in_order = _compared(submitted)
+    compared = _compared(submitted)
     own = {submission.path: submission.own for submission in submitted if submission.path}
     with ExerciseJudge(backend, time_limit, own=own) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
@@ -246,18 +246,27 @@ def judge_all(
             content = digest(submission.own)
             entry = ClassEntry(submission.name, content, (), submission.refusal, made_with)
             known = before.get((content, made_with), entry)
-            if known.judged:
-                entry = entries[submission.name] = replace(known, name=submission.name)
             file = submission.named(_PREDICTIONS)
+            same_as, alike = compared[submission.name]
             entry = replace(
-                entry, student=submission.student, predictions=score(file) if file else ""
+                known if known.judged else entry,
+                name=submission.name,
+                same_as=same_as,
+                alike=alike,
+                student=submission.student,
+                predictions=score(file) if file else "",
             )
+            if known.judged:
+                entries[submission.name] = entry
             work[submission.name] = partial(_entry, judge, submission, entry, tests)
+
+        def in_order() -> list[ClassEntry]:
+            return [entries[name] for name in work if name in entries]
 
         def ended(name: str, entry: ClassEntry) -> None:
             entries[name] = entry
             if table is not None:
-                replace_csv(table, rows_of(in_order(entries)))
+                replace_csv(table, rows_of(in_order()))
 
         in_parallel(
             work,
@@ -266,10 +275,9 @@ def judge_all(
             stop=judge.stop.set,
             progress=lambda waiting: progress(1 - waiting / len(submitted)),
         )
-    done = in_order(entries)
     if table is not None:
-        replace_csv(table, rows_of(done))
-    return done
+        replace_csv(table, rows_of(in_order()))
+    return in_order()
 
 
 def _entry(
@@ -299,29 +307,15 @@ def _caught(file: Path, backend: str) -> str:
     return f"{examination.caught} of {len(examination.trials)}" + f"; not {missed}" * bool(missed)
 
 
-def _compared(
-    submitted: Sequence[Submission],
-) -> Callable[[Mapping[str, ClassEntry]], list[ClassEntry]]:
-    """Puts entries in the order of the submissions, each with those that are like it.
-
-    Each pair is compared once, though a table asks often.
-    """
-    code, shape = cache(code_of), cache(shape_of)
-    alike = cache(lambda left, right: likeness(shape(left), shape(right)))
-
-    def in_order(entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
-        done = []
-        first: dict[str, str] = {}
-        for submission in (submission for submission in submitted if submission.name in entries):
-            entry, same = entries[submission.name], ""
-            if any(judged.written for judged in entry.functions) and code(submission.path):
-                same = first.setdefault(code(submission.path), submission.name)
-            others = [
-                (alike(submission.path, o.path), o.name) for o in submitted if o is not submission
-            ]
-            part, name = max(others, key=lambda other: other[0], default=(0.0, ""))
-            same = "" if same == submission.name else same
-            done.append(replace(entry, same_as=same, alike=f"{part:.0%} {name}" if part else ""))
-        return done
-
-    return in_order
+def _compared(submitted: Sequence[Submission]) -> dict[str, tuple[str, str]]:
+    """For each submission the first whose code is the same, and the one that is most like it."""
+    shapes = {submission.name: shape_of(submission.path) for submission in submitted}
+    first: dict[str, str] = {}
+    compared = {}
+    for submission in submitted:
+        own, shape = submission.name, shapes[submission.name]
+        same = first.setdefault(code_of(submission.path), own) if shape else own
+        others = [(likeness(shape, shapes[name]), name) for name in shapes if name != own]
+        part, name = max(others, key=lambda other: other[0], default=(0.0, ""))
+        compared[own] = "" if same == own else same, f"{part:.0%} {name}" if part else ""
+    return compared
