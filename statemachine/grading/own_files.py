@@ -21,15 +21,15 @@ _COMPILED = re.compile(rb"\b(?:%s)\b" % _NAMES)
 def has_functions(file: Path) -> bool:
     """Whether a file defines a function of the exercise, or is compiled from one that does."""
     pattern = _COMPILED if file.suffix == ".pyc" else _DEFINES
-    return pattern.search(_start(file)) is not None
+    return pattern.search(start_of(file)) is not None
 
 
 def has_solutions(file: Path) -> bool:
     """Whether any of the functions in a file may be written."""
-    return has_functions(file) and _start(file).count(b"NotImplementedError(") < len(JUDGES)
+    return has_functions(file) and start_of(file).count(b"NotImplementedError(") < len(JUDGES)
 
 
-def _start(file: Path) -> bytes:
+def start_of(file: Path) -> bytes:
     """As much of a file as is looked at; a pipe would wait for somebody to write."""
     return content(Path(os.path.realpath(file)), LARGEST + 1)
 
@@ -56,7 +56,7 @@ def named_by(file: Path) -> dict[str, Path]:
     own, waiting = {file.name: file}, [file]
     beside = [entry for entry in file.parent.iterdir() if not entry.name.startswith(".")]
     while waiting:
-        words = set(re.findall(r"\w+", _start(waiting.pop()).decode("utf-8", "replace")))
+        words = set(re.findall(r"\w+", start_of(waiting.pop()).decode("utf-8", "replace")))
         for entry in (entry for entry in beside if entry.stem in words):
             package = in_folder(entry) if (entry / "__init__.py").is_file() else {}
             files = {f"{entry.name}/{name}": inside for name, inside in package.items()}
@@ -72,7 +72,7 @@ def digest(files: Mapping[str, Path]) -> str:
     """Of names and contents; "" where there is none, or one is too large to be judged."""
     sha = hashlib.sha256()
     for name, file in files.items():
-        text, start = os.fsencode(name), _start(file)
+        text, start = os.fsencode(name), start_of(file)
         if len(start) > LARGEST:
             return ""
         sha.update(b"%d %d " % (len(text), len(start)) + text + start)

@@ -9,6 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 from .judges import JUDGES
+from .own_files import LARGEST, start_of
 
 _RUN = 4  # kinds of syntax in a row that are compared
 
@@ -47,13 +48,14 @@ def likeness(left: Counter[tuple[str, ...]], right: Counter[tuple[str, ...]]) ->
 
 
 def _tree(path: Path | None) -> ast.Module:
-    """A file's syntax without docstrings; empty where there is none."""
+    """A file's syntax without docstrings; empty where there is none, or it is too large."""
+    text = start_of(path) if path is not None else b""
     try:
-        tree = ast.parse(path.read_bytes() if path is not None else b"")
+        tree = ast.parse(text if len(text) <= LARGEST else b"")
         for node in ast.walk(tree):
             if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)):
-                text = ast.get_docstring(node, clean=False) is not None
-                node.body = (node.body[1:] or [ast.Pass()]) if text else node.body
-    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
+                documented = ast.get_docstring(node, clean=False) is not None
+                node.body = (node.body[1:] or [ast.Pass()]) if documented else node.body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
         return ast.Module([], [])
     return tree

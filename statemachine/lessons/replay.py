@@ -201,7 +201,7 @@ def slots(result: Replay) -> dict[str, Any]:
     return {
         "steps": count(steps, "step"),
         "right": course if result.broken_by else 0 if result.identical else None,
-        "start": f'keyframe 0, "{result.keyframe}"' if result.keyframe else "the default state",
+        "start": f'the keyframe "{result.keyframe}"' if result.keyframe else "the default state",
         "peak": f"{peak:.1e}",
         "peak_step": row,
         "end": f"{end:.1e}",
