@@ -105,8 +105,10 @@ def run(options: argparse.Namespace) -> int:
 
     folder = any(Path(file).is_dir() for file in options.files)
     table = options.csv or options.roster or options.tests or options.jobs is not None
-    one = options.gradescope or (folder and not table and is_one_students(Path(options.files[0])))
-    several = len(options.files) > 1 or (folder and not one)
+    single = options.gradescope or (
+        folder and not table and is_one_students(Path(options.files[0]))
+    )
+    several = len(options.files) > 1 or (folder and not single)
     if (options.mutants is not None or several) and options.gradescope:
         options.parser.error("--gradescope goes with one FILE, or one FOLDER")
     if not several and table and all(Path(file).exists() for file in options.files):
@@ -128,8 +130,8 @@ def _mutants(options: argparse.Namespace) -> int:
     from ..report.progress import progress
 
     with progress("mutants") as report:
-        found = examine(options.mutants, options.backend, options.only, progress=report)
-    return show(mutants.page(found), found, options.json)
+        examination = examine(options.mutants, options.backend, options.only, progress=report)
+    return show(mutants.page(examination), examination, options.json)
 
 
 def _one(options: argparse.Namespace) -> int:
@@ -168,12 +170,12 @@ def _class(options: argparse.Namespace) -> int:
     from ..report import classroom as words
     from ..report.progress import progress
 
-    found = classroom.submissions(options.files)
+    submitted = classroom.submissions(options.files)
     if options.roster:
-        found = classroom.enrolled(found, options.roster)
-    with resumable(options.csv, "judged"), progress(f"{len(found)} files") as report:
+        submitted = classroom.enrolled(submitted, options.roster)
+    with resumable(options.csv, "judged"), progress(f"{len(submitted)} files") as report:
         entries = classroom.judge_all(
-            found,
+            submitted,
             options.backend,
             time_limit=options.time_limit,
             jobs=options.jobs,

@@ -250,13 +250,13 @@ def _compute(
     if model == lesson.model and values == lesson.defaults:
         page = with_picture(page, lesson.name)
     if not options.calls:
-        return page, {name: each.result for name, each in taken.items()}
+        return page, {name: run.result for name, run in taken.items()}
     from ..report import calls
 
     recordings = {name: t.calls for name, t in taken.items() if t.calls and t.calls.statements}
     if recordings:
         page = replace(page, blocks=[*page.blocks, *calls.blocks(recordings)])
-    for name in [name for name, each in taken.items() if each.calls is None]:
+    for name in [name for name, run in taken.items() if run.calls is None]:
         page = replace(page, blocks=[*page.blocks, calls.not_asked(name)])
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 

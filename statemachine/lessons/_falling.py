@@ -172,9 +172,6 @@ def droop(
 
 def milestones(seconds: float) -> list[float]:
     """Times worth a row of a table: 0, 1, 2, 3, 4, 10, 20, 30, 50, 100 …, and the end."""
-    marks: list[float] = [0.0, 1.0, 2.0, 3.0, 4.0]
-    decade = 10.0
-    while decade <= seconds:
-        marks += [decade, 2 * decade, 3 * decade, 5 * decade]
-        decade *= 10
+    later = (part * 10.0**decade for decade in range(1, 8) for part in (1, 2, 3, 5))
+    marks = (0.0, 1.0, 2.0, 3.0, 4.0, *later)
     return [mark for mark in marks if mark < seconds * (1 - 1e-9)] + [seconds]

@@ -185,9 +185,8 @@ def slots(result: Forward) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Forward]) -> dict[str, Any]:
+def tables(results: Mapping[str, Forward], first: Forward) -> dict[str, Any]:
     """The four readings; then what was asked for."""
-    first = next(iter(results.values()))
     digits = 3 if len(results) > 1 else 4  # so that two columns fit
     readings = Table(
         ("", "after", *(f"{name} [m]" for name in results), "data.time"),

@@ -212,9 +212,8 @@ def _own_motors(result: Gravity) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Gravity]) -> dict[str, Any]:
+def tables(results: Mapping[str, Gravity], first: Gravity) -> dict[str, Any]:
     """The course of the joint, the balance of forces at its end, and the longer runs."""
-    first = next(iter(results.values()))
     runs = {
         f"{where(results, name)}{state}": run
         for name, result in results.items()

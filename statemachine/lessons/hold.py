@@ -166,9 +166,8 @@ def _farthest(result: Hold, gaps: Array) -> str:
     return f"{result.joints[joint]}, by {position(gap, result.slides[joint])}"
 
 
-def tables(results: Mapping[str, Hold]) -> dict[str, Any]:
+def tables(results: Mapping[str, Hold], first: Hold) -> dict[str, Any]:
     """The worst joint over time, the pose at the end, and the way of each joint."""
-    first = next(iter(results.values()))
     end = float(first.time[-1])
     clipped = not np.array_equal(first.target, first.goal)
 

@@ -152,7 +152,7 @@ def slots(result: Objects) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Objects]) -> dict[str, Any]:
+def tables(results: Mapping[str, Objects], _first: Objects) -> dict[str, Any]:
     """What each part costs."""
     costs = {
         "load: the file, once": lambda r: duration(r.loading),

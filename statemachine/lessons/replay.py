@@ -213,9 +213,8 @@ def slots(result: Replay) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Replay]) -> dict[str, Any]:
+def tables(results: Mapping[str, Replay], first: Replay) -> dict[str, Any]:
     """Equal or not, what touched on the way, and the ways back."""
-    first = next(iter(results.values()))
     gaps = {name: result.difference for name, result in results.items()}
     bodies = {name: result.apart for name, result in results.items()}
     outcome = {

@@ -114,12 +114,10 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
     _, data = play.worlds[0]
     scenes = []
     for key in range(len(model.keyframes)):
-        if key > 0:  # the code went to the first
-            reset(model, data, keyframe=key)
+        reset(model, data, keyframe=key)
         scenes.append(_scene(model, data, key))
         progress((key + 1) / len(model.keyframes))
-    if scenes:
-        reset(model, data)
+    reset(model, data)
     with make_data(model) as fresh:
         step(model, data, _STEPS)
         step(model, fresh, _STEPS)
@@ -197,9 +195,8 @@ def slots(result: Reset) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Reset]) -> dict[str, Any]:
+def tables(results: Mapping[str, Reset], first: Reset) -> dict[str, Any]:
     """What each keyframe shows, and what becomes of it."""
-    first = next(iter(results.values()))
     rises = {
         f"rise of the {scene.body}, {scene.name}": partial(_rise, k)
         for k, scene in enumerate(first.scenes)

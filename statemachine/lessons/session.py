@@ -226,10 +226,11 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
     lesson_module = module(lesson.name)
     results = {name: run.result for name, run in taken.items()}
     slots = {name: vars(result) | lesson_module.slots(result) for name, result in results.items()}
+    has_tables = hasattr(lesson_module, "tables")
     blocks = {
         "code": Code(code.splitlines()),
         "printed": Printed({name: run.printed for name, run in taken.items()}),
-        **(lesson_module.tables(results) if hasattr(lesson_module, "tables") else {}),
+        **(lesson_module.tables(results, results[first]) if has_tables else {}),
     }
     page = template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
     asked = f": {lesson.question}" if taken[first].arm else ""  # which is about the arm

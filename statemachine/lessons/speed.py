@@ -145,7 +145,7 @@ def slots(result: Speed) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Speed]) -> dict[str, Any]:
+def tables(results: Mapping[str, Speed], _first: Speed) -> dict[str, Any]:
     """Times and factors; they are this machine's, now."""
     times: dict[str, Callable[[Speed], str]] = {
         "in bulk": lambda r: _cell(r, r.bulk),

@@ -113,9 +113,8 @@ def slots(result: Layout) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Layout]) -> dict[str, Any]:
+def tables(results: Mapping[str, Layout], first: Layout) -> dict[str, Any]:
     """Sizes, and who owns which slots; engines that say the same share a table."""
-    first = next(iter(results.values()))
     sizes = [
         (name, *(str(getattr(layout, size)) for size in _SIZES)) for name, layout in results.items()
     ]

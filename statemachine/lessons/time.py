@@ -171,9 +171,8 @@ def slots(result: Pace) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Pace]) -> dict[str, Any]:
+def tables(results: Mapping[str, Pace], first: Pace) -> dict[str, Any]:
     """Both loops by the clock."""
-    first = next(iter(results.values()))
     rows = {
         "not waiting": lambda r: f"{duration(r.free)}, {r.factor:.3g} × real time",
         "paced": lambda r: f"{r.paced:.3f} s, {r.paced_factor:.3g} × real time",

@@ -218,7 +218,7 @@ def slots(result: WorldsSpeed) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, WorldsSpeed]) -> dict[str, Any]:
+def tables(results: Mapping[str, WorldsSpeed], _first: WorldsSpeed) -> dict[str, Any]:
     """What is made once, what each world costs, and how that goes with their number."""
     made = {
         "load a model": lambda r: duration(r.load),

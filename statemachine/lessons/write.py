@@ -168,9 +168,8 @@ def slots(result: Write) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Write]) -> dict[str, Any]:
+def tables(results: Mapping[str, Write], first: Write) -> dict[str, Any]:
     """What is refused."""
-    first = next(iter(results.values()))
     words = frozenset({0, 1})
     return {
         "refused": Table(("you type", "and read"), first.refused, "What is refused", words=words)
