@@ -48,16 +48,14 @@ def page(
     Args:
         name: Of the template.
         results: What was found, by engine.
-        slots: What its slots take, by engine; that of the engine's name is true, too.
+        slots: What its slots take, by engine; those of the engines' own names are true, too.
         blocks: What stands alone, by name.
         prose: Whether to keep texts and questions, which are about the arm.
     """
     template = text_of(__package__ or "", name)
     alone = {key: f"{{{key}}}" for key in blocks}
-    texts = {
-        engine: filled(template, dict.fromkeys(ENGINES, False) | {engine: True} | values | alone)
-        for engine, values in slots.items()
-    }
+    shown = {engine: engine in slots for engine in ENGINES}
+    texts = {engine: filled(template, shown | values | alone) for engine, values in slots.items()}
     title, page_blocks = "", list[Block]()
     for number in sorted(set().union(*texts.values())):
         engines: dict[str, list[str]] = {}
