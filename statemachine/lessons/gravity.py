@@ -327,7 +327,7 @@ def _apart(runs: str, touched: bool | None, left: Gravity, right: Gravity) -> st
     touches = [time for run in pair for time in run.touches.values()]
     first = round(min(touches) / timestep) if touches else steps
     rows = {None: slice(None), False: slice(first + 1), True: slice(first, None)}[touched]
-    time = np.arange(steps) * timestep
+    time = np.arange(steps, dtype=np.float64) * timestep
     paths = pair[0].path[rows, None], pair[1].path[rows, None]
     return largest_gap(*paths, [left.slide], [""], time[rows])
 
