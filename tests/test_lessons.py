@@ -419,8 +419,8 @@ def test_forward_computes_what_it_shows(asked: tuple[str, ...], backend: str) ->
 
 
 def test_what_a_lesson_shows_when_it_is_asked_for_all() -> None:
-    assert LESSONS["forward"].all_shown == {"arrays": True, "lag": True}
-    assert LESSONS["time"].all_shown == {}
+    assert LESSONS["forward"].more == ("arrays", "lag")
+    assert LESSONS["time"].more == ()
 
 
 def test_of_which_moment_a_step_leaves_what(backend: str) -> None:

@@ -129,7 +129,18 @@ def flag_of(name: str) -> str:
 # What an option is: its flags, its metavar, its help, and what else argparse is told.
 Row = tuple[Any, ...]
 REPEATED = {"action": "append", "default": []}
-_TYPES = {"N": int, "S": float}  # of what has this metavar
+
+
+def _numbers(text: str) -> list[float]:
+    """Numbers of a list like 0,-0.6,1.2, as an option's type."""
+    try:
+        return [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 0,-0.6") from None
+
+
+# By the metavar.
+_TYPES: dict[str | None, Any] = {"N": int, "S": float, "X": float, "X,X,…": _numbers}
 
 
 def file_name(text: str) -> Path:

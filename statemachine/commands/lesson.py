@@ -66,30 +66,10 @@ def _shared() -> Iterator[Row]:
 def _add_lesson(named: Any, lesson: Lesson) -> None:
     parser = named.add_parser(lesson.name, help=lesson.question, description=lesson.question)
     rows: list[Row] = [(*row, {"default": argparse.SUPPRESS}) for row in _shared()]
-    for option in lesson.options:
-        if option.kind is bool:
-            rows.append((option.flag, "", option.help, {"dest": option.key}))
-            continue
-        metavar = None if option.choices else "X,X,…" if option.many else option.key.upper()
-        default = "" if option.default is None else f" (default {option.default})"
-        more = {
-            "dest": option.key,
-            "default": option.default,
-            "type": _numbers if option.many else option.kind,
-            "choices": option.choices,
-        }
-        rows.append((option.flag, metavar, option.help + default, more))
+    rows += lesson.options
     rows.append(("--plot", "FILE", "write its pictures: .svg, .png or .pdf"))
     add_table(parser, *rows, model_of(lesson.model))
     parser.set_defaults(run=run, lesson=lesson)
-
-
-def _numbers(text: str) -> list[float]:
-    """Numbers of a list like 0,-0.6,1.2."""
-    try:
-        return [float(part) for part in text.replace(",", " ").split()]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 0,-0.6") from None
 
 
 _OVERVIEW = f"""\
@@ -124,7 +104,7 @@ def run(options: argparse.Namespace) -> int:
             f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}",
         ),
     )
-    values = {option.key: getattr(options, option.key) for option in lesson.options}
+    values = {key: getattr(options, key) for key in lesson.defaults}
     reader = _reader(options, lesson)
     if options.plot is not None:
         from ..report.figures import check_suffix
@@ -237,7 +217,7 @@ def _compute(
     from ..lessons.session import page_of_lesson, take
 
     if options.json:
-        values |= lesson.all_shown
+        values |= dict.fromkeys(lesson.more, True)
     taken = on_each_backend(
         options,
         lesson.name,

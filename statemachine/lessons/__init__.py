@@ -17,53 +17,38 @@ import importlib
 from dataclasses import dataclass
 from typing import Any
 
-
-@dataclass(frozen=True)
-class Option:
-    """An option of a lesson: a flag of the command line, a key of `options`.
-
-    Attributes:
-        more: Whether it shows more of the lesson; JSON and documentation show all.
-    """
-
-    flag: str
-    default: Any
-    help: str
-    kind: type = str
-    choices: tuple[str, ...] | None = None
-    many: bool = False
-    more: bool = False
-
-    @property
-    def key(self) -> str:
-        """Its key in `options`."""
-        return self.flag.removeprefix("--").replace("-", "_")
+# What an option is: its flag, its metavar ("" for a switch), its help, what else argparse is told.
+Row = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """An entry of the table of lessons; `on_path`: whether the guided path has it."""
+    """An entry of the table of lessons.
+
+    Attributes:
+        more: Switches that show more of it; JSON and documentation show all.
+        on_path: Whether the guided path has it.
+    """
 
     name: str
     question: str
     model: str
-    options: tuple[Option, ...] = ()
+    options: tuple[Row, ...] = ()
+    more: tuple[str, ...] = ()
     on_path: bool = True
 
     @property
     def defaults(self) -> dict[str, Any]:
         """Its options where nobody sets one."""
-        return {option.key: option.default for option in self.options}
-
-    @property
-    def all_shown(self) -> dict[str, Any]:
-        """The options that show all of it."""
-        return {option.key: True for option in self.options if option.more}
+        return {
+            flag.removeprefix("--"): dict(*more).get("default", False if metavar == "" else None)
+            for flag, metavar, _, *more in self.options
+        }
 
 
 # What depends on the robot has no default here: `fit` of the lesson's module gives it one.
-_JOINT = Option("--joint", None, "joint to write (default shoulder_lift, if there is one)")
-_VALUE = Option("--value", None, "what to write [rad or m] (default 0.8, if in range)", float)
+_JOINT = ("--joint", "JOINT", "joint to write (default shoulder_lift, if there is one)")
+_VALUE = ("--value", "X", "what to write [rad or m] (default 0.8, if in range)")
 
 # The lessons of the path, in order, and those beside it.
 LESSONS = {
@@ -73,7 +58,7 @@ LESSONS = {
             "objects",
             "What never changes, and what does?",
             "so101/scene",
-            (Option("--worlds", 10, "how many Data of one Model", int),),
+            (("--worlds", "N", "how many Data of one Model (default 10)", {"default": 10}),),
         ),
         Lesson(
             "state",
@@ -93,19 +78,20 @@ LESSONS = {
             (
                 _JOINT,
                 _VALUE,
-                Option("--site", None, "the fingertip (default gripperframe, or the last site)"),
-                Option("--arrays", False, "show which arrays each call changes", bool, more=True),
-                Option("--lag", False, "show how far behind a step leaves it", bool, more=True),
-                Option("--seconds", None, "simulated time of --lag (default 2)", float),
+                ("--site", "SITE", "the fingertip (default gripperframe, or the last site)"),
+                ("--arrays", "", "show which arrays each call changes"),
+                ("--lag", "", "show how far behind a step leaves it"),
+                ("--seconds", "S", "simulated time of --lag (default 2)"),
             ),
+            more=("arrays", "lag"),
         ),
         Lesson(
             "hold",
             "Six numbers in: how does the arm follow?",
             "so101/scene",
             (
-                Option("--seconds", 2.0, "simulated time", float),
-                Option("--target", None, "command, one number an actuator", float, many=True),
+                ("--seconds", "S", "simulated time (default 2)", {"default": 2.0}),
+                ("--target", "X,X,…", "command, one number an actuator"),
             ),
         ),
         Lesson(
@@ -113,15 +99,13 @@ LESSONS = {
             "You never wrote ctrl. Who holds the arm up?",
             "so101/scene",
             (
-                Option("--seconds", None, "simulated time (default 4)", float),
-                Option(
+                ("--seconds", "S", "simulated time (default 4)"),
+                (
                     "--joint",
-                    None,
+                    "JOINT",
                     "joint to watch, with a servo (default shoulder_lift, or that with most load)",
                 ),
-                Option(
-                    "--longer", None, "simulated time of the fall; 0 for none (default 100)", float
-                ),
+                ("--longer", "S", "simulated time of the fall; 0 for none (default 100)"),
             ),
         ),
         Lesson(
@@ -134,13 +118,13 @@ LESSONS = {
             "Same start, same commands: the same bits?",
             "so101/scene_box",
             (
-                Option("--steps", 600, "steps of each run", int),
-                Option("--ctrl", None, "command, one number an actuator", float, many=True),
-                Option(
+                ("--steps", "N", "steps of each run (default 600)", {"default": 600}),
+                ("--ctrl", "X,X,…", "command, one number an actuator"),
+                (
                     "--break",
                     None,
                     "make the second run differ",
-                    choices=("extra-step", "late-ctrl"),
+                    {"choices": ("extra-step", "late-ctrl")},
                 ),
             ),
         ),
@@ -149,21 +133,21 @@ LESSONS = {
             "What time is it in a simulator?",
             "so101/scene",
             (
-                Option("--realtime", False, "wait for the clock", bool),
-                Option("--seconds", None, "simulated time with --realtime (default 4)", float),
+                ("--realtime", "", "wait for the clock"),
+                ("--seconds", "S", "simulated time with --realtime (default 4)"),
             ),
         ),
         Lesson(
             "speed",
             "What does one second of your machine buy?",
             "so101/scene_box",
-            (Option("--steps", 4000, "steps of each run", int),),
+            (("--steps", "N", "steps of each run (default 4000)", {"default": 4000}),),
         ),
         Lesson(
             "worlds",
             "Many worlds: what does a shared Model save?",
             "so101/scene_box",
-            (Option("--most", 4096, "the largest number of worlds", int),),
+            (("--most", "N", "the largest number of worlds (default 4096)", {"default": 4096}),),
             on_path=False,
         ),
         Lesson("questions", "Check yourself: six questions.", "so101/scene_box", on_path=False),

@@ -94,7 +94,7 @@ def lesson(name: str, backend: str = DEFAULT, prediction: str = "", **options: A
         BadInputError: A prediction is no letter of its question.
     """
     check_name("lesson", name, LESSONS)
-    known = [option.key for option in LESSONS[name].options]
+    known = LESSONS[name].defaults
     for key in options:
         check_name("option", key, known)
     page = _page(LESSONS[name], backend, options)

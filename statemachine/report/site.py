@@ -52,7 +52,7 @@ def make_path(
                 if backends:
                     raise
                 continue
-            taken[backend] = take(lesson, model, backend, lesson.all_shown)
+            taken[backend] = take(lesson, model, backend, dict.fromkeys(lesson.more, True))
         page = with_picture(page_of_lesson(lesson, taken), lesson.name)
         name, typed = f"{number:02}-{lesson.name}", f"statemachine lesson {lesson.name}"
         written.append(_write(folder, name, page, lesson.question, typed))
