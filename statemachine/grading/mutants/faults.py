@@ -39,34 +39,28 @@ def _adapters() -> list[ModuleType]:
     return adapters
 
 
-def reading(name: str) -> Callable[[Callable[[Data, Array], Array]], Fault]:
+def reading(name: str, function: Callable[[Data, Array], Array]) -> Fault:
     """A fault in a derived array as it is read."""
 
-    def decorate(function: Callable[[Data, Array], Array]) -> Fault:
-        def fault(patch: Patcher) -> None:
-            right = vars(Data)[name].fget
-            patch.setattr(Data, name, property(lambda data: read_only(function(data, right(data)))))
+    def fault(patch: Patcher) -> None:
+        right = vars(Data)[name].fget
+        patch.setattr(Data, name, property(lambda data: read_only(function(data, right(data)))))
 
-        return fault
-
-    return decorate
+    return fault
 
 
-def hook(name: str) -> Callable[[Instead], Fault]:
+def hook(name: str, instead: Instead) -> Fault:
     """A fault in what the backends do for a verb."""
 
-    def decorate(instead: Instead) -> Fault:
-        def replacement(right: Callable[..., Any]) -> Callable[..., Any]:
-            return lambda data, *arguments: instead(data, partial(right, data), *arguments)
+    def replacement(right: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda data, *arguments: instead(data, partial(right, data), *arguments)
 
-        def fault(patch: Patcher) -> None:
-            _adapters()  # they define the kinds of Data
-            for kind in Data.__subclasses__():
-                patch.setattr(kind, name, replacement(vars(kind)[name]))
+    def fault(patch: Patcher) -> None:
+        _adapters()  # they define the kinds of Data
+        for kind in Data.__subclasses__():
+            patch.setattr(kind, name, replacement(vars(kind)[name]))
 
-        return fault
-
-    return decorate
+    return fault
 
 
 def advancing(instead: Instead) -> Fault:
@@ -112,7 +106,7 @@ def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Fa
 
     def fault(patch: Patcher) -> None:
         advancing(stepping)(patch)
-        hook("_recompute")(looking)(patch)
+        hook("_recompute", looking)(patch)
 
     return fault
 
@@ -166,31 +160,31 @@ def scaled(factor: float, *arrays: Callable[[Any], Array]) -> Fault:
     return compiled(partial(scale, by=factor), partial(scale, by=1 / factor))
 
 
-@reading("xquat")
+@partial(reading, "xquat")
 def xyzw(_data: Data, right: Array) -> Array:
     """The order of another engine."""
     return xyzw_from_wxyz(right)
 
 
-@reading("xpos")
+@partial(reading, "xpos")
 def com_for_frame(data: Data, right: Array) -> Array:
     """The place that another engine reports for a link."""
     offsets = data.model.compiled.body_ipos
     return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), offsets)
 
 
-@hook("_recompute")
+@partial(hook, "_recompute")
 def no_forward(_data: Data, _right: Callable[[], None]) -> None:
     """Nobody does the arithmetic."""
 
 
-@hook("_recompute")
+@partial(hook, "_recompute")
 def forward_steps(data: Data, _right: Callable[[], None]) -> None:
     """Step, where nothing but the derived values should change."""
     data._advance(data._raw_model, data._raw)
 
 
-@hook("_reset")
+@partial(hook, "_reset")
 def reset_keeps_ctrl(data: Data, right: Callable[[int | None], None], key: int | None) -> None:
     """A default ctrl is a command too, and is forgotten."""
     ctrl = data.ctrl.copy()
