@@ -99,10 +99,9 @@ def run(
         UnknownNameError: There is no such backend.
         MissingEngineError: Its engine is not installed here.
     """
-    path = _python_file(Path(file))
-    own = {} if folder is None else {path: in_folder(folder)}
+    own = {} if folder is None else {Path(file): in_folder(folder)}
     with ExerciseJudge(backend, time_limit, wall_limit, own) as judge:
-        return judge.judge(path, progress)
+        return judge.judge(file, progress)
 
 
 class ExerciseJudge(ExitStack):
