@@ -18,9 +18,8 @@ from .calls import reason
 from .class_table import NOTHING, ClassEntry, read, rows_of
 from .exercise import TIME_LIMIT, ExerciseJudge
 from .mutants.run import examine
-from .own_files import digest, has_functions, in_folder
+from .own_files import code_of, digest, has_functions, in_folder, likeness, shape_of
 from .predictions import score
-from .similarity import code_of, likeness, shape_of
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
 _PREDICTIONS = "lesson.json"
