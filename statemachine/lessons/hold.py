@@ -125,16 +125,13 @@ def _freely(model: Model, ctrl: Array, steps: int, places: Ints) -> Array | None
     """Where the joints end if nothing can touch anything."""
     try:
         alone = model.replace(contacts=False)
-    except UnsupportedError:
-        return None
-    with make_data(alone) as data:
-        reset(alone, data, start_keyframe(model))
-        data.ctrl = ctrl
-        try:
+        with make_data(alone) as data:
+            reset(alone, data, start_keyframe(model))
+            data.ctrl = ctrl
             step(alone, data, steps)
-        except DivergedError:
-            return None
-        return data.qpos[places].copy()
+            return data.qpos[places].copy()
+    except (UnsupportedError, DivergedError):
+        return None
 
 
 def slots(result: Hold) -> dict[str, Any]:

@@ -89,21 +89,17 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
     """Look who notices the write; then go on with the Data that was written."""
     model, joint = play.model, options["joint"]
     at = coordinate(model, joint)
-    place, dof = at.place, at.dof
-    looks = [  # after the copy, the write and the print
+    before, after, _ = (  # after the copy, the write and the print
         read_derived(play.names["data"]) for _ in play.lines() if "copy" in play.names
-    ]
-    before, after, *_ = looks
+    )
     data, copy = play.names["data"], play.names["copy"]
-    view, in_engine = float(data.qpos[place]), _in_engine(data, place)
+    view, in_engine = float(data.qpos[at.place]), _in_engine(data, at.place)
     step(model, data)
     contacts = len(data.contacts)
     with make_data(model) as other:  # the same without the write
         step(model, other)
-        speed_change, contacts_without = (
-            float(data.qvel[dof] - other.qvel[dof]),
-            len(other.contacts),
-        )
+        speed_change = float(data.qvel[at.dof] - other.qvel[at.dof])
+        contacts_without = len(other.contacts)
     arrays, state = {name: getattr(data, name) for name in INPUTS}, get_state(model, data)
     same_arrays = True
     for call in (step, forward, reset, lambda model, data: set_state(model, data, state)):
@@ -113,10 +109,10 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
     return Write(
         joint=joint,
         slide=at.slide,
-        place=place,
+        place=at.place,
         value=options["value"],
         view=view,
-        copy=float(copy[place]),
+        copy=float(copy[at.place]),
         same_arrays=same_arrays,
         in_engine=in_engine,
         changed=tuple(name for name in before if before[name] != after[name]),
