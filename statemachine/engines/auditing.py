@@ -34,6 +34,17 @@ Restore = Callable[[Machine], object]
 Save = Callable[[Machine], AbstractContextManager[Restore]]
 
 
+def copied(take: Callable[[Machine], Any], give: Callable[[Machine, Any], object]) -> Save:
+    """A way to save that is a copy: `take` makes it, `give` puts it into a machine."""
+
+    @contextmanager
+    def save(machine: Machine) -> Iterator[Restore]:
+        copy = take(machine)
+        yield lambda other: give(other, copy)
+
+    return save
+
+
 @dataclass(frozen=True, eq=False)
 class SavePoint:
     """A save point: where a run starts, and how long it runs before it is saved.

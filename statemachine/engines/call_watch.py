@@ -160,15 +160,12 @@ def entries(field: str, before: bytes, after: bytes, size: int) -> str:
     return f"{field}[{first}]" if end == first + 1 else f"{field}[{first}:{end}]"
 
 
-def named(namespace: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def named(namespace: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Names and values, Models first; what is in a list, tuple or dict too."""
-    variables = []
+    variables: list[tuple[str, Any]] = []
     for name, value in namespace.items():
-        if name.startswith("__"):
-            continue
-        variables.append((name, value))
-        if isinstance(value, (list, tuple)):
-            variables += [(f"{name}[{i}]", item) for i, item in enumerate(value)]
-        elif isinstance(value, dict):
-            variables += [(f"{name}[{key!r}]", item) for key, item in value.items()]
-    yield from sorted(variables, key=lambda pair: not isinstance(pair[1], Model))
+        if not name.startswith("__"):
+            items = dict(enumerate(value)) if isinstance(value, (list, tuple)) else value
+            inside = items.items() if isinstance(items, dict) else ()
+            variables += [(name, value), *((f"{name}[{key!r}]", item) for key, item in inside)]
+    return sorted(variables, key=lambda pair: not isinstance(pair[1], Model))

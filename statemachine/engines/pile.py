@@ -16,6 +16,8 @@ HALF = 0.1  # an edge [m]
 # Where the boxes begin, one over the other [m], and how the lowest is turned (w, x, y, z).
 PLACES = ((0.0, 0.0, 0.25), (0.0, 0.02, 0.55), (0.0, 0.0, 0.85))
 TILT = (0.92, 0.31, 0.21, 0.1)
+Write = Callable[[Any, float], object]
+Read = Callable[[Any], float]
 _WRITTEN, _OTHER = 0.5, -0.25  # half of anything is not what it has at the start
 
 
@@ -23,13 +25,14 @@ class Pile(ABC):
     """A world of an engine with the pile in it; of all there is a new one for each trial.
 
     Attributes:
-        quantities: What decides the future.
+        quantities: What decides the future: what puts a number there, and what tells the number
+            that is there, which may take a step for it.
         near: By what part of a number it may be read otherwise than it was written.
         resets: Ways to the start, by name.
         ways_to_save: Ways to save, by name.
     """
 
-    quantities: ClassVar[Sequence[str]]
+    quantities: ClassVar[Mapping[str, tuple[Write, Read]]]
     near: ClassVar[float] = 0.0
     resets: ClassVar[Mapping[str, Callable[[Any], object]]]
     ways_to_save: ClassVar[Mapping[str, Save]]
@@ -49,20 +52,12 @@ class Pile(ABC):
         """How many there are."""
 
     @abstractmethod
-    def write(self, quantity: str, value: float) -> None:
-        """Put a number there."""
-
-    @abstractmethod
-    def read(self, quantity: str) -> float:
-        """The number that is there; may take a step for it."""
-
-    @abstractmethod
     def run(self, steps: int) -> Array:
         """Go on under gravity; coordinates of boxes and joint (steps, 22) after every step."""
 
     def disturb(self, quantity: str) -> None:
         """Put something else there."""
-        self.write(quantity, _OTHER)
+        self.quantities[quantity][0](self, _OTHER)
 
     def refilled(self) -> Pile:
         """With the bodies in it, if a way to the start takes them away."""
@@ -71,11 +66,11 @@ class Pile(ABC):
     @classmethod
     def _survives(cls, quantity: str, act: Callable[[Any], object]) -> bool:
         """Whether a number that was written is there after something was done."""
+        write, read = cls.quantities[quantity]
         with cls.fresh() as scene:
-            scene.write(quantity, _WRITTEN)
+            write(scene, _WRITTEN)
             act(scene)
-            off = scene.refilled().read(quantity) - _WRITTEN
-            return abs(off) <= cls.near * _WRITTEN
+            return abs(read(scene.refilled()) - _WRITTEN) <= cls.near * _WRITTEN
 
     @classmethod
     def reset(cls) -> dict[str, dict[str, bool]]:

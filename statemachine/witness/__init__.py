@@ -8,8 +8,7 @@ that computes is another, and the reading of the file is not.
 from __future__ import annotations
 
 from .file import read_file
-from .numbers import read_numbers
-from .record import OWN_READING, SAME_READING, Segment, WitnessModel, labels
+from .record import OWN_READING, SAME_READING, Segment, WitnessModel, labels, read_numbers
 
 __all__ = [
     "OWN_READING",

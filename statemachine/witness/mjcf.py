@@ -8,6 +8,7 @@ else in a file (shapes, masses, actuators, keyframes) has no part in places and 
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -19,8 +20,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..rotations import HERE, Array, Placement
-from .mjcf_places import numbers, own_place
-from .mjcf_text import Source, attached_source, body_of, source_of
+from .mjcf_text import Source, attached_source, body_of, numbers, own_place, source_of
 
 Element = ElementTree.Element
 _MOST_BODIES = 100_000
@@ -93,9 +93,9 @@ class PlainMjcf:
         self._done: Counter[str] = Counter()
         source = source_of(root, path, self._done)
         self._degrees = source.compiler.degrees
-        angle = "degree" if self._degrees else "radian"
         self.root: Element = ElementTree.Element("mujoco", model="robot")
-        ElementTree.SubElement(self.root, "compiler", angle=angle)
+        unit = "degree" if self._degrees else "radian"
+        ElementTree.SubElement(self.root, "compiler", angle=unit)
         world = ElementTree.SubElement(self.root, "worldbody")
         # Of a root body without a joint, and of the world, Pinocchio drops the pose and the
         # sites; of several root bodies, all but the first. Below one that stands still it
@@ -103,7 +103,7 @@ class PlainMjcf:
         ground = ElementTree.SubElement(world, "body", name="the ground")
         still = ElementTree.SubElement(ground, "body", name="body 0")
         self.bodies: list[FileBody] = [FileBody("world", "body 0")]
-        self._sites = self._joints = 0
+        self._numbers = {"joint": itertools.count(), "site": itertools.count()}
         around = _Surroundings(HERE, "", (source,))
         for worldbody in source.root.findall("worldbody"):
             self._write(worldbody, ground, self.bodies[0], around, still)
@@ -115,6 +115,9 @@ class PlainMjcf:
                 self._done["root places"] += not _nowhere_else(place)
                 self._done["root sites"] += len(root_body.findall("site"))
             self._right_sites(root_body)
+        self.changes: tuple[str, ...] = tuple(
+            _CHANGES[what].format(n) for what, n in self._done.items() if n
+        )
 
     def _right_sites(self, root_body: Element) -> None:
         """Write sites of a body without a joint as bodies.
@@ -128,11 +131,6 @@ class PlainMjcf:
                     for site in body.findall("site"):
                         site.tag = "body"
                         self._done["still sites"] += 1
-
-    @property
-    def changes(self) -> tuple[str, ...]:
-        """What was done to the text, in words."""
-        return tuple(_CHANGES[what].format(n) for what, n in self._done.items() if n)
 
     def _write(
         self,
@@ -236,8 +234,7 @@ class PlainMjcf:
         name = self._name(element, around)
         body.joints.append((name, kind, ref))
         self._done["joint names"] += not name
-        written = {"name": f"joint {self._joints}", "type": kind}
-        self._joints += 1
+        written = {"name": f"joint {next(self._numbers['joint'])}", "type": kind}
         if kind != "free":
             pos, axis = given.get("pos", "0 0 0"), given.get("axis", "0 0 1")
             if not _nowhere_else(around.frame):
@@ -249,10 +246,9 @@ class PlainMjcf:
     def _site(
         self, element: Element, target: Element, body: FileBody, around: _Surroundings
     ) -> None:
-        name = self._name(element, around)
-        body.sites.append((name, f"site {self._sites}"))
-        self._sites += 1
-        written = ElementTree.SubElement(target, "site", name=body.sites[-1][1])
+        called = f"site {next(self._numbers['site'])}"
+        body.sites.append((self._name(element, around), called))
+        written = ElementTree.SubElement(target, "site", name=called)
         self._place(self._resolved(element, "site", around), written, around)
 
     def _place(self, given: dict[str, str], target: Element, around: _Surroundings) -> None:

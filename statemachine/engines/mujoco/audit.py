@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from copy import copy
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array, Model
-from ..auditing import ONLY, Disturbance, Driver, Restore, SaveMethod, SavePoint
+from ..auditing import ONLY, Disturbance, Driver, SaveMethod, SavePoint, copied
 
 # What another past may have left in them, as a part of the weight or inertia that it acts on.
 _PUSH = 0.1
@@ -89,7 +89,9 @@ class MujocoDriver(Driver):
         }
         return (
             *(self.way(name, spec) for name, spec in candidates.items()),
-            SaveMethod("mj_copyData", self._copied),
+            SaveMethod(
+                "mj_copyData", copied(copy, lambda m, other: mj.mj_copyData(m, m.model, other))
+            ),
             *(
                 self.way(f"INTEGRATION without {name}", self.whole & ~bit, name)
                 for name, bit in self.fields.items()
@@ -101,19 +103,10 @@ class MujocoDriver(Driver):
 
     def way(self, name: str, spec: int, left_out: str = "") -> SaveMethod:
         """The candidate of a mask of components."""
-
-        @contextmanager
-        def save(machine: Any) -> Iterator[Restore]:
-            kept = saved(machine, spec)
-            yield lambda other: mj.mj_setState(other.model, other, kept, spec)
-
+        save = copied(
+            lambda m: saved(m, spec), lambda m, state: mj.mj_setState(m.model, m, state, spec)
+        )
         return SaveMethod(name, save, left_out)
-
-    @contextmanager
-    def _copied(self, machine: Any) -> Iterator[Restore]:
-        kept = mj.MjData(machine.model)
-        mj.mj_copyData(kept, machine.model, machine)
-        yield lambda other: mj.mj_copyData(other, other.model, kept)
 
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, ClassVar
@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...interface import Array
+from ..auditing import Save, copied
 from ..pile import HALF, PLACES, TILT, Pile
 from .audit import mj, saved
 
@@ -24,6 +25,24 @@ MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
 <body pos="2 0 2"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body></worldbody>
 <actuator><position joint="j" kp="20"/></actuator></mujoco>"""
 
+
+def _owner(scene: MujocoPile, field: str) -> Any:
+    """The Data or the options of the Model."""
+    return scene.data if hasattr(scene.data, field) else scene.model.opt
+
+
+def _write(scene: MujocoPile, value: float, field: str) -> None:
+    """Every number of it."""
+    owner = _owner(scene, field)
+    setattr(owner, field, 0 * getattr(owner, field) + value)
+
+
+def _read(scene: MujocoPile, field: str) -> float:
+    """The number of which all are; NaN if they differ."""
+    values = np.ravel(getattr(_owner(scene, field), field))
+    return float(values[0]) if (values == values[0]).all() else np.nan
+
+
 # What decides the future, by where the engine has it; the last two belong to the Model.
 _FIELDS = {
     "time": "time",
@@ -37,33 +56,33 @@ _FIELDS = {
 }
 
 
-@contextmanager
-def _copied(scene: MujocoPile) -> Iterator[Callable[[MujocoPile], object]]:
-    qpos, qvel = np.array(scene.data.qpos), np.array(scene.data.qvel)
-
-    def restore(other: MujocoPile) -> None:
-        other.data.qpos[:], other.data.qvel[:] = qpos, qvel
-
-    yield restore
+def _put(scene: MujocoPile, copies: tuple[Array, Array]) -> None:
+    scene.data.qpos[:], scene.data.qvel[:] = copies
 
 
-@contextmanager
-def _state(scene: MujocoPile, part: str) -> Iterator[Callable[[MujocoPile], object]]:
-    """The components of a mask of mjtState."""
-    mask = getattr(mj.mjtState, part)
-    state = saved(scene.data, int(mask))
-    yield lambda other: mj.mj_setState(other.model, other.data, state, mask)
+def _components(part: str) -> Save:
+    """Those of a mask of mjtState."""
+    spec = int(getattr(mj.mjtState, part))
+    return copied(
+        lambda scene: saved(scene.data, spec),
+        lambda scene, state: mj.mj_setState(scene.model, scene.data, state, spec),
+    )
 
 
 class MujocoPile(Pile):
     """A Model and a Data."""
 
-    quantities = tuple(_FIELDS)
+    quantities: ClassVar = {
+        name: (partial(_write, field=field), partial(_read, field=field))
+        for name, field in _FIELDS.items()
+    }
     resets: ClassVar = {"mj_resetData": lambda scene: mj.mj_resetData(scene.model, scene.data)}
     ways_to_save: ClassVar = {
-        "qpos and qvel copied": _copied,
-        "mjSTATE_FULLPHYSICS": partial(_state, part="mjSTATE_FULLPHYSICS"),
-        "mjSTATE_INTEGRATION": partial(_state, part="mjSTATE_INTEGRATION"),
+        "qpos and qvel copied": copied(
+            lambda scene: (np.array(scene.data.qpos), np.array(scene.data.qvel)), _put
+        ),
+        "mjSTATE_FULLPHYSICS": _components("mjSTATE_FULLPHYSICS"),
+        "mjSTATE_INTEGRATION": _components("mjSTATE_INTEGRATION"),
     }
 
     def __init__(self) -> None:
@@ -81,19 +100,6 @@ class MujocoPile(Pile):
 
     def bodies(self) -> int:
         return self.model.nbody
-
-    def _owner(self, field: str) -> Any:
-        return self.data if hasattr(self.data, field) else self.model.opt
-
-    def write(self, quantity: str, value: float) -> None:
-        """Every number of it."""
-        owner, field = self._owner(_FIELDS[quantity]), _FIELDS[quantity]
-        setattr(owner, field, 0 * getattr(owner, field) + value)
-
-    def read(self, quantity: str) -> float:
-        """The number of which all are; NaN if they differ."""
-        values = np.ravel(getattr(self._owner(_FIELDS[quantity]), _FIELDS[quantity]))
-        return float(values[0]) if (values == values[0]).all() else np.nan
 
     def run(self, steps: int) -> Array:
         trace = []

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from ..auditing import (
     Save,
     SaveMethod,
     SavePoint,
+    copied,
 )
 from .world import poses_and_rates, saved_in_a_file, saved_in_memory, written
 
@@ -55,14 +56,10 @@ class Client:
         self.targets: Array | None = None
 
 
-@contextmanager
-def put_back(machine: Client, how: str = "put") -> Iterator[Restore]:
-    """What can be read of positions and velocities, as the backend writes it.
-
-    To "place" takes every body far away and brings it back, which leaves no memory of contacts.
-    """
-    state = machine.world.read()
-    yield lambda other: getattr(other.world, how)(*state)
+# What can be read of positions and velocities, as the backend writes it. To "place" them takes
+# every body far away and brings it back, which leaves no memory of contacts.
+put_back = copied(lambda m: m.world.read(), lambda m, state: m.world.put(*state))
+taken_apart = copied(lambda m: m.world.read(), lambda m, state: m.world.place(*state))
 
 
 def let_pass(machine: Client) -> None:
@@ -156,7 +153,7 @@ class PybulletDriver(Driver):
             SaveMethod(_BEST, self._with_targets(written)),
             SaveMethod("saveState + targets", self._with_targets(saved_in_memory), travels=False),
             SaveMethod("saveBullet + targets", self._with_targets(saved_in_a_file)),
-            SaveMethod("taken apart + targets", self._with_targets(partial(put_back, how="place"))),
+            SaveMethod("taken apart + targets", self._with_targets(taken_apart)),
         )
 
     def _with_targets(self, save: Save) -> Save:

@@ -6,7 +6,7 @@ next step show in what the next step does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import ClassVar
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
-from ..pile import HALF, PLACES, TILT, Pile
+from ..pile import HALF, PLACES, TILT, Pile, Read, Write
 from ..samples import GRAVITY, PENDULUM_URDF
 from .world import (
     fresh_world,
@@ -28,9 +28,6 @@ from .world import (
 )
 
 _TURNS = (np.array((*TILT[1:], TILT[0])) / np.linalg.norm(TILT), *[np.array((0, 0, 0, 1.0))] * 2)
-# Of a quantity: what puts a number there, and what tells it.
-Write = Callable[["BulletPile", float], object]
-Read = Callable[["BulletPile"], float]
 
 
 def _joint(scene: BulletPile, k: int) -> float:
@@ -71,7 +68,7 @@ def _moved(scene: BulletPile) -> float:
 
 
 # Nothing else acts while one of these is looked at; the box is in the air.
-_QUANTITIES: dict[str, tuple[Write, Read]] = {
+_QUANTITIES: Mapping[str, tuple[Write, Read]] = {
     "joint position": (
         lambda s, x: pb.resetJointState(s.arm, 0, x, _joint(s, 1), s.client),
         lambda s: _joint(s, 0),
@@ -108,7 +105,7 @@ def _put_back(scene: BulletPile) -> None:
 class BulletPile(Pile):
     """A world's client, and the numbers of its bodies."""
 
-    quantities = tuple(_QUANTITIES)
+    quantities = _QUANTITIES
     near = 0.05  # a motor's target is met that well in one step
     resets: ClassVar = {
         "resetSimulation": lambda scene: pb.resetSimulation(physicsClientId=scene.client),
@@ -146,12 +143,6 @@ class BulletPile(Pile):
     def bodies(self) -> int:
         return pb.getNumBodies(self.client)
 
-    def write(self, quantity: str, value: float) -> None:
-        _QUANTITIES[quantity][0](self, value)
-
-    def read(self, quantity: str) -> float:
-        return _QUANTITIES[quantity][1](self)
-
     def disturb(self, quantity: str) -> None:
         if quantity == "applied force":  # there is one until the next step
             pb.stepSimulation(self.client)
@@ -167,9 +158,6 @@ class BulletPile(Pile):
         trace = []
         for _ in range(steps):
             pb.stepSimulation(client)
-            places: list[float] = []
-            for box in self.bases:
-                pos, quat = pb.getBasePositionAndOrientation(box, client)
-                places += (*pos, *quat)
-            trace.append((*places, _joint(self, 0)))
+            poses = [pb.getBasePositionAndOrientation(box, client) for box in self.bases]
+            trace.append((*(x for pos, quat in poses for x in (*pos, *quat)), _joint(self, 0)))
         return np.array(trace)

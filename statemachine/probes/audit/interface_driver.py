@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 
-from ...engines.auditing import Disturbance, Driver, Restore, SaveMethod, SavePoint
+from ...engines.auditing import Disturbance, Driver, SaveMethod, SavePoint, copied
 from ...interface import (
     INPUTS,
     Array,
@@ -85,21 +82,17 @@ class InterfaceDriver(Driver):
 def written(*names: str) -> SaveMethod:
     """Arrays of a Data, and its time, that are written back."""
 
-    @contextmanager
-    def save(machine: Data) -> Iterator[Restore]:
-        kept = {name: np.array(getattr(machine, name)) for name in names}
+    def take(data: Data) -> dict[str, Array]:
+        return {name: np.array(getattr(data, name)) for name in names}
 
-        def restore(other: Data) -> None:
-            for name, value in kept.items():
-                setattr(other, name, value if name in INPUTS else float(value))
+    def give(data: Data, values: dict[str, Array]) -> None:
+        for name, value in values.items():
+            setattr(data, name, value if name in INPUTS else float(value))
 
-        yield restore
-
-    return SaveMethod(" ".join(names), save)
+    return SaveMethod(" ".join(names), copied(take, give))
 
 
-@contextmanager
-def as_a_state(machine: Data) -> Iterator[Restore]:
-    """By get_state and set_state."""
-    kept = get_state(machine.model, machine)
-    yield lambda other: set_state(other.model, other, kept)
+as_a_state = copied(
+    lambda data: get_state(data.model, data),
+    lambda data, state: set_state(data.model, data, state),
+)
