@@ -24,7 +24,7 @@ from statemachine.measures import Gap
 from statemachine.measures.readings import readings
 from statemachine.probes import freshness
 from statemachine.probes.freshness import Scratch
-from statemachine.probes.stale_rows import gaps, table, told
+from statemachine.probes.stale_rows import gaps, gaps_text, table
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 
@@ -408,9 +408,9 @@ def test_gaps_in_words(gap: Gap, text: str) -> None:
 
 def test_rounding_is_left_out_beside_more() -> None:
     small, large = Gap(1e-15, "N", "box"), Gap(0.5, "N·m", "j")
-    assert told([small, large]) == "0.5 N·m at j"
-    assert told([small]) == "below 1e-06 N at box"
-    assert told([]) == ""
+    assert gaps_text([small, large]) == "0.5 N·m at j"
+    assert gaps_text([small]) == "below 1e-06 N at box"
+    assert gaps_text([]) == ""
 
 
 def test_a_figure_and_its_place_stay_on_one_line() -> None:

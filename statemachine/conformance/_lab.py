@@ -104,9 +104,9 @@ class Lab(ExitStack):
         """
         driver, run = self._moving
         for question in questions:
-            for found in question(driver, run):
-                first = f"{found.experiment}, {found.case}: another future than {found.into}"
-                require(found.holds, f"{first}, after {found.gap.first} steps")
+            for finding in question(driver, run):
+                first = f"{finding.experiment}, {finding.case}: another future than {finding.into}"
+                require(finding.holds, f"{first}, after {finding.gap.first} steps")
 
     @cached_property
     def _moving(self) -> tuple[Driver, ReferenceRun]:
@@ -210,20 +210,20 @@ def require_raises(
 
 def snapshot(data: Data) -> dict[str, Array]:
     """Copies of everything derived that this backend yields, contacts included."""
-    found: dict[str, Array] = {}
+    values: dict[str, Array] = {}
     for name, held in readings(data).items():
         if isinstance(held, Contacts):
-            found |= {f"contacts.{part}": np.array(array) for part, array in vars(held).items()}
+            values |= {f"contacts.{part}": np.array(array) for part, array in vars(held).items()}
         else:
-            found[name] = np.array(held)
-    return found
+            values[name] = np.array(held)
+    return values
 
 
-def same(one: dict[str, Array], two: dict[str, Array], what: str) -> None:
+def same(before: dict[str, Array], after: dict[str, Array], what: str) -> None:
     """Two snapshots hold the same bits."""
-    require(one.keys() == two.keys(), f"{what}: {sorted(one)} against {sorted(two)}")
-    for name, array in one.items():
-        require_equal(two[name], array, f"{what}: {name}")
+    require(before.keys() == after.keys(), f"{what}: {sorted(before)} against {sorted(after)}")
+    for name, array in before.items():
+        require_equal(after[name], array, f"{what}: {name}")
 
 
 def force_on(model: Model, data: Data, body: int) -> tuple[Array, Ints, Array]:

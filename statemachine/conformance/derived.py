@@ -124,8 +124,8 @@ def check_forward_depends_on_the_state_alone(lab: Lab, model: Model, data: Data)
     step(model, data, 3)
     other = lab.data(model)
     set_state(model, other, get_state(model, data))
-    for each in (data, other):
-        forward(model, each)
+    for copy in (data, other):
+        forward(model, copy)
     same(snapshot(data), snapshot(other), "forward of a restored State")
 
 

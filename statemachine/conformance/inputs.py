@@ -80,7 +80,7 @@ def check_bad_assignment_changes_nothing(lab: Lab, model: Model, data: Data) -> 
         ("time", np.nan),
         ("time", "soon"),
     ]
-    require_raises(BadInputError, *(partial(setattr, data, *each) for each in bad), unchanged=data)
+    require_raises(BadInputError, *(partial(setattr, data, *item) for item in bad), unchanged=data)
 
 
 @check(on="arm")
@@ -93,7 +93,7 @@ def check_derived_is_read_only(lab: Lab, model: Model, data: Data) -> None:
         require(not array.flags.writeable, f"{name} can be written into")
     facts = [(data, name, 0.0) for name in held]
     facts += [(data, "speed", 1.0), (model, "nq", 7)]
-    require_raises(ReadOnlyError, *(partial(setattr, *each) for each in facts))
+    require_raises(ReadOnlyError, *(partial(setattr, *fact) for fact in facts))
 
 
 @check(on="arm")
@@ -146,8 +146,8 @@ def check_infinite_ctrl_is_refused_or_clamped(lab: Lab, model: Model, data: Data
     forward(model, at_end)
     require_equal(data.qacc, at_end.qacc, "qacc under an infinite ctrl")
     set_state(model, again, get_state(model, data))
-    for each in (data, at_end, again):
-        step(model, each, 50)
+    for run in (data, at_end, again):
+        step(model, run, 50)
     require_equal(data.qpos, at_end.qpos, "qpos under an infinite ctrl")
     require_equal(again.qpos, data.qpos, "qpos from the State of an infinite ctrl")
     require(np.isposinf(data.ctrl[1]), "the array does not keep what was written")
@@ -205,7 +205,7 @@ def check_foreign_data_is_refused(lab: Lab) -> None:
     wrong: tuple[Any, ...] = (None, 3, "data", lab.arm)
     require_raises(
         TypeError,
-        *(partial(step, lab.arm, each) for each in wrong),
+        *(partial(step, lab.arm, thing) for thing in wrong),
         lambda: make_data(data),  # pyright: ignore[reportArgumentType]
         lambda: pickle.dumps(data),
     )

@@ -89,16 +89,16 @@ def check_latency_delays_a_command(lab: Lab) -> None:
     for latency, late in ((h, 1), (0.03, 6), (2.5 * h, 3), (0.0, 0)):
         model = arm.replace(latency=latency)
         require_close(model.actuator_delay, np.full(arm.nu, late * h), 1e-12, "actuator_delay")
-        found = poses(model)
-        require_close(found[:late], np.zeros((late, arm.nq)), 1e-9, f"before {latency} s")
-        require_close(found[late:], prompt[: 40 - late], 1e-9, f"{late} steps late")
+        late_poses = poses(model)
+        require_close(late_poses[:late], np.zeros((late, arm.nq)), 1e-9, f"before {latency} s")
+        require_close(late_poses[late:], prompt[: 40 - late], 1e-9, f"{late} steps late")
     finer = arm.replace(latency=h, substeps=5)
     require_close(finer.actuator_delay, np.full(arm.nu, h), 1e-12, "actuator_delay of substeps")
     require_close(poses(finer)[1:], poses(arm.replace(substeps=5))[:-1], 1e-9, "5 substeps late")
-    one = np.zeros(arm.nu)
-    one[2] = 2 * h
-    found = poses(arm.replace(latency=one, contacts=False))
-    require(bool(np.abs(found[0, [0, 1, 3, 4, 5]]).min() > 1e-6), "all joints were late")
+    latencies = np.zeros(arm.nu)
+    latencies[2] = 2 * h
+    late_poses = poses(arm.replace(latency=latencies, contacts=False))
+    require(bool(np.abs(late_poses[0, [0, 1, 3, 4, 5]]).min() > 1e-6), "all joints were late")
 
 
 @check("latency", "position servo", on="arm", latency=0.04)
@@ -108,10 +108,10 @@ def check_a_state_has_the_commands_on_their_way(lab: Lab, model: Model, data: Da
     run_ctrl(model, data, 20, seed=1)
     state = get_state(model, data)
     futures = []
-    for each, seed in ((data, 2), (other, 3), (data, 4)):
-        run_ctrl(model, each, 12, seed=seed)
-        set_state(model, each, state)
-        futures.append(run_ctrl(model, each, 12, seed=5))
+    for run, seed in ((data, 2), (other, 3), (data, 4)):
+        run_ctrl(model, run, 12, seed=seed)
+        set_state(model, run, state)
+        futures.append(run_ctrl(model, run, 12, seed=5))
     require_equal(futures[1:], [futures[0]] * 2, "qpos after a restore")
     # The command on its way, not the one that was written last, moves the arm at first.
     start = state["qpos"]

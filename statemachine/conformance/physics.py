@@ -255,7 +255,10 @@ def check_options_do_what_they_say(lab: Lab) -> None:
         (limp, "damping", 5.0, 60, -np.inf, 0.8 * fall),
         (limp, "frictionloss", 0.3, 60, -np.inf, 0.8 * fall),
         (limp, "contacts", False, 400, 0.6, np.inf),
-        *((base, "integrator", each, 20, -0.01, 0.01) for each in base.capabilities.integrators),
+        *(
+            (base, "integrator", integrator, 20, -0.01, 0.01)
+            for integrator in base.capabilities.integrators
+        ),
     ]
     for model, name, value, steps, least, most in cases:
         if name in options:
@@ -277,8 +280,8 @@ def check_unsupported_is_said(lab: Lab) -> None:
         error = require_raises(UnsupportedError, lambda n=name: model.replace(**{n: 1}))
         facts = getattr(error, "backend", ""), getattr(error, "feature", "")
         require(facts == (model.backend, name), str(error))
-    told = model.capabilities.behaviours
-    require(told.keys() == set(BEHAVIOURS), f"the record speaks of {sorted(told)}")
-    for name, behaviour in told.items():
+    behaviours = model.capabilities.behaviours
+    require(behaviours.keys() == set(BEHAVIOURS), f"the record speaks of {sorted(behaviours)}")
+    for name, behaviour in behaviours.items():
         known = ("native", "emulated", "unsupported")
         require(behaviour.support in known and bool(behaviour.note), f"the record on {name}")

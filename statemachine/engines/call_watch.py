@@ -136,7 +136,7 @@ class CallWatch(ABC):
         """The objects that a call is about, the first of them foremost; None: not ours."""
 
     @abstractmethod
-    def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
+    def created(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
         """The object that a call has made."""
 
     @abstractmethod
@@ -152,7 +152,7 @@ def entries(field: str, before: bytes, after: bytes, size: int) -> str:
     """Which entries of a flat array of items of a size differ: "qpos[1]", "ctrl[0:2]"."""
     if len(before) != len(after):
         return field
-    was, now = (np.frombuffer(each, np.uint8).reshape(-1, size) for each in (before, after))
+    was, now = (np.frombuffer(contents, np.uint8).reshape(-1, size) for contents in (before, after))
     differ = np.flatnonzero((was != now).any(axis=1)).tolist()
     first, end = differ[0], differ[-1] + 1
     if len(differ) == len(now) or len(differ) != end - first:

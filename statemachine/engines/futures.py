@@ -38,27 +38,27 @@ class FutureGap:
         return max(self.angle, self.length)
 
 
-def gap(one: Array, other: Array, places: JointPlaces, counts: Ints | None = None) -> FutureGap:
+def gap(first: Array, second: Array, places: JointPlaces, counts: Ints | None = None) -> FutureGap:
     """The gap between two futures.
 
     Args:
-        one: Positions and velocities, (n, k).
-        other: The same of the other future.
+        first: Positions and velocities, (n, k).
+        second: The same of the other future.
         places: What the numbers of a row are; velocities follow.
         counts: (n,) how many steps each row comes after, if not 0, 1, 2, …
     """
-    rows = np.arange(len(one)) if counts is None else counts
+    rows = np.arange(len(first)) if counts is None else counts
     # As integers: what is compared are bytes, in which 0 is not -0, and NaN is NaN.
     differs = (
-        np.ascontiguousarray(one).view(np.int64) != np.ascontiguousarray(other).view(np.int64)
+        np.ascontiguousarray(first).view(np.int64) != np.ascontiguousarray(second).view(np.int64)
     ).any(axis=1)
     steps = int(rows[-1])
     if not differs.any():
         return FutureGap(steps, None, 0.0, 0.0)
     moved = [np.concatenate((places.slides, places.positions)), places.hinges]
-    length, angle = (farthest(one[:, chosen], other[:, chosen]) for chosen in moved)
+    length, angle = (farthest(first[:, chosen], second[:, chosen]) for chosen in moved)
     quats = places.quats[:, None] + np.arange(4)
-    turned = turns(one[:, quats], other[:, quats])
+    turned = turns(first[:, quats], second[:, quats])
     return FutureGap(
         steps,
         int(rows[np.argmax(differs)]),
@@ -69,10 +69,10 @@ def gap(one: Array, other: Array, places: JointPlaces, counts: Ints | None = Non
 
 def worst(gaps: list[FutureGap]) -> FutureGap:
     """The earliest difference and the largest, of several gaps over the same steps."""
-    firsts = [each.first for each in gaps if each.first is not None]
+    firsts = [of.first for of in gaps if of.first is not None]
     return FutureGap(
         gaps[0].steps,
         min(firsts, default=None),
-        max(each.angle for each in gaps),
-        max(each.length for each in gaps),
+        max(of.angle for of in gaps),
+        max(of.length for of in gaps),
     )

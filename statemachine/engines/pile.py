@@ -75,14 +75,16 @@ class Pile(ABC):
     @classmethod
     def reset(cls) -> dict[str, dict[str, bool]]:
         """Which quantities are, for each way to reset, still what was written before."""
-        kept = {}
+        survivors = {}
         for name, way in cls.resets.items():
-            kept[name] = {quantity: cls._survives(quantity, way) for quantity in cls.quantities}
+            survivors[name] = {
+                quantity: cls._survives(quantity, way) for quantity in cls.quantities
+            }
             with cls.fresh() as scene:
                 bodies = scene.bodies()
                 way(scene)
-                kept[name]["bodies"] = scene.bodies() == bodies
-        return kept
+                survivors[name]["bodies"] = scene.bodies() == bodies
+        return survivors
 
     @classmethod
     def save(cls) -> dict[str, dict[str, bool]]:

@@ -177,17 +177,17 @@ class CallRecorder:
                 return bare(*args, **kwargs)
             for watched in objects:
                 self._note_writes(watched)
-            made = None
+            created = None
             try:
                 result = bare(*args, **kwargs)
-                made = watch.made(function, args, result)
+                created = watch.created(function, args, result)
                 return result
             finally:
-                called = watch.engine, function, made or next(iter(objects), None)
+                called = watch.engine, function, created or next(iter(objects), None)
                 self._counts[called] += 1
-                if made:
-                    made.look_again()
-                    self._changed[called][made, NEW] = None
+                if created:
+                    created.look_again()
+                    self._changed[called][created, NEW] = None
                 for watched in objects:
                     for field in watched.look_again():
                         self._changed[called][watched, field] = None
@@ -265,8 +265,8 @@ def statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]],
     ends = [node.end_lineno or node.lineno for node in body]
     for k, (node, first, end) in enumerate(zip(body, firsts, ends, strict=True)):
         shared = (k > 0 and ends[k - 1] == first) or firsts[k + 1 : k + 2] == [end]
-        whole = "\n".join(lines[first - 1 : end])
-        source = (ast.get_source_segment(code, node) or whole) if shared else whole
+        text = "\n".join(lines[first - 1 : end])
+        source = (ast.get_source_segment(code, node) or text) if shared else text
         compiled = compile(ast.Module([node], []), name, "exec", dont_inherit=True)
 
         yield source, first, functools.partial(exec, compiled)

@@ -78,7 +78,7 @@ class Freshness:
 
     def __str__(self) -> str:
         title = f"Derived values of {self.model} on {self.backend} {self.engine_version}"
-        cells = [(row.name, row.of, told(row.gaps) or "–") for row in self.rows]
+        cells = [(row.name, row.of, gaps_text(row.gaps) or "–") for row in self.rows]
         lines = table(("array", "of", "how far off"), cells)
         notes = (line for note in self.notes for line in textwrap.wrap(note, WIDTH))
         return "\n".join([f"{title} at {self.time:g} s", *lines, *notes])
@@ -125,7 +125,7 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     return lines
 
 
-def told(off: Sequence[Gap]) -> str:
+def gaps_text(off: Sequence[Gap]) -> str:
     """Gaps in words; what is nothing but rounding is left out beside what is more."""
     worth = [gap for gap in off if gap.shown >= TINY]
     return "; ".join(str(gap) for gap in worth or off[:1])

@@ -22,7 +22,7 @@ from ..measures import Gap
 from ..measures.readings import readings
 from ..measures.text import few
 from .freshness import DEPEND, Age, Scratch, age_of, row
-from .stale_rows import Row, StaleRead, table, told
+from .stale_rows import Row, StaleRead, gaps_text, table
 
 _PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
 
@@ -78,7 +78,7 @@ class Watch:
         stale = sum(read.count for read in self.stale_reads)
         head = f"{stale} of {self.reads} reads were stale"
         cells = [
-            (r.name, r.place, str(r.count), r.of, told(r.gaps) or "not to be told")
+            (r.name, r.place, str(r.count), r.of, gaps_text(r.gaps) or "not to be told")
             for r in self.stale_reads
         ]
         headers = ("array", "read at", "times", "of", "worst")
@@ -221,7 +221,7 @@ def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
 
 def _stale_read(stale: Row, entries: list[str]) -> StaleReadError:
     never = stale.of == "never computed"
-    facts = [told(stale.gaps)] if stale.gaps else []
+    facts = [gaps_text(stale.gaps)] if stale.gaps else []
     facts += [f"written since: {few(entries)}"] if entries and not never else []
     said = f"{stale.name} {'was' if never else 'is of'} {stale.of}"
     said += f" ({'; '.join(facts)})" if facts else ""

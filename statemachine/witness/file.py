@@ -79,11 +79,11 @@ def _segments(
     number = model.frames[frame].parentJoint
     joint = model.joints[number]
     idx_q, idx_v = joint.idx_q, joint.idx_v
-    found: list[tuple[str, Segment]] = []
+    segments: list[tuple[str, Segment]] = []
     for name, kind, ref in body.joints:
         if kind not in SIZES:
             raise ModelError(f"{path.name} has a joint of the kind {kind!r}, which is unknown")
-        found.append((name, Segment(kind, idx_q, idx_v, ref)))
+        segments.append((name, Segment(kind, idx_q, idx_v, ref)))
         idx_q, idx_v = idx_q + SIZES[kind][0], idx_v + SIZES[kind][1]
         if kind == "free":
             # MuJoCo's qpos of a free body is its pose in the world, whatever pose the file
@@ -91,7 +91,7 @@ def _segments(
             model.jointPlacements[number] = pin.SE3.Identity()
     if (idx_q, idx_v) != (joint.idx_q + joint.nq, joint.idx_v + joint.nv):
         raise ModelError(f"Pinocchio makes other joints of body {body.written!r} in {path.name}")
-    return found
+    return segments
 
 
 def _read_urdf(pin: Any, path: Path) -> WitnessModel:

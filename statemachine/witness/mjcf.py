@@ -170,7 +170,7 @@ class PlainMjcf:
     ) -> None:
         """Write a body of another file with all below it; or all bodies, where none is named."""
         source = attached_source(element.get("model", ""), around.source, self._done)
-        if source.path.resolve() in [each.path.resolve() for each in around.sources]:
+        if source.path.resolve() in [above.path.resolve() for above in around.sources]:
             raise ModelError(f"{source.path.name} attaches itself")
         self._done["attach"] += 1
         inside = around._replace(
@@ -179,8 +179,8 @@ class PlainMjcf:
             prefix=around.prefix + element.get("prefix", ""),
         )
         if name := element.get("body"):
-            found, childclass = body_of(source, name)
-            self._body(found, target, inside._replace(childclass=childclass))
+            body_element, childclass = body_of(source, name)
+            self._body(body_element, target, inside._replace(childclass=childclass))
             return
         for worldbody in source.root.findall("worldbody"):
             self._write(worldbody, target, body, inside, sites)

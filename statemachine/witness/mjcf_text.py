@@ -93,13 +93,13 @@ def body_of(source: Source, name: str) -> tuple[Element, str]:
                 return child, childclass
             if child.tag in ("body", "frame", "replicate"):
                 inner = child.get("childclass") or childclass
-                if found := below(child, inner, child.tag != "body"):
-                    return found
+                if place := below(child, inner, child.tag != "body"):
+                    return place
         return None
 
     for worldbody in source.root.findall("worldbody"):
-        if found := below(worldbody, "", False):
-            return found
+        if place := below(worldbody, "", False):
+            return place
     raise ModelError(f"{source.path.name} has no body {name!r} to attach")
 
 
@@ -177,18 +177,18 @@ def classes(root: Element, path: Path, done: Counter[str]) -> Classes:
     Raises:
         ModelError: Two classes have one name, or one has none.
     """
-    found: Classes = {"main": {}}
+    by_class: Classes = {"main": {}}
 
     def read(block: Element, name: str) -> None:
-        preset = found[name]
+        preset = by_class[name]
         for element in block:
             if isinstance(element.tag, str) and element.tag != "default":
                 preset[element.tag] = preset.get(element.tag, {}) | element.attrib
         for nested in block.findall("default"):
             own = nested.get("class", "")
-            if not own or own in found:
+            if not own or own in by_class:
                 raise ModelError(f"{path.name} has two default classes {own!r}, or one unnamed")
-            found[own] = {tag: dict(given) for tag, given in preset.items()}
+            by_class[own] = {tag: dict(given) for tag, given in preset.items()}
             read(nested, own)
 
     blocks = root.findall("default")
@@ -197,7 +197,7 @@ def classes(root: Element, path: Path, done: Counter[str]) -> Classes:
         if block.get("class", "main") != "main":
             raise ModelError(f"{path.name} calls its outermost default {block.get('class')!r}")
         read(block, "main")
-    return found
+    return by_class
 
 
 def numbers(text: str, count: int) -> Array:

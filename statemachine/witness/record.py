@@ -70,13 +70,13 @@ class WitnessModel:
 def labels(kind: str, names: Iterable[str]) -> list[str]:
     """What bodies or sites are called: their names, or "body 7" and "site 3" without one."""
     given = list(names)
-    found = []
+    called = []
     for number, name in enumerate(given):
         own = name or f"{kind} {number}"
         while not name and own in given:  # somebody else's name
             own = f"unnamed {own}"
-        found.append(own)
-    return found
+        called.append(own)
+    return called
 
 
 # MuJoCo's mjtJoint, in order, and what Pinocchio calls such a joint.
@@ -106,7 +106,7 @@ def read_numbers(
     types = pin.FrameType
     # Of each body: the joint that carries it, its pose in that joint, and its frame.
     carriers = [(0, pin.SE3.Identity(), 0)]
-    found: list[tuple[str, Segment]] = []
+    segments: list[tuple[str, Segment]] = []
     for body in range(1, len(bodies)):
         parent, pose, frame = carriers[int(compiled.body_parentid[body])]
         pose = pose * _pose(pin, compiled.body_pos[body], compiled.body_quat[body])
@@ -123,7 +123,7 @@ def read_numbers(
             parent = model.addJoint(parent, moving, pose * anchor, f"joint {joint}")
             pose = anchor.inverse()
             added = model.joints[parent]
-            found.append((joints[joint], Segment(kind, added.idx_q, added.idx_v, ref)))
+            segments.append((joints[joint], Segment(kind, added.idx_q, added.idx_v, ref)))
         own = model.addFrame(pin.Frame(f"body {body}", parent, frame, pose, types.BODY))
         carriers.append((parent, pose, own))
     placed: list[int] = []
@@ -135,7 +135,7 @@ def read_numbers(
     frames = [frame for *_, frame in carriers]
     return WitnessModel(
         model,
-        tuple(found),
+        tuple(segments),
         dict(zip(labels("body", bodies), frames, strict=True)),
         dict(zip(labels("site", sites), placed, strict=True)),
         SAME_READING,

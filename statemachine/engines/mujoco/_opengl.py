@@ -50,8 +50,8 @@ def _opengl(asked: str, known: tuple[tuple[str, str], ...]) -> str | None:
 
 def environment(opengl: str, known: dict[str, str]) -> dict[str, str]:
     """An environment in which MuJoCo takes this OpenGL."""
-    kept = {name: value for name, value in known.items() if name != "MUJOCO_GL"}
-    return {**kept, "MUJOCO_GL": opengl} if opengl else kept
+    others = {name: value for name, value in known.items() if name != "MUJOCO_GL"}
+    return {**others, "MUJOCO_GL": opengl} if opengl else others
 
 
 def opengl_remedy() -> str:
@@ -70,6 +70,6 @@ def diagnosis() -> tuple[bool, str, str]:
         return False, "no offscreen OpenGL", opengl_remedy()
     if works == os.environ.get("MUJOCO_GL", ""):
         return True, "offscreen", ""
-    found = f"offscreen with MUJOCO_GL={works}" if works else "offscreen by default"
+    state = f"offscreen with MUJOCO_GL={works}" if works else "offscreen by default"
     step = f"export MUJOCO_GL={works}" if works else "unset MUJOCO_GL"
-    return True, found, f"this library sets that itself; in programs of your own: {step}"
+    return True, state, f"this library sets that itself; in programs of your own: {step}"

@@ -34,7 +34,7 @@ class MujocoDriver(Driver):
     def __init__(self, model: Model, seed: int) -> None:
         super().__init__(model, seed)
         self.name = f"MuJoCo {model.engine_version} itself"
-        self.whole = int(_STATE.mjSTATE_INTEGRATION)
+        self.integration = int(_STATE.mjSTATE_INTEGRATION)
         # Every component that this model has, by the engine's own name for it.
         self.fields = {
             name.removeprefix("mjSTATE_").lower(): int(bit)
@@ -85,7 +85,7 @@ class MujocoDriver(Driver):
             "mjSTATE_PHYSICS": int(_STATE.mjSTATE_PHYSICS),
             "mjSTATE_FULLPHYSICS": full,
             "FULLPHYSICS + USER": full | int(_STATE.mjSTATE_USER),
-            "mjSTATE_INTEGRATION": self.whole,
+            "mjSTATE_INTEGRATION": self.integration,
         }
         return (
             *(self.way(name, spec) for name, spec in candidates.items()),
@@ -93,7 +93,7 @@ class MujocoDriver(Driver):
                 "mj_copyData", copied(copy, lambda m, other: mj.mj_copyData(m, m.model, other))
             ),
             *(
-                self.way(f"INTEGRATION without {name}", self.whole & ~bit, name)
+                self.way(f"INTEGRATION without {name}", self.integration & ~bit, name)
                 for name, bit in self.fields.items()
             ),
         )
@@ -119,7 +119,7 @@ class MujocoDriver(Driver):
         return (
             Disturbance("mj_forward", lambda m: mj.mj_forward(m.model, m)),
             Disturbance("mj_inverse", lambda m: mj.mj_inverse(m.model, m), promised=False),
-            Disturbance("mj_getState", lambda m: saved(m, self.whole)),
+            Disturbance("mj_getState", lambda m: saved(m, self.integration)),
             Disturbance("mj_step1, mj_step2 for mj_step", halves, promised=one_stage, instead=True),
         )
 
@@ -148,7 +148,7 @@ class MujocoDriver(Driver):
     def _batch(self, point: SavePoint, steps: int) -> list[Array]:
         batch = import_module("mujoco.batch").Batch(point.model.raw, _SEVERAL, _THREADS)
         with self.at(point) as machine:
-            batch.state[:] = saved(machine, self.whole)
+            batch.state[:] = saved(machine, self.integration)
             first = self.read(machine)
         out = batch.rollout(steps, record=["qpos", "qvel"])
         futures = np.concatenate((out["qpos"], out["qvel"]), axis=2)

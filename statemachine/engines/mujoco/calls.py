@@ -116,7 +116,7 @@ class MujocoWatch(CallWatch):
         objects = [self._watched(thing) for thing in things]
         return sorted(objects, key=lambda watched: isinstance(watched, _MjModel))
 
-    def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
+    def created(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
         thing = args[0] if function in ("MjModel", "MjData") else result
         return self._watched(thing) if isinstance(thing, self._kinds) else None
 

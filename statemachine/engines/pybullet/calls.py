@@ -182,7 +182,7 @@ class PybulletWatch(CallWatch):
             return None  # of a Data from before that is collected just now
         return [world] if world else []
 
-    def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
+    def created(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
         if function != "connect" or result < 0:
             return None
         self._worlds[result] = _World(self._bare, result)
@@ -197,8 +197,8 @@ class PybulletWatch(CallWatch):
                 self._name_model(f"{label}.model", value.model)
                 self._label(value.machine.world.raw, f"the world of {label}")
                 machine = value.machine
-                kept = self._arrays.get(machine) or _Arrays(machine)
-                arrays.setdefault(machine, kept).lead(label)
+                watched = self._arrays.get(machine) or _Arrays(machine)
+                arrays.setdefault(machine, watched).lead(label)
         self._arrays = arrays  # the others no variable leads to
 
     def _name_model(self, label: str, model: PybulletModel) -> None:

@@ -129,8 +129,10 @@ class PybulletDials:
         """(nsolid,) lateral friction that the engine tells of each link that touches."""
         with self.model._make_data() as data:
             world = data.raw
-            told = [pb.getDynamicsInfo(b, link, world.client)[1] for b, link, _ in world.solids()]
-        return np.array(told)
+            frictions = [
+                pb.getDynamicsInfo(b, link, world.client)[1] for b, link, _ in world.solids()
+            ]
+        return np.array(frictions)
 
 
 def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> PybulletModel:

@@ -58,8 +58,8 @@ def timestep(client: int) -> float:
 
 def gravity_of(client: int) -> tuple[float, float, float]:
     """What the engine tells of its gravity [m/s²]."""
-    told = pb.getPhysicsEngineParameters(client)
-    return tuple(told[f"gravityAcceleration{axis}"] for axis in "XYZ")
+    parameters = pb.getPhysicsEngineParameters(client)
+    return tuple(parameters[f"gravityAcceleration{axis}"] for axis in "XYZ")
 
 
 def poses_and_rates(machine: HasClient) -> list[tuple[Any, Any]]:

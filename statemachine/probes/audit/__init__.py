@@ -160,7 +160,7 @@ def _runs(
             without.append(f"{point.name}: the run diverges")
             continue
         lacking = [driver for driver in drivers if driver not in able]
-        without += [f"{point.name}: on {each.name}, {each.lacks(point)}" for each in lacking]
+        without += [f"{point.name}: on {driver.name}, {driver.lacks(point)}" for driver in lacking]
         for driver, run in undisturbed:
             runs[driver].append(run)
     return runs, tuple(without)

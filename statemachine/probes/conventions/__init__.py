@@ -121,7 +121,9 @@ def probe(
         asked[name][engine] = ask(name, engine)
     return Conventions(
         versions(engines),
-        tuple(Answered(name, QUESTIONS[name].question, found) for name, found in asked.items()),
+        tuple(
+            Answered(name, QUESTIONS[name].question, findings) for name, findings in asked.items()
+        ),
     )
 
 

@@ -157,13 +157,13 @@ ORDERS = _orders(TREE, "as listed") | _orders(sorted(TREE), "by alphabet")
 )
 def joints(names: Mapping[str, Sequence[str]]) -> Iterator[EngineAnswer]:
     """Which rule gives the engine's names, by format; and whether the fixed joint is among them."""
-    for form, found in names.items():
-        moving = [name for name in found if name != FIXED]
+    for form, listed in names.items():
+        moving = [name for name in listed if name != FIXED]
         words = next(
             (rule for rule, order in ORDERS.items() if [n for n in order if n != FIXED] == moving),
             UNDECIDED,
         )
         yield EngineAnswer(words, (Measurement("", tuple(moving)),), form)
-        counted = Measurement("joints with a number", len(found))
-        fixed = "takes a number" if FIXED in found else "none"
+        counted = Measurement("joints with a number", len(listed))
+        fixed = "takes a number" if FIXED in listed else "none"
         yield EngineAnswer(fixed, (counted,), f"fixed joint, {form}")

@@ -48,9 +48,9 @@ step = question(
 def reset(still_there: Mapping[str, Mapping[str, bool]]) -> Iterator[EngineAnswer]:
     """What each way to reset keeps of what was written before."""
     for way, there in still_there.items():
-        kept, gone = _split(there)
+        left, gone = _split(there)
         gone = [f"{name} (gone)" if name == "bodies" else name for name in gone]
-        words = f"keeps {', '.join(kept) or 'nothing'}"
+        words = f"keeps {', '.join(left) or 'nothing'}"
         yield EngineAnswer(words, (Measurement("sets back", tuple(gone)),), way)
 
 

@@ -21,9 +21,9 @@ _SAME = 1e-6  # m/s², s, m/s
 )
 def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Iterator[EngineAnswer]:
     """The gravity (3,) [m/s²] that a body feels, unless the engine tells of another."""
-    told, measured = gravity
-    felt, said = (" ".join(f"{g:g}" for g in np.round(v, 2) + 0.0) for v in (measured, told))
-    words = felt if np.allclose(told, measured, atol=_SAME) else f"told {said}, felt {felt}"
+    stated, measured = gravity
+    felt, said = (" ".join(f"{g:g}" for g in np.round(v, 2) + 0.0) for v in (measured, stated))
+    words = felt if np.allclose(stated, measured, atol=_SAME) else f"told {said}, felt {felt}"
     yield EngineAnswer(words, (Measurement("falls with", tuple(map(float, measured)), "m/s²"),))
 
 
@@ -34,9 +34,9 @@ def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Iterator[Engine
 )
 def timestep(step: OneStep) -> Iterator[EngineAnswer]:
     """The step [s] that a body at 1 m/s tells by how far it comes, and the engine's clock."""
-    told, moved, clock, ticked = step
-    told_ms, moved_ms = (f"{span * 1e3:.4g} ms" for span in (told, moved))
-    words = moved_ms if abs(told - moved) < _SAME else f"told {told_ms}, moves {moved_ms}"
+    stated, moved, clock, ticked = step
+    stated_ms, moved_ms = (f"{span * 1e3:.4g} ms" for span in (stated, moved))
+    words = moved_ms if abs(stated - moved) < _SAME else f"told {stated_ms}, moves {moved_ms}"
     yield EngineAnswer(words, (Measurement("at 1 m/s a body moves", moved, "m"),), "one step")
     ticks = (Measurement("it goes on by", ticked, "s"),)
     yield EngineAnswer(clock if ticked else "none", ticks, "clock")
@@ -58,9 +58,9 @@ def actuation(runs: Sequence[LetGo]) -> Iterator[EngineAnswer]:
         yield EngineAnswer(words, figures, part)
 
 
-def _share(share: float, whole: str, nothing: str) -> str:
+def _share(share: float, all_of_it: str, nothing: str) -> str:
     """What a share of one, or of next to nothing, means."""
-    return whole if 0.9 < share < 1.1 else nothing if abs(share) < 0.1 else UNDECIDED
+    return all_of_it if 0.9 < share < 1.1 else nothing if abs(share) < 0.1 else UNDECIDED
 
 
 @question(
