@@ -56,8 +56,9 @@ def run(backend: str) -> list[Outcome]:
             except MissingEngineError as error:
                 outcomes.append(Outcome(name, "skipped", str(error)))
             except UnsupportedError as error:
-                result = "skipped" if _declared(lab, error) else "failed"
-                outcomes.append(Outcome(name, result, str(error)))
+                outcomes.append(
+                    Outcome(name, "skipped" if _declared(lab, error) else "failed", str(error))
+                )
             except Exception as error:  # whatever a backend raises is its failure
                 outcomes.append(Outcome(name, "failed", f"{type(error).__name__}: {error}"))
             else:

@@ -304,8 +304,7 @@ class Driver(ABC):
                 )
                 self.command(machine, point.ctrl + stir)
             self.leave_traces(machine, point)
-            for _ in range(_AFTERWARDS):
-                self.advance(machine)
+            self.advance(machine, _AFTERWARDS)
             yield machine
 
     def arrive(self, machine: Machine, point: SavePoint) -> None:

@@ -116,12 +116,10 @@ class CallWatch(ABC):
     """What the recorder must know of an engine.
 
     Attributes:
-        engine: Its name.
         words: What a page says of its calls.
         module: The engine.
     """
 
-    engine: str
     words: CallWords
     module: Any
 

@@ -12,7 +12,7 @@ import functools
 import io
 import linecache
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout
 from dataclasses import dataclass
 from typing import Any
@@ -96,7 +96,8 @@ class CallRecorder:
 
     _active = False
 
-    def __init__(self, watches: Sequence[CallWatch]) -> None:
+    def __init__(self, watches: Mapping[str, CallWatch]) -> None:
+        """Of watches by engine."""
         self._watches = watches
         self.begin()
         self._listening = False  # only while a statement runs, and not within a call
@@ -110,22 +111,22 @@ class CallRecorder:
             restore.callback(setattr, CallRecorder, "_active", False)
             restore.callback(setattr, self, "_listening", False)
             CallRecorder._active = True
-            for watch in self._watches:
+            for engine, watch in self._watches.items():
                 for owner, attribute, function in watch.functions():
                     original = vars(owner)[attribute]  # as it lies there: of a class, a descriptor
-                    counted = self._counted(watch, function, getattr(owner, attribute))
+                    counted = self._counted(engine, function, getattr(owner, attribute))
                     static = isinstance(original, staticmethod)
                     restore.callback(setattr, owner, attribute, original)
                     setattr(owner, attribute, staticmethod(counted) if static else counted)
             yield
 
-    def _counted(self, watch: CallWatch, function: str, bare: Any) -> Callable[..., Any]:
+    def _counted(self, engine: str, function: str, bare: Any) -> Callable[..., Any]:
         @functools.wraps(bare)
         def counted(*args: Any, **kwargs: Any) -> Any:
             # A Data keeps the function that it was made with: it may outlive the recording.
             if not self._listening:
                 return bare(*args, **kwargs)
-            return self._call(watch, function, bare, args, kwargs)
+            return self._call(engine, function, bare, args, kwargs)
 
         return counted
 
@@ -141,7 +142,7 @@ class CallRecorder:
         """A statement has run, and printed something: what it did."""
         self._listening = False
         due: list[str] = []
-        for watch in self._watches:
+        for watch in self._watches.values():
             for watched in watch.living():
                 watched.named = False
             watch.name(namespace)
@@ -168,9 +169,9 @@ class CallRecorder:
         return Statement(source, line, calls, changed, printed, tuple(due))
 
     def _call(
-        self, watch: CallWatch, function: str, bare: Callable[..., Any], args: Any, kwargs: Any
+        self, engine: str, function: str, bare: Callable[..., Any], args: Any, kwargs: Any
     ) -> Any:
-        self._listening = False
+        watch, self._listening = self._watches[engine], False
         try:
             objects = watch.concerned(function, args, kwargs)
             if objects is None:
@@ -183,7 +184,7 @@ class CallRecorder:
                 created = watch.created(function, args, result)
                 return result
             finally:
-                called = watch.engine, function, created or next(iter(objects), None)
+                called = engine, function, created or next(iter(objects), None)
                 self._counts[called] += 1
                 if created:
                     created.look_again()
@@ -227,11 +228,11 @@ def record(code: str, engine: str) -> CallRecording:
     check_name("engine whose calls can be recorded", engine, recorded_engines())
     require(engine)
     watch = room(engine).call_watch()
-    watches = [watch, *(room(helper).call_watch() for helper in watch.words.helpers)]
+    helpers = {helper: room(helper).call_watch() for helper in watch.words.helpers}
     namespace: dict[str, Any] = {"__name__": "__main__"}
     done: list[Statement] = []
     error = None
-    recorder = CallRecorder(watches)
+    recorder = CallRecorder({engine: watch, **helpers})
     with recorder.replaced():
         for source, line, run in statements(code):
             out = io.StringIO()

@@ -94,23 +94,23 @@ def _segments(
     return segments
 
 
+# By how many numbers it has in q and v; a hinge or a slide: to these vectors it is one number.
+_KINDS = {(2, 1): "unbounded", (1, 1): "hinge"}
+
+
 def _read_urdf(pin: Any, path: Path) -> WitnessModel:
     model = pin.buildModelFromUrdf(str(path))
     joints: list[tuple[str, Segment]] = []
     changed = 0
     for number, name in list(enumerate(model.names))[1:]:
-        joint = model.joints[number]
-        kind = joint.shortname()
-        if kind.endswith("FreeFlyer"):
-            kind = "free"
+        joint, theirs = model.joints[number], model.joints[number].shortname()
+        free = theirs.endswith("FreeFlyer")
+        kind = "free" if free else _KINDS.get((joint.nq, joint.nv))
+        if kind is None:
+            raise ModelError(f"{path.name}: a joint of Pinocchio's kind {theirs} is not handled")
+        if free:
             changed += not model.jointPlacements[number].isIdentity()
             model.jointPlacements[number] = pin.SE3.Identity()  # as of an MJCF
-        elif (joint.nq, joint.nv) == (2, 1):
-            kind = "unbounded"
-        elif (joint.nq, joint.nv) == (1, 1):
-            kind = "hinge"  # or a slide: to Pinocchio's vectors it is one number
-        else:
-            raise ModelError(f"{path.name}: a joint of Pinocchio's kind {kind} is not handled")
         joints.append((name, Segment(kind, joint.idx_q, joint.idx_v)))
     links = [k for k, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
     bodies = {model.frames[k].name: k for k in links}

@@ -219,10 +219,9 @@ class PlainMjcf:
         self, element: Element, target: Element, body: FileBody, around: _Surroundings
     ) -> None:
         given = self._resolved(element, "joint", around)
-        free = element.tag == "freejoint" or given.get("type") == "free"
-        kind = "free" if free else given.get("type", "hinge")
+        kind = "free" if element.tag == "freejoint" else given.get("type", "hinge")
         compiler = around.source.compiler
-        if free and (element.get("align") == "true" or compiler.aligned):
+        if kind == "free" and (element.get("align") == "true" or compiler.aligned):
             raise ModelError(
                 f"{around.source.path.name} aligns a free body with its inertia, which its text "
                 "does not tell the place of"

@@ -123,9 +123,8 @@ class MujocoEngine(RawEngine):
         require("mujoco")
         opengl = offscreen_opengl()
         if opengl is None:
-            remedy = opengl_remedy()
             raise MissingEngineError(
-                f"MuJoCo finds no OpenGL to draw with: {remedy}", engine="OpenGL"
+                f"MuJoCo finds no OpenGL to draw with: {opengl_remedy()}", engine="OpenGL"
             )
         return opengl
 

@@ -59,8 +59,7 @@ class MujocoDriver(Driver):
     def leave_traces(self, machine: Any, point: SavePoint) -> None:
         """Every component that stepping does not change is left at something else."""
         model, data = machine.model, machine
-        rng = np.random.default_rng(self.seed + 2)
-        around = partial(rng.uniform, -_PUSH, _PUSH)
+        around = partial(np.random.default_rng(self.seed + 2).uniform, -_PUSH, _PUSH)
         data.time += 1.0
         data.qfrc_applied[:] += around(size=model.nv) * model.dof_M0
         data.xfrc_applied[:, :3] += around(size=(model.nbody, 3)) * model.body_mass[:, None] * 9.81

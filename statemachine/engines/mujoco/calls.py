@@ -89,7 +89,6 @@ def _fields(data: Any) -> tuple[str, ...]:
 class MujocoWatch(CallWatch):
     """A watch on MuJoCo."""
 
-    engine = "mujoco"
     words = CallWords(
         shown="the arrays, counts and options of MjData and MjModel",
         step="mj_step",
@@ -133,8 +132,10 @@ class MujocoWatch(CallWatch):
             if isinstance(value, (Model, Data)):
                 model = value if isinstance(value, Model) else value.model
                 where = label if model is value else f"{label}.model"
-                described = f"the description of {where}"
-                leads = [(where, model.raw, False), (described, model.compiled, True)]
+                leads = [
+                    (where, model.raw, False),
+                    (f"the description of {where}", model.compiled, True),
+                ]
             if isinstance(value, Data):  # of a closed one there is none
                 leads.append((label, getattr(value, "_raw", None), False))
             for said, thing, raw in leads:

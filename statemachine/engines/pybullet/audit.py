@@ -84,8 +84,11 @@ class PybulletDriver(Driver):
     def __init__(self, model: Model, seed: int) -> None:
         super().__init__(model, seed)
         self.name = f"PyBullet {model.engine_version} itself"
-        joints = enumerate(model.actuator_jntid.tolist())
-        self._servos = {int(model.jnt_dofadr[j]): actuator for actuator, j in joints if j >= 0}
+        self._servos = {  # actuators by degree of freedom
+            int(model.jnt_dofadr[joint]): actuator
+            for actuator, joint in enumerate(model.actuator_jntid.tolist())
+            if joint >= 0
+        }
 
     def lacks(self, point: SavePoint) -> str:
         limits = point.model.capabilities.behaviours["joint limits"]

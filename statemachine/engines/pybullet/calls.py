@@ -146,7 +146,6 @@ class _Arrays(WatchedObject):
 class PybulletWatch(CallWatch):
     """A watch on PyBullet."""
 
-    engine = "pybullet"
     words = CallWords(
         shown="what its getters tell without computing anything anew",
         step="stepSimulation",

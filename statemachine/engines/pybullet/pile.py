@@ -55,8 +55,9 @@ def _set_target(scene: BulletPile, value: float) -> None:
 def _push(scene: BulletPile, value: float) -> None:
     """A force that makes up this speed in one step of 1/240 s; the box weighs 1 kg."""
     at = pb.getBasePositionAndOrientation(scene.box, scene.client)[0]
-    force = (240 * value, 0, 0)
-    pb.applyExternalForce(scene.box, -1, force, at, pb.WORLD_FRAME, physicsClientId=scene.client)
+    pb.applyExternalForce(
+        scene.box, -1, (240 * value, 0, 0), at, pb.WORLD_FRAME, physicsClientId=scene.client
+    )
 
 
 def _moved(scene: BulletPile) -> float:

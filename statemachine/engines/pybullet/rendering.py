@@ -37,10 +37,12 @@ class PybulletDrawer:
             for part in parts
             for shape, colour in _shapes(part, (*GHOST, 1.0) if ghost else part.rgba)
         ]
-        up = camera.axes[1].tolist()
-        self._view = pb.computeViewMatrix(camera.eye.tolist(), list(camera.target), up)
-        aspect = size[0] / size[1]
-        self._lens = pb.computeProjectionMatrixFOV(camera.fovy, aspect, camera.near, camera.far)
+        self._view = pb.computeViewMatrix(
+            camera.eye.tolist(), list(camera.target), camera.axes[1].tolist()
+        )
+        self._lens = pb.computeProjectionMatrixFOV(
+            camera.fovy, size[0] / size[1], camera.near, camera.far
+        )
 
     def shot(self, xpos: Array, xquat: Array) -> Shot:
         """A picture with the bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
