@@ -7,35 +7,78 @@ held side by side. A difference is then of that step, of that stage and of that 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import BadInputError, DivergedError, UnsupportedError
-from ..interface import (
-    Array,
-    Data,
-    Model,
-    State,
-    forward,
-    get_state,
-    make_data,
-    reset,
-    set_state,
-    step,
-)
+from ..interface import Array, Data, Model, State, get_state, make_data, reset, set_state, step
 from ..runs.derived import put_row
 from ..runs.drive import Progress, silent
 from .matching import Matched, match_models
 from .perturbed import Rerun
-from .stages import Reading, StageReader
-from .step_samples import StageGap, StepSamples, StepSpike
+from .stages import AFTER, FORCE, FOUND, STAGES, Reading, StageMeasure, StageReader, measures
 
 MOMENTS = 200
 RELATIVE = 1e-6  # of the scale of a stage: what is less is rounding
 _BEFORE = ("qacc", "qfrc_contact", "qfrc_friction")
+_STANDS_OUT = 10.0  # times the median
+_MOST_SPIKES = 5
+
+
+@dataclass(frozen=True)
+class StageGap:
+    """One stage of a step, over all moments.
+
+    Attributes:
+        stage: Its name.
+        told: Whether both engines tell it; reason: why not, or "".
+        unit: Of the figures.
+        scale: Its usual size on the two sides: the median of its largest entry over the moments
+            at which that is at least a thousandth of what it ever is.
+        tolerance: What does not count.
+        null: How far the left side, put back to its own states, gets from its own run.
+        worst: The largest difference; at: when [s from the start].
+        where: The joint, body or pair to look at then.
+        beyond: At how many moments it is beyond the tolerance and beyond the null.
+        leads: At how many of them no earlier stage is, so that it has a cause of its own.
+        first: The first of them [s]; None if there is none.
+    """
+
+    stage: str
+    told: bool
+    reason: str = ""
+    unit: str = ""
+    scale: float = 0.0
+    tolerance: float = 0.0
+    null: float = 0.0
+    worst: float = 0.0
+    at: float | None = None
+    where: str = ""
+    beyond: int = 0
+    leads: int = 0
+    first: float | None = None
+
+
+@dataclass(frozen=True)
+class StepSpike:
+    """A moment at which the accelerations of one step differ far more than they usually do.
+
+    Attributes:
+        at: When [s from the start].
+        size: The difference of accelerations [unit]; joint: whose.
+        stage: The first stage beyond its tolerance there; where: its joint, body or pair.
+    """
+
+    at: float
+    size: float
+    unit: str
+    joint: str
+    stage: str
+    where: str
 
 
 @dataclass(frozen=True)
@@ -95,12 +138,13 @@ def one_step(
     if not matched.joints:
         raise BadInputError("the two sides have no joint in common: no state can be given on")
     reader = StageReader(matched)
-    samples = StepSamples(reader)
     trace = rerun.record(derive=False)
     rows = len(trace) - 1
     every = max(1, -(-rows // moments))
     inputs = {name: trace[name] for name in ("time", "qpos", "qvel", "ctrl")}
-    primed = ""
+    primed, failed = "", False
+    times: list[float] = []
+    readings: list[tuple[Reading, Reading, Reading]] = []
     with (
         make_data(matched.one) as running,
         make_data(matched.one) as left,
@@ -110,29 +154,31 @@ def one_step(
             start = inputs["qpos"][k], inputs["qvel"][k]
             set_state(matched.one, left, state)
             primed = _put(matched, reader, other, state, before) or primed
-            here = other.qpos.copy(), other.qvel.copy()
             try:
-                samples.add(
-                    float(inputs["time"][k] - inputs["time"][0]),
-                    _taken(reader, 0, running, start),
-                    _taken(reader, 0, left, start),
-                    _taken(reader, 1, other, here),
+                readings.append(
+                    (
+                        reader.step(0, running, *start),
+                        reader.step(0, left, *start),
+                        reader.step(1, other, other.qpos.copy(), other.qvel.copy()),
+                    )
                 )
             except DivergedError:
-                samples.failed = True
+                failed = True
                 break
+            times.append(float(inputs["time"][k] - inputs["time"][0]))
             progress(k / rows)
     progress(1.0)
-    measures = samples.measures(relative)
+    measured = measures(reader, readings, relative)
+    leading = _leading(measured, len(times))
     return StepComparison(
-        moments=len(samples.times),
+        moments=len(times),
         every=every,
-        until=samples.times[-1] if samples.times else 0.0,
+        until=times[-1] if times else 0.0,
         relative=relative,
-        stages=samples.gaps(measures),
-        spikes=samples.spikes(measures),
+        stages=_gaps(measured, times, Counter(stage for stage, _ in leading)),
+        spikes=_spikes(measured, times, leading),
         primed=primed,
-        notes=_notes(matched, samples),
+        notes=_notes(matched, failed),
     )
 
 
@@ -173,24 +219,74 @@ def _put(
     return reader.prime(1, data, before)
 
 
-def _taken(
-    reader: StageReader, side: int, data: Data, start: tuple[Array, Array]
-) -> tuple[Reading, Array]:
-    """Take a step, and read what it was made of, and how the velocity changed a second."""
-    model, (qpos, qvel) = data.model, start
-    # After a step, derived arrays are of the state before its last engine step.
-    stale = model.capabilities.behaviours["stale after a step"].support
-    if model.substeps == 1 and stale != "unsupported":
-        step(model, data)
-        reading = reader.read(side, data, qpos)
-    else:
-        forward(model, data)
-        reading = reader.read(side, data, qpos)
-        step(model, data)
-    return reading, (data.qvel - qvel) / model.timestep
+def _leading(measured: Sequence[StageMeasure], moments: int) -> list[tuple[str, str]]:
+    """For each moment the first stage beyond its tolerance, and its worst element."""
+    leading = [("", "")] * moments
+    for measure in sorted(measured, key=lambda m: -STAGES.index(m.stage)):
+        for row in np.flatnonzero(measure.beyond.any(axis=1)).tolist():
+            leading[row] = measure.stage, measure.culprit(row)
+    return leading
 
 
-def _notes(matched: Matched, samples: StepSamples) -> tuple[str, ...]:
+def _gaps(
+    measured: Sequence[StageMeasure], times: Sequence[float], leads: Mapping[str, int]
+) -> tuple[StageGap, ...]:
+    """Each stage, by that of its units that is farthest beyond its tolerance."""
+    gaps = []
+    for stage in STAGES:
+        by_unit = [_gap(measure, times) for measure in measured if measure.stage == stage]
+        if not by_unit:
+            reason = "nothing touches" if stage == FOUND else "an engine does not tell it"
+            by_unit = [StageGap(stage, stage == FOUND, reason)]
+        # Of the measures of one stage that of pairs comes last, and says more than joints do.
+        gaps.append(replace(max(reversed(by_unit), key=_weight), leads=leads[stage]))
+    return tuple(gaps)
+
+
+def _weight(gap: StageGap) -> tuple[bool, float]:
+    """By what the units of one stage are ranked."""
+    if not gap.worst or gap.stage == FORCE:
+        return gap.beyond > 0, float(gap.worst > 0)
+    return gap.beyond > 0, gap.worst / gap.tolerance if gap.tolerance else np.inf
+
+
+def _gap(measure: StageMeasure, times: Sequence[float]) -> StageGap:
+    place = np.unravel_index(int(np.argmax(measure.apart)), measure.apart.shape)
+    row, worst = int(place[0]), float(measure.apart[place])
+    hits = np.flatnonzero(measure.beyond.any(axis=1))
+    return StageGap(
+        stage=measure.stage,
+        told=True,
+        unit=measure.unit,
+        scale=measure.scale,
+        tolerance=measure.tolerance,
+        null=float(measure.null.max()),
+        worst=worst,
+        at=times[row] if worst else None,
+        where=measure.culprit(row) if worst else "",
+        beyond=len(hits),
+        first=times[int(hits[0])] if len(hits) else None,
+    )
+
+
+def _spikes(
+    measured: Sequence[StageMeasure], times: Sequence[float], leading: Sequence[tuple[str, str]]
+) -> tuple[StepSpike, ...]:
+    """The moments at which the accelerations stand out, the largest first."""
+    spikes: list[StepSpike] = []
+    for measure in (measure for measure in measured if measure.stage == AFTER):
+        most = measure.apart.max(axis=1)
+        stands = measure.beyond.any(axis=1) & (most > _STANDS_OUT * np.median(most))
+        padded = np.concatenate([[-np.inf], most, [-np.inf]])
+        stands &= (most >= padded[:-2]) & (most > padded[2:])  # no flank of another
+        for row in np.flatnonzero(stands).tolist():
+            joint = measure.names[int(np.argmax(measure.apart[row]))]
+            size = float(most[row])
+            spikes.append(StepSpike(times[row], size, measure.unit, joint, *leading[row]))
+    return tuple(sorted(spikes, key=lambda spike: -spike.size)[:_MOST_SPIKES])
+
+
+def _notes(matched: Matched, failed: bool) -> tuple[str, ...]:
     one, two = matched.one, matched.two
     names = ("position servo", "joint damping", "dry friction", "joint limits")
     by_us = [
@@ -211,7 +307,7 @@ def _notes(matched: Matched, samples: StepSamples) -> tuple[str, ...]:
             for backend, laws in by_us
         ),
         (
-            samples.failed,
+            failed,
             "a side does not stand a step from a state of the left one: the rest is left out",
         ),
     ]

@@ -1,15 +1,16 @@
-"""The stages of one step, as two matched Models tell them: what is compared, and of what."""
+"""The stages of one step, as two matched Models tell them, and how far apart they are."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..engines import room
-from ..interface import Array, Data, Ints, JointType, Model
+from ..interface import Array, Data, Ints, JointType, Model, forward, step
 from ..measures import ContactNames
 from ..rotations import angle_between, matrix_from_quat
 from ..runs.derived import array_or_nan
@@ -27,167 +28,142 @@ ARRAYS = {
     ACCELERATION: ("qacc",),
 }
 STAGES = (KINEMATICS, MASS, "bias", "actuator", "passive", FOUND, *list(ARRAYS)[3:], AFTER)
+_FORCES = ("bias", "actuator", "passive", FORCE, "other constraints")
 _WORDS = {"qfrc_friction": "dry friction", "qfrc_limit": "limit", "qfrc_equality": "equality"}
+_UNITS = ("m", "rad", "kg·m²", "kg·m", "kg", "N·m", "N", "rad/s²", "m/s²")
+_LEAST = 1e-3  # of the largest: a size that is less is not usual
 
 
-@dataclass(frozen=True, eq=False)
-class StageGroup:
-    """Numbers of one stage that have one unit.
-
-    Attributes:
-        stage: One of `STAGES`.
-        unit: Theirs.
-        names: What each is of: a joint, a body, a pair of joints.
-        size: Of an element: 1 for a number, 3 for a vector, 9 for a rotation.
-    """
+class StageColumn(NamedTuple):
+    """The k elements of a stage: a name and a unit for each."""
 
     stage: str
-    unit: str
-    names: tuple[str, ...]
-    size: int = 1
-
-    def apart(self, one: Array, two: Array) -> Array:
-        """How far apart the elements (n, k) are at n moments; NaN where one is not told."""
-        shape = len(one), len(self.names), self.size
-        if self.size == 9:
-            return angle_between(one.reshape(*shape[:2], 3, 3), two.reshape(*shape[:2], 3, 3))
-        return np.linalg.norm((one - two).reshape(shape), axis=2)
-
-    def largest(self, one: Array, two: Array) -> Array:
-        """The largest of all elements (n,); of places their reach, of rotations one radian."""
-        if self.size == 9:
-            return np.ones(len(one))
-        both = np.concatenate([one, two], axis=1).reshape(len(one), -1, self.size)
-        if self.size == 3:
-            return np.array([float(np.linalg.norm(reach)) for reach in np.ptp(both, axis=1)])
-        return np.nanmax(np.abs(both[:, :, 0]), axis=1, initial=0.0)
+    names: Sequence[str]
+    units: Sequence[str]
 
 
-Touching = dict[str, Array]  # by pair (4,): how deep [m], and the force [N]
-Reading = tuple[list[Array], Touching]
+class Reading(NamedTuple):
+    """One step of one side.
+
+    Attributes:
+        values: Of each column its elements (k, size): numbers, vectors of 3, rotations of 9.
+        contacts: By pair of bodies or geoms (4,): how deep [m], and the force [N].
+    """
+
+    values: list[Array]
+    contacts: dict[str, Array]
 
 
 class StageReader:
     """Reads the same numbers, in the same order, from a Data of either Model.
 
     Attributes:
-        groups: What is read.
-        dofs: For each Model the degrees of freedom that both have.
+        columns: What is read, but for contacts.
     """
 
     def __init__(self, matched: Matched) -> None:
         self._matched = matched
-        self._models = matched.one, matched.two
-        self._rooms = [room(model.backend) for model in self._models]
-        one, two = self._models
-        here, names, turns = _dofs(one, [a for a, _ in matched.joints])
-        self.dofs, self._turns = (here, _dofs(two, [b for _, b in matched.joints])[0]), turns
-        bodies = tuple(one.body_names[s.one] or f"body {s.one}" for s in matched.solids[1:])
-        sites = tuple(one.site_names[a] or f"site {a}" for a, _ in matched.sites)
-        self.groups: list[StageGroup] = [
-            StageGroup(KINEMATICS, "m", bodies + sites, 3),
-            StageGroup(KINEMATICS, "rad", bodies + sites, 9),
-        ]
-        upper = np.triu_indices(len(names))
-        self._mass_units: list[tuple[Ints, Ints]] = []
-        for both, unit in ((2, "kg·m²"), (1, "kg·m"), (0, "kg")):
-            chosen = turns[upper[0]].astype(int) + turns[upper[1]].astype(int) == both
-            rows, columns = upper[0][chosen], upper[1][chosen]
-            pairs = zip(rows.tolist(), columns.tolist(), strict=True)
-            labels = tuple(names[i] if i == j else f"{names[i]} and {names[j]}" for i, j in pairs)
-            self._mass_units.append((rows, columns))
-            self.groups.append(StageGroup(MASS, unit, labels))
+        self._models = left, right = matched.one, matched.two
+        here, names, turns = _dofs(left, [a for a, _ in matched.joints])
+        self._dofs = here, _dofs(right, [b for _, b in matched.joints])[0]
+        frames = [left.body_names[s.one] or f"body {s.one}" for s in matched.solids[1:]]
+        frames += [left.site_names[a] or f"site {a}" for a, _ in matched.sites]
+        self._upper = np.triu_indices(len(names))
+        entries = list(zip(*(places.tolist() for places in self._upper), strict=True))
+        masses = [names[i] if i == j else f"{names[i]} and {names[j]}" for i, j in entries]
+        accelerations = np.where(turns, "rad/s²", "m/s²").tolist()
+        self.columns = [
+            StageColumn(KINEMATICS, frames, ["m"] * len(frames)),
+            StageColumn(KINEMATICS, frames, ["rad"] * len(frames)),
+            StageColumn(MASS, masses, [("kg", "kg·m", "kg·m²")[turns[i] + turns[j]]
+                                       for i, j in entries]),
+        ]  # fmt: skip
         for stage, arrays in {**ARRAYS, AFTER: ("",)}.items():
-            units = ("rad/s²", "m/s²") if stage in (ACCELERATION, AFTER) else ("N·m", "N")
-            self.groups += self._of_dofs(stage, names, units, arrays)
-        self._names = _contact_names(matched)
-
-    def _of_dofs(
-        self, stage: str, names: Sequence[str], units: tuple[str, str], arrays: Sequence[str]
-    ) -> list[StageGroup]:
-        labels = [
-            f"{name} ({_WORDS[array]})" if array in _WORDS else name
-            for array in arrays
-            for name in names
-        ]
-        turns = np.tile(self._turns, len(arrays))
-        return [
-            StageGroup(stage, unit, tuple(np.array(labels, dtype=object)[chosen]))
-            for unit, chosen in ((units[0], turns), (units[1], ~turns))
-        ]
+            units = np.where(turns, "N·m", "N").tolist()
+            self.columns.append(
+                StageColumn(
+                    stage,
+                    [f"{n} ({_WORDS[a]})" if a in _WORDS else n for a in arrays for n in names],
+                    (accelerations if stage in (ACCELERATION, AFTER) else units) * len(arrays),
+                )
+            )
+        self._contact_names = _contact_names(matched)
 
     def prime(self, side: int, data: Data, before: dict[str, Array]) -> str:
         """Let a Data know of the step before, and say what of it its engine takes; "" for nothing.
 
         `before` are arrays of the other side.
         """
-        own, model = self._rooms[side], self._models[side]
-        if not own.primes:
-            return ""
-        given = {}
-        for name, values in before.items():
-            given[name] = np.zeros(model.nv)
-            given[name][self.dofs[side]] = values[self.dofs[1 - side]]
-        own.prime(model, data, given)
-        return own.primes
+        model = self._models[side]
+        engine = room(model.backend)
+        if engine.primes:
+            given = {name: np.zeros(model.nv) for name in before}
+            for name, values in before.items():
+                given[name][self._dofs[side]] = values[self._dofs[1 - side]]
+            engine.prime(model, data, given)
+        return engine.primes
 
-    def read(self, side: int, data: Data, qpos: Array) -> Reading:
-        """The numbers of all groups but the last, and the contacts.
+    def step(self, side: int, data: Data, qpos: Array, qvel: Array) -> Reading:
+        """Take a step, and read what it was made of.
 
         Args:
             side: 0 or 1.
-            data: Its derived arrays are of the state.
-            qpos: (nq,) of the state.
+            data: In the state that the step begins in.
+            qpos: (nq,) and qvel (nv,) of that state.
+            qvel: See qpos.
         """
-        model, dofs = self._models[side], self.dofs[side]
-        where, turned = self._poses(side, data)
-        found: list[Array] = [where, turned]
-        mass = self._rooms[side].mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
-        found += [mass[rows, columns] for rows, columns in self._mass_units]
-        for arrays in ARRAYS.values():
-            values = np.concatenate([array_or_nan(data, name)[dofs] for name in arrays])
-            turns = np.tile(self._turns, len(arrays))
-            found += [values[turns], values[~turns]]
-        return found, self._touching(side, data)
+        model, dofs = self._models[side], self._dofs[side]
+        # After a step, derived arrays are of the state before its last engine step.
+        stale = model.capabilities.behaviours["stale after a step"].support != "unsupported"
+        if stale and model.substeps == 1:
+            step(model, data)
+            values, contacts = self._read(side, data, qpos), self._contacts(side, data)
+        else:
+            forward(model, data)
+            values, contacts = self._read(side, data, qpos), self._contacts(side, data)
+            step(model, data)
+        rate = (data.qvel - qvel) / model.timestep
+        return Reading([*values, rate[dofs, None]], contacts)
 
-    def whole(self, side: int, reading: Reading, rate: Array) -> list[Array]:
-        """The numbers of all groups; `rate` (nv,) is how the velocity changed, a second."""
-        own = rate[self.dofs[side]]
-        return [*reading[0], own[self._turns], own[~self._turns]]
+    def _read(self, side: int, data: Data, qpos: Array) -> list[Array]:
+        """All columns but the velocity update."""
+        model, dofs = self._models[side], self._dofs[side]
+        mass = room(model.backend).mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
+        forces = [
+            np.concatenate([array_or_nan(data, name)[dofs] for name in arrays])[:, None]
+            for arrays in ARRAYS.values()
+        ]
+        return [*self._poses(side, data), mass[self._upper][:, None], *forces]
 
     def _poses(self, side: int, data: Data) -> tuple[Array, Array]:
         """Origins and rotations of the left's frames, wherever the right's are in the solids."""
-        solids, sites = self._matched.solids[1:], self._matched.sites
-        xpos, xquat = data.xpos, data.xquat
-        spots, turns = [], []
-        for solid in solids:
+        xpos, xquat, positions, rotations = data.xpos, data.xquat, [], []
+        for solid in self._matched.solids[1:]:
             body = (solid.one, solid.two)[side]
-            turn = matrix_from_quat(xquat[body])
-            spot = xpos[body]
+            position, rotation = xpos[body], matrix_from_quat(xquat[body])
             if side:
-                spot, turn = spot + turn @ solid.align.pos, turn @ solid.align.mat
-            spots.append(spot)
-            turns.append(turn.ravel())
-        for pair in sites:
-            spots.append(data.site_xpos[pair[side]])
-            turns.append(data.site_xmat[pair[side]])
-        return np.array(spots).ravel(), np.array(turns).ravel()
+                position = position + rotation @ solid.align.pos
+                rotation = rotation @ solid.align.mat
+            positions.append(position)
+            rotations.append(rotation.ravel())
+        for pair in self._matched.sites:
+            positions.append(data.site_xpos[pair[side]])
+            rotations.append(data.site_xmat[pair[side]].ravel())
+        return np.reshape(positions, (-1, 3)), np.reshape(rotations, (-1, 9))
 
-    def _touching(self, side: int, data: Data) -> Touching:
-        contacts, (say, keys) = data.contacts, self._names[side]
-        found: Touching = {}
+    def _contacts(self, side: int, data: Data) -> dict[str, Array]:
+        contacts, (name_of, keys) = data.contacts, self._contact_names[side]
+        by_pair: dict[str, Array] = {}
         for k, geoms in enumerate(contacts.geom.tolist()):
             # Of points that are apart only a force counts: an engine may push before they touch.
             depth = max(0.0, -float(contacts.dist[k]))
             force = contacts.frame[k].T @ contacts.force[k]
-            if not depth and not force.any():
-                continue
-            one, two = (keys[geom] for geom in geoms)
-            name = say(one, two)
-            before = found.get(name, np.zeros(4))
-            total = before[1:] + (-force if one > two else force)
-            found[name] = np.array([max(depth, before[0]), *total])
-        return found
+            if depth or force.any():
+                a, b = (keys[geom] for geom in geoms)
+                total = by_pair.setdefault(name_of(a, b), np.zeros(4))
+                total[0] = max(depth, total[0])
+                total[1:] += -force if a > b else force
+        return by_pair
 
 
 # What says how a contact of two keys is called, and the key of each geom: of the two keys the
@@ -197,29 +173,159 @@ PairNames = tuple[Callable[[int, int], str], Sequence[int]]
 
 def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
     """By geoms, where both Models have the same; else by bodies, called as on the left."""
-    one, two = matched.one, matched.two
-    if one.geom_names == two.geom_names and np.array_equal(one.geom_bodyid, two.geom_bodyid):
-        same: PairNames = ContactNames.of(one).geoms, range(one.ngeom)
+    left, right = matched.one, matched.two
+    if left.geom_names == right.geom_names and np.array_equal(left.geom_bodyid, right.geom_bodyid):
+        same: PairNames = ContactNames.of(left).geoms, range(left.ngeom)
         return same, same
     counterpart = {b: a for a, b in matched.bodies}
     # A body that only the right has comes after those of the left.
-    extra = [b for b in range(two.nbody) if b not in counterpart]
-    labels = [*one.body_names, *(two.body_names[b] or f"body {b} of the right" for b in extra)]
-    counterpart |= {b: one.nbody + k for k, b in enumerate(extra)}
-    parents = [*one.body_parentid.tolist(), *([0] * len(extra))]
+    extra = [b for b in range(right.nbody) if b not in counterpart]
+    labels = [*left.body_names, *(right.body_names[b] or f"body {b} of the right" for b in extra)]
+    counterpart |= {b: left.nbody + k for k, b in enumerate(extra)}
+    parents = [*left.body_parentid.tolist(), *([0] * len(extra))]
     geoms = ["world", *([""] * (len(labels) - 1))]
     names = ContactNames(labels, geoms, range(len(labels)), parents)
-    right = [counterpart[int(body)] for body in two.geom_bodyid]
-    return (names.pair, one.geom_bodyid.tolist()), (names.pair, right)
+    keys = [counterpart[int(body)] for body in right.geom_bodyid]
+    return (names.pair, left.geom_bodyid.tolist()), (names.pair, keys)
 
 
-def _dofs(model: Model, joints: Sequence[int]) -> tuple[Ints, list[str], NDArray[np.bool_]]:
-    """The degrees of freedom of some joints, a name for each, and whether it turns."""
+def _dofs(model: Model, joints: Sequence[int]) -> tuple[Ints, list[str], Ints]:
+    """The degrees of freedom of some joints, a name for each, and 1 for one that turns."""
     dofs, names, turns = [], [], []
     for joint in joints:
         kind, start = JointType(int(model.jnt_type[joint])), int(model.jnt_dofadr[joint])
         dofs += range(start, start + kind.nv)
         names += [model.joint_names[joint] or f"joint {joint}"] * kind.nv
-        free = [False] * 3 + [True] * 3
-        turns += free if kind is JointType.FREE else [kind is not JointType.SLIDE] * kind.nv
-    return np.array(dofs, dtype=np.int64), names, np.array(turns, dtype=bool)
+        free = [0] * 3 + [1] * 3
+        turns += free if kind is JointType.FREE else [int(kind is not JointType.SLIDE)] * kind.nv
+    return np.array(dofs, dtype=np.int64), names, np.array(turns, dtype=np.int64)
+
+
+@dataclass(eq=False)
+class StageMeasure:
+    """What was read of a stage in one unit: of k elements, at n moments.
+
+    Attributes:
+        stage, unit: Of all elements.
+        names: What each is of: a joint, a body, a pair of joints.
+        apart: (n, k) how far the two sides are apart.
+        null: (n, k) how far the left side is from itself.
+        scale: Its usual size, on either side.
+        tolerance: What does not count.
+    """
+
+    stage: str
+    unit: str
+    names: list[str]
+    apart: Array
+    null: Array
+    scale: float
+    tolerance: float = 0.0
+
+    @property
+    def beyond(self) -> NDArray[np.bool_]:
+        """(n, k) what is beyond the tolerance, and beyond the null."""
+        return self.apart > np.maximum(self.tolerance, self.null)
+
+    def culprit(self, row: int) -> str:
+        """What to look at in a moment: the element that differs most, or where that comes from.
+
+        A body that is elsewhere takes along all that hangs on it, so that the first one counts; a
+        mass shows in the entries of every joint that carries it, so that the last of these counts.
+        """
+        hits = np.flatnonzero(self.beyond[row]).tolist()
+        if self.stage == MASS:
+            hits = [k for k in hits if " and " not in self.names[k]]
+        if hits and self.stage in (KINEMATICS, MASS):
+            return self.names[hits[0 if self.stage == KINEMATICS else -1]]
+        return self.names[int(np.argmax(self.apart[row]))]
+
+
+def measures(
+    reader: StageReader, readings: Sequence[tuple[Reading, Reading, Reading]], relative: float
+) -> list[StageMeasure]:
+    """What both sides tell, by stage and unit.
+
+    Args:
+        reader: That read them.
+        readings: Of each moment: the left side as it runs, put back to its State, and the right.
+        relative: What does not count, of the scale.
+    """
+    if not readings:
+        return []
+    columns = [
+        (column, [np.array([moment[k].values[c] for moment in readings]) for k in range(3)])
+        for c, column in enumerate(reader.columns)
+    ]
+    pairs = list(
+        dict.fromkeys(p for moment in readings for k in (1, 2, 0) for p in moment[k].contacts)
+    )
+    if pairs:
+        # Depth and force of each pair at each moment; what is not found is zero.
+        sides = [
+            np.array([[m[k].contacts.get(pair, np.zeros(4)) for pair in pairs] for m in readings])
+            for k in range(3)
+        ]
+        units = (FOUND, "m", slice(0, 1)), (FORCE, "N", slice(1, 4))
+        columns += [
+            (StageColumn(stage, pairs, [unit] * len(pairs)), [side[:, :, part] for side in sides])
+            for stage, unit, part in units
+        ]
+    by_unit = [measure for column, sides in columns for measure in _by_unit(column, *sides)]
+    # What is nothing but rounding, as the contact force of a run in which nothing touches,
+    # is held against the other forces, and accelerations against what forces give.
+    least = {unit: _largest_scale(by_unit, _FORCES, unit) for unit in ("N·m", "N")}
+    for unit, force, mass in (("rad/s²", "N·m", "kg·m²"), ("m/s²", "N", "kg")):
+        largest = _largest_scale(by_unit, (MASS,), mass)
+        least[unit] = least[force] / largest if largest else 0.0
+    for measure in by_unit:
+        if measure.stage in (*_FORCES, ACCELERATION, AFTER):
+            measure.scale = max(measure.scale, _LEAST * least[measure.unit])
+        measure.tolerance = relative * measure.scale
+    return by_unit
+
+
+def _by_unit(
+    column: StageColumn, running: Array, left: Array, right: Array
+) -> Iterator[StageMeasure]:
+    """The elements (n, k, size) of each unit, those of them that both sides tell."""
+    for unit in _UNITS:
+        places = [k for k, of in enumerate(column.units) if of == unit]
+        apart = _distances(left[:, places], right[:, places])
+        told = np.flatnonzero(np.isfinite(apart).all(axis=0))
+        if len(told):
+            null = np.nan_to_num(_distances(running[:, places], left[:, places]))
+            sizes = _sizes(column.stage, left[:, places], right[:, places])
+            acting = sizes[sizes > _LEAST * sizes.max(initial=0.0)]
+            yield StageMeasure(
+                column.stage,
+                unit,
+                [column.names[places[k]] for k in told.tolist()],
+                apart[:, told],
+                null[:, told],
+                # The median, of those that are no thousandth of the largest.
+                float(np.median(acting)) if len(acting) else 0.0,
+            )
+
+
+def _distances(one: Array, two: Array) -> Array:
+    """How far apart elements (n, k, size) are (n, k); NaN where one is not told."""
+    if one.shape[2] == 9:
+        shape = *one.shape[:2], 3, 3
+        return angle_between(one.reshape(shape), two.reshape(shape))
+    return np.linalg.norm(one - two, axis=2)
+
+
+def _sizes(stage: str, one: Array, two: Array) -> Array:
+    """The largest of all elements (n,); of places their reach, of rotations one radian."""
+    both = np.concatenate([one, two], axis=1)
+    if both.shape[2] == 9:
+        return np.ones(len(both))
+    if stage == KINEMATICS:
+        return np.array([float(np.linalg.norm(reach)) for reach in np.ptp(both, axis=1)])
+    return np.nanmax(np.linalg.norm(both, axis=2), axis=1, initial=0.0)
+
+
+def _largest_scale(rows: Sequence[StageMeasure], stages: Sequence[str], unit: str) -> float:
+    """The largest scale of some stages in a unit."""
+    return max((m.scale for m in rows if m.stage in stages and m.unit == unit), default=0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..compare import StepComparison
-from ..compare.step_samples import StageGap
+from ..compare.one_step import StageGap
 from ..measures.text import NONE, figure, listed, quantity, sentence, short_time
 from ..page import Headline, Items, Page, Table, TableCell, Text
 from . import template
