@@ -16,8 +16,8 @@ from statemachine.commands.compare import EXPERIMENTS
 from statemachine.compare import (
     Request,
     compare,
+    run_sides,
     series,
-    sides_of,
     touches,
     witness,
 )
@@ -219,7 +219,8 @@ def test_the_whole_force_of_a_contact_is_the_engines(box: Trace) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_both_figures_of_a_force_are_given() -> None:
-    (one, two), _ = sides_of("hold")
+    run = run_sides("hold")
+    one, two = run.left, run.right
     assert "gripper on floor, normal force" in by_name(compare(one, two))
     # The greatest that the course's page shows, and that of the vectors.
     assert normal_forces(one)["gripper on floor"].max() == pytest.approx(351, abs=1)
@@ -228,7 +229,8 @@ def test_both_figures_of_a_force_are_given() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_hold_ends_pressed_on_one_engine_and_free_on_the_other() -> None:
-    (one, two), _ = sides_of("hold")
+    run = run_sides("hold")
+    one, two = run.left, run.right
     touch: Any = touches(one, two)[0]
     assert (touch.one.ends, touch.two.ends) == (True, False)
     assert touch.one.force > 10
@@ -330,7 +332,8 @@ def test_what_is_no_tolerance(word: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_free_of_contact_the_engines_agree() -> None:
     for name in ("droop", "fall", "waves"):
-        (one, two), said = sides_of(name)
+        run = run_sides(name)
+        one, two, said = run.left, run.right, run.said
         found = compare(one, two)
         assert found.agrees, name
         assert not said
@@ -341,7 +344,8 @@ def test_free_of_contact_the_engines_agree() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_hold_parts_when_the_finger_meets_the_floor() -> None:
-    (one, two), _ = sides_of("hold")
+    run = run_sides("hold")
+    one, two = run.left, run.right
     found = by_name(compare(one, two))
     assert found["gripper on floor, first touch"].verdict == "agrees"
     touch = found["gripper on floor, first touch"].at
@@ -355,7 +359,8 @@ def test_the_hold_parts_when_the_finger_meets_the_floor() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
-    (one, two), _ = sides_of(Request(("hold",), defaults="engine"))
+    run = run_sides(Request(("hold",), defaults="engine"))
+    one, two = run.left, run.right
     found = compare(one, two)
     # FINDINGS: POSITION_CONTROL is 13 to 41 degrees off in the transient, at 5 ms.
     assert np.degrees(by_name(found)["elbow_flex"].max) > 13
@@ -365,7 +370,8 @@ def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
 @pytest.mark.usefixtures("bullet")
 def test_one_trace_is_played_on_the_other_engine(tmp_path: Any) -> None:
     path = write(traced("waves", seed=2), tmp_path / "waves.npz")
-    (one, two), said = sides_of(Request((str(path),)))
+    run = run_sides(Request((str(path),)))
+    one, two, said = run.left, run.right, run.said
     assert (one.header.backend, two.header.backend) == ("mujoco", "pybullet")
     assert compare(one, two).agrees
     assert "was played on pybullet" in said[0]
@@ -412,7 +418,8 @@ def no_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_pybullet_its_recorded_run_takes_its_place(
     no_pybullet: None, name: str, defaults: Any
 ) -> None:
-    (one, two), said = sides_of(Request((name,), defaults=defaults))
+    run = run_sides(Request((name,), defaults=defaults))
+    one, two, said = run.left, run.right, run.said
     assert not one.header.recorded
     assert two.header.recorded
     assert "recorded run that comes with the package" in said[0]
@@ -426,7 +433,7 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
 
 def test_what_was_not_recorded_needs_the_engine(no_pybullet: None) -> None:
     with pytest.raises(MissingEngineError, match="pybullet is not installed"):
-        sides_of(Request(("hold",), seconds=1.0))
+        run_sides(Request(("hold",), seconds=1.0))
 
 
 # The command.

@@ -12,7 +12,7 @@ import pytest
 import statemachine as sm
 from statemachine.backends import pybullet_backend
 from statemachine.cli import main
-from statemachine.compare import Request, sides_of
+from statemachine.compare import Request, run_sides
 from statemachine.compare import compare as compare_traces
 from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.checks import HUGE
@@ -177,7 +177,8 @@ def test_both_sides_may_diverge(tmp_path: Path) -> None:
       <general joint="wheel" gainprm="1" biastype="affine" biasprm=".1 0 2" ctrlrange="-1 1"/>
       </actuator></mujoco>""",
     )
-    (one, two), _ = sides_of(Request(("droop",), model=str(path)))
+    run = run_sides(Request(("droop",), model=str(path)))
+    one, two = run.left, run.right
     found = compare_traces(one, two)
     assert found.one.ended
     assert found.two.ended

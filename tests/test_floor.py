@@ -12,12 +12,13 @@ import pytest
 import statemachine as sm
 from statemachine.compare import FloorBand, Uncertainty, chaos_floor, compare, perturbed_runs
 from statemachine.compare.matching import match_models
-from statemachine.compare.perturbed import ROUNDING, Rerun, parse_uncertainty
+from statemachine.compare.perturbed import ROUNDING, parse_uncertainty
 from statemachine.compare.why.gap import Ruler
 from statemachine.errors import BadInputError
 from statemachine.page import Text
 from statemachine.report import compare as report
 from statemachine.runs import Trace
+from statemachine.runs.rerun import Rerun
 
 from .conftest import Cli
 from .small_models import DOUBLE_PENDULUM, PENDULUM, TILTED_BOX, model_of

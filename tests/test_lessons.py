@@ -38,7 +38,7 @@ from statemachine.lessons.session import CodeRun, Taken, load_line, page_of_less
 from statemachine.page import Code, Heading, Page, Printed, Question, Table, Text, Traces, Verdict
 from statemachine.report import progress as bar
 from statemachine.report import quiz
-from statemachine.runs.recorder import record_scenario
+from statemachine.runs.rerun import record_scenario
 from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import ROOT, Cli, assert_in, assert_not_in, lesson_result, one_line, written

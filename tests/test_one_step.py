@@ -10,10 +10,10 @@ import pytest
 import statemachine as sm
 from statemachine.compare import StepComparison, one_step, rerun_of
 from statemachine.compare.one_step import RELATIVE
-from statemachine.compare.perturbed import Rerun
 from statemachine.compare.stages import STAGES
 from statemachine.errors import BadInputError
 from statemachine.report.one_step import page
+from statemachine.runs.rerun import Rerun
 from statemachine.runs.scenarios import scenario
 
 from .small_models import LINKS_AND_BALL, model_of

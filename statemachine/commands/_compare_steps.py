@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from ._common import PROGRAM, Row, refuse, show
-from ._compare_rerun import both_of, finer
 
 OPTIONS: tuple[Row, ...] = (
     (
@@ -60,12 +59,12 @@ def run(options: argparse.Namespace, request: Any) -> int:
 
 
 def _one_step(options: argparse.Namespace, request: Any) -> int:
-    from ..compare import one_step
+    from ..compare import one_step, prepare_sides
     from ..compare.labels import numbered
     from ..report.one_step import page
     from ..report.progress import progress
 
-    left, right = both_of(request)
+    (left, right), _, _ = prepare_sides(request)
     with progress("one step") as told:
         found = one_step(left, right.model, names=request.names, progress=told)
     labels = numbered(tuple(side.label for side in request.sides) or request.backends)
@@ -73,13 +72,21 @@ def _one_step(options: argparse.Namespace, request: Any) -> int:
 
 
 def _converge(options: argparse.Namespace, request: Any) -> int:
-    from ..compare import convergence, sides_of
+    from ..compare import convergence, run_sides
     from ..report.convergence import page
     from ..report.progress import progress
 
+    def with_more(options: dict[str, Any], usual: int, times: int) -> dict[str, Any]:
+        return {**options, "substeps": options.get("substeps", usual) * times}
+
     def run(times: int) -> Any:
-        traces, _ = sides_of(finer(request, times))
-        return traces
+        given = request.options.get("substeps", 1)
+        sides = tuple(
+            replace(side, options=with_more(side.options, given, times)) for side in request.sides
+        )
+        both = with_more(request.options, 1, times)
+        finer = run_sides(replace(request, options=both, sides=sides))
+        return finer.left, finer.right
 
     with progress("converge") as told:
         found = convergence(run, progress=told)
@@ -87,7 +94,7 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
 
 
 def _versions(options: argparse.Namespace, request: Any) -> int:
-    from ..compare import compare, sides_of
+    from ..compare import compare, run_sides
     from ..measures import parse_tolerances
     from ..releases import backends_of, published
     from ..report.progress import progress
@@ -98,8 +105,8 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
     check_junit(options)
 
     def compared(pair: tuple[str, str], *bar: Any) -> Any:
-        traces, _ = sides_of(replace(request, backends=pair), *bar)
-        return compare(*traces, tolerances=tolerances)
+        run = run_sides(replace(request, backends=pair), *bar)
+        return compare(run.left, run.right, tolerances=tolerances)
 
     if options.bisect:
         backends = _around_a_change(published(options.versions), compared)

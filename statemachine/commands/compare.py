@@ -8,7 +8,6 @@ from typing import Any
 from ..errors import EndedEarlyError
 from ..installed import PAIR
 from . import (
-    _compare_floor,
     _compare_html,
     _compare_models,
     _compare_steps,
@@ -78,7 +77,13 @@ def add(parser: argparse.ArgumentParser) -> None:
             "another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
             REPEATED,
         ),
-        *_compare_floor.OPTIONS,
+        (
+            "--uncertainty",
+            "SIZE",
+            "how uncertain the start of your robot is, such as 0.1mm or 0.1deg",
+            REPEATED,
+        ),
+        ("--no-chaos", "", "do not look for the chaos floor: faster"),
         *_compare_html.OPTIONS,
         json_of(),
         ("--junit", "FILE", "write each quantity as a test of JUnit, for CI", {"type": file_name}),
@@ -283,7 +288,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
-    from ..compare import compare, run_sides, sides_of, touches, witness
+    from ..compare import compare, run_sides, touches, witness
     from ..measures import parse_tolerances
     from ..report import compare as report
     from ..report.progress import progress
@@ -295,30 +300,27 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
         refuse_given(
             options, ["backends"], "{} is of a run, and two traces are runs that were made"
         )
-    renderer, run = pictures.checked(options), None
+    renderer = pictures.checked(options)
     with progress("compare") as told:
-        if request.sides:
-            run = run_sides(request, told)
-            (one, two), said = (run.left, run.right), run.said
-        else:
-            (one, two), said = sides_of(request, told)
+        run = run_sides(request, told)
+    one, two, said = run.left, run.right, run.said
     found = compare(one, two, tolerances=tolerances)
-    played = compare(one, run.played, tolerances=tolerances) if run and run.is_apart else None
+    played = compare(one, run.played, tolerances=tolerances) if run.is_apart else None
     if options.json:
-        for line in (*(run.unmatched if run else ()), *said):
+        for line in (*run.unmatched, *said):
             complain(line, 0)
-    asked = witness(one, two, run.file if run else None)
-    rerun = run.reruns[0] if run and run.reruns else None
-    floor = _compare_floor.floor_of(options, request, found, one, two, rerun)
+    asked = witness(one, two, run.file)
+    floor = _floor(options, found, run)
+    given = run if request.sides else None
     if options.html:
-        _compare_html.write(options, request, found, (one, two), said, asked, run, played, floor)
+        _compare_html.write(options, request, found, (one, two), said, asked, given, played, floor)
     page = report.page(
         found,
         one,
         two,
         said=said,
         witness=asked,
-        run=run,
+        run=given,
         played=played,
         floor=floor,
         why_not="" if found.ended else why_not,  # which the page says itself
@@ -329,7 +331,7 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
         "touches": touches(one, two),
         "floor": floor,
     }
-    if run:
+    if request.sides:
         result |= {
             "sides": request.sides,
             "commands": run.commands,
@@ -341,3 +343,32 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
     code = show(page, result, options.json)
     pictures.write(renderer, options, one, two, found, request, floor)
     return code
+
+
+def _floor(options: argparse.Namespace, comparison: Any, run: Any) -> Any:
+    """The chaos floor of a `compare.SidesRun`; None where the left side was not run here.
+
+    Raises:
+        BadInputError: An uncertainty was given, and the left side was not run here.
+    """
+    if options.no_chaos:
+        return None
+    rerun, _ = run.reruns
+    if rerun is None:
+        says = "--uncertainty runs the left side again, and it is a recorded run"
+        refuse((options.uncertainty, says))
+        return None
+    from ..compare import chaos_floor
+    from ..compare.perturbed import parse_uncertainty
+    from ..report.progress import progress
+
+    with progress("chaos floor") as told:
+        return chaos_floor(
+            comparison,
+            run.left,
+            run.right,
+            rerun,
+            seed=options.seed,
+            uncertain=parse_uncertainty(options.uncertainty),
+            progress=told,
+        )

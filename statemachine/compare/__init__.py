@@ -1,7 +1,7 @@
 """Where two runs part, and by how much: traces of any two engines, quantity by quantity.
 
-    (one, two), said = sides_of("hold")
-    comparison = compare(one, two)
+    run = run_sides("hold")
+    comparison = compare(run.left, run.right)
     comparison.agrees, comparison.agreements
 
 A side is a file, an engine and options, typed or from Python:
@@ -14,15 +14,16 @@ Two engines that agree prove nothing; neither side is the truth.
 
 from __future__ import annotations
 
+from ..runs.rerun import Rerun, rerun_of
 from .agreement import Agreement, Comparison, SideRun, compare
 from .convergence import QuantityLimit, TimestepConvergence, convergence
 from .floor import ChaosFloor, FloorBand, chaos_floor
 from .labels import Labels, labels_of
 from .one_step import StepComparison, one_step
-from .perturbed import Rerun, Uncertainty, perturbed_runs, rerun_of
+from .perturbed import Uncertainty, perturbed_runs
 from .series import Contact, Series, Touch, default_tip, series, touches
 from .sides import Request, Side, parse_sides, split_words
-from .two_sides import SidesRun, run_sides, sides_of
+from .two_sides import SidesRun, prepare_sides, run_sides
 from .witness import Witness, witness
 
 __all__ = [
@@ -52,10 +53,10 @@ __all__ = [
     "one_step",
     "parse_sides",
     "perturbed_runs",
+    "prepare_sides",
     "rerun_of",
     "run_sides",
     "series",
-    "sides_of",
     "split_words",
     "touches",
     "witness",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,9 +13,10 @@ from ..errors import StateMachineError, TraceError
 from ..interface import Array, Data, Model
 from ..runs import Trace, model_file
 from ..runs.recorder import layout_of
+from ..runs.rerun import SideStart, start_of
 from ..runs.scenarios import Controller
-from .matching import Matched, Pairs, SideStart, match_models, start_of
-from .sides import Request
+from .matching import Matched, Pairs, match_models
+from .sides import Request, Side
 
 
 def called(trace: Trace, file: str) -> Trace:
@@ -24,12 +25,14 @@ def called(trace: Trace, file: str) -> Trace:
     return Trace(replace(trace.header, provenance=made_by), trace.columns)
 
 
-def match_sides(one: Model, two: Model, request: Request) -> Matched | None:
+def match_sides(
+    sides: Sequence[Side], one: Model, two: Model, names: Mapping[str, str]
+) -> Matched | None:
     """Which is which; None for one file, of which every engine has the same ids."""
-    left, right = request.sides
-    if left.path == right.path and not request.names and one.joint_names == two.joint_names:
+    left, right = sides
+    if left.path == right.path and not names and one.joint_names == two.joint_names:
         return None
-    matched = match_models(one, two, request.names)
+    matched = match_models(one, two, names)
     if not matched.joints and one.njnt and two.njnt:
         raise TraceError(
             f"{left.label} and {right.label} have no joint in common, by name or by place: name "

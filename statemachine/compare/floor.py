@@ -15,8 +15,9 @@ from ..interface import Array, Ints
 from ..measures import common_moments
 from ..runs import Trace
 from ..runs.drive import Progress, silent
+from ..runs.rerun import Rerun
 from .agreement import Agreement, Comparison
-from .perturbed import EXACT, ROUNDING, RUNS, Rerun, Uncertainty, perturbed_runs
+from .perturbed import EXACT, ROUNDING, RUNS, Uncertainty, perturbed_runs
 from .series import default_tip, series, touches
 
 _WINDOW = 0.025  # of the common time, to either side

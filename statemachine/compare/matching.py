@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,27 +19,13 @@ from ..engines.description.tree import GroupTree
 from ..engines.records import BodyPair
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
-from ..interface import Array, Model, make_data, reset
+from ..interface import Array, Model
 from ..rotations import HERE
+from ..runs.rerun import SideStart
 
 Pairs = tuple[tuple[int, int], ...]
 Only = Mapping[str, tuple[str, ...]]
 _ONE_PLACE = 1e-6  # [m] within which two sites without a common name are one
-
-
-class SideStart(NamedTuple):
-    """Where a run starts: qpos (nq,), qvel (nv,), ctrl (nu,)."""
-
-    qpos: Array
-    qvel: Array
-    ctrl: Array
-
-
-def start_of(model: Model, keyframe: int | str | None) -> SideStart:
-    """Where a Model starts: in a keyframe, or in its default state if that is None."""
-    with make_data(model) as data:
-        reset(model, data, keyframe)
-        return SideStart(data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,8 @@ from ..errors import BadInputError, DivergedError, UnsupportedError
 from ..interface import Array, Data, Model, State, get_state, make_data, reset, set_state, step
 from ..runs.derived import put_row
 from ..runs.drive import Progress, silent
+from ..runs.rerun import Rerun
 from .matching import Matched, match_models
-from .perturbed import Rerun
 from .stages import AFTER, FORCE, FOUND, STAGES, Reading, StageMeasure, StageReader, measures
 
 MOMENTS = 200

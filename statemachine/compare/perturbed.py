@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +12,10 @@ from ..errors import BadInputError
 from ..interface import Array, Data, JointType, Model
 from ..measures import amount
 from ..rotations import times
-from ..runs import Trace, record
+from ..runs import Trace
 from ..runs.drive import Progress, part_of, silent
-from ..runs.recorder import commands_of
-from ..runs.scenarios import Controller, Scenario
-from .matching import start_of
+from ..runs.rerun import Rerun
+from ..runs.scenarios import Controller
 
 RUNS = 4
 ROUNDING = 1e-12  # of a value, or of 1 where it is less; some thousand times that of a float64
@@ -54,84 +53,6 @@ def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
             raise BadInputError(f"the {kind} that is uncertain is given twice: {word!r}")
         found[kind] = value
     return Uncertainty(**found)
-
-
-@dataclass(frozen=True, eq=False)
-class Rerun:
-    """How a side is run, so that it can be run again.
-
-    Attributes:
-        model: With all its options.
-        controller: Makes a fresh controller of a Model; it may give None for none.
-        seconds: Simulated time.
-        keyframe: Where it starts; qpos, qvel: written over that.
-        defaults, options: For the header of a trace; see `traces.record`.
-    """
-
-    model: Model
-    controller: Callable[[Model], Controller | None]
-    seconds: float
-    keyframe: int | str | None = None
-    qpos: Array | None = None
-    qvel: Array | None = None
-    defaults: Literal["model", "engine"] = "model"
-    options: dict[str, Any] = field(default_factory=dict)
-
-    def record(self, **arguments: Any) -> Trace:
-        """The run; `arguments` are further ones of `traces.record`, which win."""
-        given = {
-            "controller": self.controller(self.model),
-            "seconds": self.seconds,
-            "keyframe": self.keyframe,
-            "qpos": self.qpos,
-            "qvel": self.qvel,
-            "defaults": self.defaults,
-            "options": self.options,
-            **arguments,
-        }
-        return record(self.model, **given)
-
-    def start(self) -> tuple[Array, Array]:
-        """Positions (nq,) and velocities (nv,) that it starts with."""
-        qpos, qvel, _ = start_of(self.model, self.keyframe)
-        return (
-            qpos if self.qpos is None else np.array(self.qpos),
-            qvel if self.qvel is None else np.array(self.qvel),
-        )
-
-
-def rerun_of(
-    scenario: Scenario,
-    model: Model,
-    *,
-    seconds: float | None = None,
-    seed: int = 0,
-    defaults: Literal["model", "engine"] = "model",
-    options: dict[str, Any] | None = None,
-) -> Rerun:
-    """How a scenario is run on a Model; arguments are those of `traces.record_scenario`."""
-    scenario = scenario.on(model)
-    chosen = {**scenario.options, **(options or {})}
-    return Rerun(
-        model.replace(**chosen) if chosen else model,
-        lambda replaced: scenario.controller(replaced, seed),
-        scenario.seconds if seconds is None else seconds,
-        keyframe=scenario.keyframe,
-        defaults=defaults,
-        options=chosen,
-    )
-
-
-def replayed(trace: Trace, model: Model) -> Rerun:
-    """A run that was made on a Model: its start and its commands, row by row."""
-    return Rerun(
-        model,
-        lambda _model: commands_of(trace),
-        float(trace.time[-1] - trace.time[0]),
-        qpos=trace.qpos[0],
-        qvel=trace.qvel[0],
-        defaults="engine" if trace.header.defaults == "engine" else "model",
-    )
 
 
 def perturbed_runs(

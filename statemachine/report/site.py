@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..backends import backend_names, load
-from ..compare import Request, compare, series, sides_of, witness
+from ..compare import Request, compare, run_sides, series, witness
 from ..compare.why import explain
 from ..errors import MissingEngineError
 from ..installed import available
@@ -95,7 +95,8 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
     found = []
     for name in ("hold", "gravity", "box"):
         say(f"comparing: {name} ...")
-        (one, two), said = sides_of(Request((name,)))
+        run = run_sides(Request((name,)))
+        one, two, said = run.left, run.right, run.said
         asked = witness(one, two)
         page = comparison.page(compare(one, two), one, two, said=said, witness=asked)
         curves = {

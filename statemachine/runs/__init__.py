@@ -12,7 +12,8 @@ from __future__ import annotations
 from .csv_files import export_csv
 from .files import model_file, read, shipped, shipped_names, write
 from .header import COLUMNS, CONTACTS, Header
-from .recorder import play, record, record_scenario
+from .recorder import record
+from .rerun import play, record_scenario
 from .trace import Trace
 
 __all__ = [

@@ -12,15 +12,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import BadInputError, DivergedError, EngineError, TraceError
+from ..errors import BadInputError, DivergedError, EngineError
 from ..interface import Array, Data, Model, State, make_data, reset, set_state
 from ..interface.checks import HUGE
 from .derived import derived
-from .drive import Controller, Progress, check_length, drive, part_of, silent, steps_in
+from .drive import Controller, Progress, drive, part_of, silent, steps_in
 from .energy import energies
 from .header import Header
 from .provenance import provenance
-from .scenarios import Scenario
 from .trace import Trace
 
 
@@ -123,117 +122,6 @@ def record(
         ended=ended,
     )
     return Trace(header, columns)
-
-
-def record_scenario(
-    scenario: Scenario,
-    model: Model,
-    *,
-    seconds: float | None = None,
-    seed: int = 0,
-    command: str = "",
-    defaults: Literal["model", "engine"] = "model",
-    options: dict[str, Any] | None = None,
-    progress: Progress = silent,
-) -> Trace:
-    """Record a scenario on a model, which is given as loaded.
-
-    Args:
-        scenario: What to do, as it is on that model; its options are put into it.
-        model: Of any backend.
-        seconds: Simulated time; None for the scenario's own.
-        seed: Of what the scenario draws.
-        command: What makes this trace again.
-        defaults: What `load` was given.
-        options: Further options for `Model.replace`, which win over the scenario's.
-        progress: Told the fraction that is done.
-
-    Raises:
-        UnsupportedError: The backend lacks one of the options.
-        UnknownNameError: The model lacks the keyframe.
-        BadInputError: The scenario makes no sense on the model, or a timestep is longer than
-            the run.
-    """
-    scenario = scenario.on(model)
-    chosen = {**scenario.options, **(options or {})}
-    replaced = model.replace(**chosen) if chosen else model
-    seconds = scenario.seconds if seconds is None else seconds
-    check_length(replaced, seconds)
-    return record(
-        replaced,
-        scenario.controller(replaced, seed),
-        seconds,
-        keyframe=scenario.keyframe,
-        experiment=scenario.name,
-        says=scenario.says,
-        command=command,
-        defaults=defaults,
-        options=chosen,
-        seed=seed if scenario.seeded else None,
-        writes_state=scenario.own,  # ours write nothing but ctrl
-        progress=progress,
-    )
-
-
-def play(
-    trace: Trace,
-    model: Model,
-    *,
-    command: str = "",
-    defaults: Literal["model", "engine"] = "model",
-    options: dict[str, Any] | None = None,
-    progress: Progress = silent,
-) -> Trace:
-    """The ctrl of a trace, from the state it starts in, on another model or engine.
-
-    Where the timesteps differ, a command holds until the time of the next one.
-
-    Raises:
-        TraceError: The model has other joints or actuators, in name or in order.
-    """
-    header = trace.header
-    for what, ours, theirs in (
-        ("joints", model.joint_names, header.joints),
-        ("actuators", model.actuator_names, header.actuators),
-    ):
-        if tuple(ours) != tuple(theirs):
-            raise TraceError(
-                f"the trace has other {what} than {model.path.name}: "
-                f"{', '.join(theirs)} and {', '.join(ours)}"
-            )
-    if (header.nq, header.nv) != (model.nq, model.nv):
-        raise TraceError("the trace's joints are of other kinds than the model's")
-    return record(
-        model,
-        commands_of(trace),
-        float(trace.time[-1] - trace.time[0]),
-        qpos=trace.qpos[0],
-        qvel=trace.qvel[0],
-        experiment=header.experiment,
-        says=header.says,
-        command=command,
-        defaults=defaults,
-        options=options,
-        seed=header.provenance.seed,
-        writes_state=False,
-        progress=progress,
-    )
-
-
-def commands_of(trace: Trace) -> Controller:
-    """A controller that gives the ctrl of a trace; a command holds until the time of the next."""
-    commands, start = trace.ctrl, float(trace.time[0])
-    # A hair early, so that a sum of timesteps does not miss the row that it means.
-    times = trace.time - start - 1e-6 * trace.timestep
-    began: list[float] = []
-
-    def controller(time: float, _data: Data) -> Array:
-        if not began:
-            began.append(time)
-        row = int(np.searchsorted(times, time - began[0], side="right")) - 1
-        return commands[max(0, min(row, len(commands) - 1))]
-
-    return controller
 
 
 def layout_of(model: Model) -> dict[str, Any]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...engines.records import Edit, ModelDifference
 from ...interface import Array
-from ..matching import Matched, SideStart
+from ...runs.rerun import SideStart
+from ..matching import Matched
 
 START, COMMANDS, ORDER = "start", "commands", "order of ctrl"
 _SAME = 1e-12

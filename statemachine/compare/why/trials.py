@@ -24,11 +24,11 @@ from ...measures import Deviation
 from ...processes import checked_jobs
 from ...processes.forks import forks_for, in_forks
 from ...runs import Trace
-from ...runs.recorder import commands_of
+from ...runs.rerun import Rerun, SideStart, commands_of, start_of
 from ...runs.scenarios import Controller, Scenario
 from ..alike import beginning_with, commands_alike, retold, translated
-from ..matching import Matched, SideStart, start_of
-from ..perturbed import RUNS, Rerun, Uncertainty, perturbed_run
+from ..matching import Matched
+from ..perturbed import RUNS, Uncertainty, perturbed_run
 from .causes import Cause, built, causes, differences_of
 from .gap import Curves, Ruler
 from .of_the_run import COMMANDS, ORDER, START, of_the_run, order_of_ctrl
