@@ -18,6 +18,8 @@ from typing import Literal
 
 import numpy as np
 
+from ...interface import Array
+
 Method = Literal["nothing", "one at a time", "all sets", "drawn orders"]
 Subset = frozenset[str]
 Needs = Mapping[str, str]  # of a cause the one that has to be brought to the same before it
@@ -51,7 +53,10 @@ class Shares:
 
 
 class _Game:
-    """The gap with sets of causes brought to the same, as parts of the first gap."""
+    """The gap with sets of causes brought to the same, as parts of the first gap.
+
+    What cannot be run, or cannot be, is NaN.
+    """
 
     def __init__(
         self,
@@ -61,38 +66,28 @@ class _Game:
         needs: Needs,
     ) -> None:
         self._value, self._gap, self._ahead, self.needs = value, gap, ahead, needs
-        self._parts: dict[Subset, float | None] = {frozenset(): 1.0}
+        self.parts: dict[Subset, float] = {frozenset(): 1.0}
 
-    def __call__(self, brought: Subset) -> float | None:
-        if brought not in self._parts:
+    def __call__(self, brought: Subset) -> float:
+        if brought not in self.parts:
             gap = self._value(brought)
-            self._parts[brought] = None if gap is None else gap / self._gap
-        return self._parts[brought]
+            self.parts[brought] = math.nan if gap is None else gap / self._gap
+        return self.parts[brought]
 
     def can_be(self, brought: Subset) -> bool:
         """Whether all that the causes of a set need is in it."""
         return all(self.needs[c] in brought for c in brought if c in self.needs)
 
-    @property
-    def evaluated(self) -> int:
-        """How many sets were run."""
-        return len(self._parts)
-
     def expect(self, wanted: Iterable[Subset]) -> None:
         """Say which sets are evaluated next."""
         sets = dict.fromkeys(filter(self.can_be, wanted))
-        self._ahead(brought for brought in sets if brought not in self._parts)
+        self._ahead(brought for brought in sets if brought not in self.parts)
 
-    def takes(self, cause: str, before: Subset) -> float | None:
-        """What a cause takes away after others; None where it cannot come there, or be run."""
+    def takes(self, cause: str, before: Subset) -> float:
+        """What a cause takes away after others."""
         if not self.can_be(before) or not self.can_be(before | {cause}):
-            return None
-        first, then = self(before), self(before | {cause})
-        return None if first is None or then is None else first - then
-
-    @property
-    def impossible(self) -> tuple[tuple[str, ...], ...]:
-        return tuple(sorted(tuple(sorted(s)) for s, part in self._parts.items() if part is None))
+            return math.nan
+        return self(before) - self(before | {cause})
 
 
 def shapley(
@@ -123,140 +118,122 @@ def shapley(
         game.expect([*ones, *(everything - one for one in ones), everything])
     alone = {cause: game.takes(cause, frozenset()) for cause in causes}
     last = {cause: game.takes(cause, everything - {cause}) for cause in causes}
-    share: dict[str, float | None] = dict.fromkeys(causes, 0.0)
-    error = dict.fromkeys(causes, 0.0)
-    needed = set(needs.values())
-    active = [c for c in causes if c in needed or not _is_dummy(alone[c]) or not _is_dummy(last[c])]
-    if not _takes_all(game, active, everything):
+    share, error = dict.fromkeys(causes, 0.0), dict.fromkeys(causes, 0.0)
+    active = [
+        cause
+        for cause in causes
+        if cause in needs.values()
+        # Not: it takes away nothing. What is not known may take something.
+        or not (abs(alone[cause]) <= _DUMMY and abs(last[cause]) <= _DUMMY)
+    ]
+    whole = game(everything)
+    if not (math.isnan(whole) or abs(game(frozenset(active)) - whole) <= _DUMMY):
         active = list(causes)  # some do nothing alone and nothing last, but something together
     method: Method = "nothing"
     orders = 0
-    if active and _adds_up(game, active, alone, last, everything):
+    if active and _adds_up(1.0 - whole, [alone[c] for c in active], [last[c] for c in active]):
         method = "one at a time"
-        share |= _scaled({c: (_number(alone[c]) + _number(last[c])) / 2 for c in active}, game)
-    elif active and (levels := _levels(game, active, budget)):
+        share |= _scaled(
+            {c: (alone[c] + last[c]) / 2 for c in active}, 1.0 - game(frozenset(active))
+        )
+    elif active and (sets := _all_sets(game, active, budget)):
         method = "all sets"
-        game.expect(subset for level in levels for subset in level)
-        share |= _exact(game, active, levels)
+        game.expect(sets)
+        share |= _exact(game, active, sets)
     elif active:
         method = "drawn orders"
         drawn = _drawn(game, active, budget, np.random.default_rng(seed))
-        orders = 2 * len(drawn[active[0]])
-        for c in active:
-            means = drawn[c]
-            share[c] = float(np.mean(means)) if means else None
-            enough = len(means) > 1
-            error[c] = float(np.std(means, ddof=1) / math.sqrt(len(means))) if enough else math.inf
-    return Shares(method, share, error, alone, last, orders, game.impossible)
+        orders = 2 * len(drawn)
+        means = (float(column.mean()) if orders else math.nan for column in drawn.T)
+        share |= dict(zip(active, means, strict=True))
+        error |= dict(zip(active, _errors(drawn).tolist(), strict=True))
+    impossible = (tuple(sorted(s)) for s, part in game.parts.items() if math.isnan(part))
+    return Shares(
+        method,
+        *(_known(share), error, _known(alone), _known(last)),
+        orders,
+        tuple(sorted(impossible)),
+    )
 
 
-def _number(value: float | None) -> float:
-    assert value is not None  # `_adds_up` has seen to it
-    return value
+def _known(parts: Mapping[str, float]) -> dict[str, float | None]:
+    """Parts by cause, None where one is not known."""
+    return {cause: None if math.isnan(part) else part for cause, part in parts.items()}
 
 
-def _is_dummy(part: float | None) -> bool:
-    return part is not None and abs(part) <= _DUMMY
+def _adds_up(whole: float, alone: Sequence[float], last: Sequence[float]) -> bool:
+    """Whether causes take away as much first as last, and together as much as all of them do."""
+    apart = (abs(first - then) <= ADDS_UP for first, then in zip(alone, last, strict=True))
+    return abs(sum(alone) - whole) <= ADDS_UP and all(apart) and any(alone)
 
 
-def _takes_all(game: _Game, active: Sequence[str], everything: Subset) -> bool:
-    """Whether some causes take away what all of them do."""
-    part, whole = game(frozenset(active)), game(everything)
-    return whole is None or (part is not None and abs(part - whole) <= _DUMMY)
-
-
-def _scaled(shares: dict[str, float], game: _Game) -> dict[str, float | None]:
+def _scaled(shares: dict[str, float], whole: float) -> dict[str, float]:
     """Shares that nearly add up, with what they lack spread over them by their size."""
-    whole = 1.0 - _number(game(frozenset(shares)))
     lacking, size = whole - sum(shares.values()), sum(map(abs, shares.values()))
     return {c: share + lacking * (abs(share) / size) for c, share in shares.items()}
 
 
-def _adds_up(
-    game: _Game,
-    active: Sequence[str],
-    alone: dict[str, float | None],
-    last: dict[str, float | None],
-    everything: Subset,
-) -> bool:
-    whole = game(everything)
-    if whole is None or any(alone[c] is None or last[c] is None for c in active):
-        return False
-    together = abs(sum(_number(alone[c]) for c in active) - (1.0 - whole))
-    apart = max(abs(_number(alone[c]) - _number(last[c])) for c in active)
-    nothing = not any(_number(alone[c]) for c in active)
-    return together <= ADDS_UP and apart <= ADDS_UP and not nothing
-
-
-def _levels(game: _Game, active: Sequence[str], budget: int) -> list[list[Subset]]:
-    """All sets that can be, by size; none of them where there are more than the budget.
+def _all_sets(game: _Game, active: Sequence[str], budget: int) -> list[Subset]:
+    """All sets that can be, the smaller ones first; none where there are more than the budget.
 
     They are in one order everywhere, else the last bits of their sums would be chance.
     """
-    levels: list[list[Subset]] = [[frozenset()]]
-    count = 1
-    for _ in active:
-        smaller = levels[-1]
-        larger = dict.fromkeys(s | {cause} for s in smaller for cause in active if cause not in s)
-        levels.append([subset for subset in larger if game.can_be(subset)])
-        count += len(levels[-1])
-        if count > budget:
-            return []
-    return levels
+    sets: dict[Subset, None] = {frozenset(): None}
+    smaller = list(sets)
+    while smaller and len(sets) <= budget:
+        larger = (s | {cause} for s in smaller for cause in active if cause not in s)
+        smaller = list(dict.fromkeys(filter(game.can_be, larger)))
+        sets |= dict.fromkeys(smaller)
+    return list(sets) if len(sets) <= budget else []
 
 
-def _exact(
-    game: _Game, active: Sequence[str], levels: Sequence[Sequence[Subset]]
-) -> dict[str, float | None]:
+def _exact(game: _Game, active: Sequence[str], sets: Sequence[Subset]) -> dict[str, float]:
     """Over all orders, by the number of orders that lead to a set and from it to all causes."""
     begins: dict[Subset, int] = {frozenset(): 1}
     ends: dict[Subset, int] = {frozenset(active): 1}
-    for level in levels[1:]:
-        begins |= {s: sum(begins.get(s - {c}, 0) for c in s) for s in level}
-    for level in reversed(levels[:-1]):
-        ends |= {s: sum(ends.get(s | {c}, 0) for c in active if c not in s) for s in level}
+    for s in sets[1:]:
+        begins[s] = sum(begins.get(s - {c}, 0) for c in s)
+    for s in reversed(sets[:-1]):
+        ends[s] = sum(ends.get(s | {c}, 0) for c in active if c not in s)
     shares = dict.fromkeys(active, 0.0)
-    unknown = set[str]()
-    for before in (subset for level in levels[:-1] for subset in level):
+    for before in sets[:-1]:
         for cause in active:
             after = before | {cause}
-            if cause in before or after not in ends:
-                continue
-            takes = game.takes(cause, before)
-            if takes is None:
-                unknown.add(cause)
-            else:
-                shares[cause] += begins[before] * ends[after] / ends[frozenset()] * takes
-    return {cause: None if cause in unknown else share for cause, share in shares.items()}
+            if cause not in before and after in ends:
+                weight = begins[before] * ends[after] / ends[frozenset()]
+                shares[cause] += weight * game.takes(cause, before)
+    return shares
 
 
-def _drawn(
-    game: _Game, active: Sequence[str], budget: int, random: np.random.Generator
-) -> dict[str, list[float]]:
-    """For each cause the means over pairs of orders, until they are precise enough.
+def _drawn(game: _Game, active: Sequence[str], budget: int, random: np.random.Generator) -> Array:
+    """What each cause takes away (pairs, causes), the means over pairs of orders.
 
-    The second order of a pair is the reverse of the first, unless a cause needs another.
+    Pairs are drawn until they are precise enough. The second order of a pair is the reverse of
+    the first, unless a cause needs another.
     """
-    means: dict[str, list[float]] = {cause: [] for cause in active}
-    start, failed = game.evaluated, 0
+    pairs: list[list[float]] = []
+    start, failed = len(game.parts), 0
     while failed < _FAILURES:
         order = _order(game, active, random)
         orders = order, _order(game, active, random) if game.needs else order[::-1]
         game.expect(frozenset(each[:n]) for each in orders for n in range(len(each) + 1))
         one, two = (_along(game, each) for each in orders)
-        if one is None or two is None:
+        pair = [(one[cause] + two[cause]) / 2 for cause in active]
+        if math.isnan(sum(pair)):
             failed += 1
         else:
-            for cause in active:
-                means[cause].append((one[cause] + two[cause]) / 2)
-        pairs = len(means[active[0]])
-        if pairs >= _FEWEST:
-            errors = [np.std(values, ddof=1) / math.sqrt(pairs) for values in means.values()]
-            if max(errors) <= _PRECISE:
-                break
-        if game.evaluated - start >= budget:
+            pairs.append(pair)
+        precise = len(pairs) >= _FEWEST and _errors(np.array(pairs)).max() <= _PRECISE
+        if precise or len(game.parts) - start >= budget:
             break
-    return means
+    return np.array(pairs, dtype=np.float64).reshape(-1, len(active))
+
+
+def _errors(pairs: Array) -> Array:
+    """The standard error of the mean of each column (pairs, causes)."""
+    if len(pairs) < 2:
+        return np.full(pairs.shape[1], math.inf)
+    return np.array([np.std(column, ddof=1) / math.sqrt(len(pairs)) for column in pairs.T])
 
 
 def _order(game: _Game, active: Sequence[str], random: np.random.Generator) -> list[str]:
@@ -268,13 +245,11 @@ def _order(game: _Game, active: Sequence[str], random: np.random.Generator) -> l
             return order
 
 
-def _along(game: _Game, order: Sequence[str]) -> dict[str, float] | None:
-    """What each takes away in an order; None where a set cannot be run."""
-    parts, before = dict[str, float](), frozenset[str]()
-    for cause in order:
-        takes = game.takes(cause, before)
-        if takes is None:
-            return None
-        parts[cause] = takes
-        before |= {cause}
+def _along(game: _Game, order: Sequence[str]) -> dict[str, float]:
+    """What each takes away in an order; NaN from where a set cannot be run."""
+    parts = dict.fromkeys(order, math.nan)
+    for k, cause in enumerate(order):
+        parts[cause] = game.takes(cause, frozenset(order[:k]))
+        if math.isnan(parts[cause]):
+            break
     return parts
