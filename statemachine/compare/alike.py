@@ -176,16 +176,3 @@ def retold(controller: Controller, matched: Matched, start: Array) -> Controller
         return None if wanted is None else matched.ctrl(np.asarray(wanted, np.float64), start)
 
     return told
-
-
-def beginning_with(ctrl: Array, controller: Controller) -> Controller:
-    """A controller that begins with some ctrl (nu,), where it gives none of its own."""
-    begun = False
-
-    def told(time: float, data: Data) -> Any:
-        nonlocal begun
-        wanted = controller(time, data)
-        first, begun = not begun, True
-        return ctrl if first and wanted is None else wanted
-
-    return told

@@ -14,7 +14,7 @@ from ..measures import amount
 from ..rotations import times
 from ..runs import Trace
 from ..runs.drive import Progress, part_of, silent
-from ..runs.rerun import Rerun
+from ..runs.rerun import Rerun, beginning_with
 from ..runs.scenarios import Controller
 
 RUNS = 4
@@ -190,15 +190,10 @@ def _nudged(values: Array, draw: np.random.Generator) -> Array:
 
 def nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
     """A controller whose commands differ by rounding, and what is commanded without one."""
-    began = False
 
     def nudging(time: float, data: Data) -> Any:
-        nonlocal began
-        wanted = None if controller is None else controller(time, data)
-        if wanted is not None:
-            return _nudged(np.asarray(wanted, dtype=np.float64), draw)
-        # Once: a ctrl that stays as it is must not wander.
-        first, began = not began, True
-        return _nudged(data.ctrl, draw) if first else None
+        ctrl = None if controller is None else controller(time, data)
+        return None if ctrl is None else _nudged(np.asarray(ctrl, dtype=np.float64), draw)
 
-    return nudging
+    # Once: a ctrl that stays as it is must not wander.
+    return beginning_with(lambda data: _nudged(data.ctrl, draw), nudging)

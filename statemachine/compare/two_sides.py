@@ -16,10 +16,9 @@ from ..measures import common_moments
 from ..measures.text import command, milliseconds
 from ..runs import Trace, model_file, play, read, shipped
 from ..runs.drive import Progress, check_length, part_of, silent, steps_in
-from ..runs.rerun import Rerun, SideStart, commands_of, replayed, rerun_of, start_of
+from ..runs.rerun import Rerun, SideStart, beginning_with, commands_of, replayed, rerun_of, start_of
 from ..runs.scenarios import SCENARIOS, Controller, Scenario
 from .alike import (
-    beginning_with,
     called,
     for_left,
     in_terms_of_right,
@@ -138,7 +137,7 @@ def prepare_sides(
         controller = own(model if scenario.own else left)
         if matched and not scenario.own:
             controller = retold(controller, matched, own_start.ctrl)
-        return controller if begin is None else beginning_with(begin.ctrl, controller)
+        return controller if begin is None else beginning_with(lambda _: begin.ctrl, controller)
 
     one, two = (
         Rerun(

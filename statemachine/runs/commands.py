@@ -57,8 +57,7 @@ def hold_ctrl(model: Model) -> Array:
     Raises:
         BadInputError: The model has no actuators.
     """
-    if not model.nu:
-        raise BadInputError(f"{model.path.name} has no actuators: nothing in it takes a command")
+    need_actuators(model)
     if is_the_arm(model) and model.nu == len(TARGET):
         return np.array(TARGET)
     qpos, load = _start(model)
@@ -76,6 +75,12 @@ def hold_ctrl(model: Model) -> Array:
                 factor = model.actuator_gain[i] * gear
                 ctrl[i] = np.clip(force / factor, low, high)
     return np.array([float(f"{value:.{_DIGITS}g}") + 0.0 for value in ctrl])
+
+
+def need_actuators(model: Model) -> None:
+    """Raise BadInputError for a model that nothing can be commanded in."""
+    if not model.nu:
+        raise BadInputError(f"{model.path.name} has no actuators: nothing in it takes a command")
 
 
 def _start(model: Model) -> tuple[Array, Array | None]:

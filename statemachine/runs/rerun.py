@@ -201,3 +201,18 @@ def commands_of(trace: Trace) -> Controller:
         return commands[max(0, min(row, len(commands) - 1))]
 
     return controller
+
+
+def beginning_with(first: Callable[[Data], Array], controller: Controller) -> Controller:
+    """A controller that begins with some ctrl (nu,), where it gives none of its own."""
+    begun = False
+
+    def beginning(time: float, data: Data) -> Any:
+        nonlocal begun
+        ctrl = controller(time, data)
+        if ctrl is None and not begun:
+            ctrl = first(data)
+        begun = True
+        return ctrl
+
+    return beginning

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import BadInputError, check_name
 from ..interface import Array, Data, Model
 from ..measures.text import listed, sentence
-from .commands import hold_ctrl, home, is_servo, waves
+from .commands import hold_ctrl, home, is_servo, need_actuators, waves
 from .drive import Controller
 from .robot import has_floor, is_the_arm
 
@@ -130,8 +130,7 @@ def _need_joints(model: Model) -> None:
 
 def _need_actuators(model: Model) -> None:
     _need_joints(model)
-    if not model.nu:
-        raise BadInputError(f"{model.path.name} has no actuators: nothing in it takes a command")
+    need_actuators(model)
 
 
 def _falls(model: Model, onto: bool) -> str:

@@ -233,7 +233,7 @@ def _errors(pairs: Array) -> Array:
     """The standard error of the mean of each column (pairs, causes)."""
     if len(pairs) < 2:
         return np.full(pairs.shape[1], math.inf)
-    return np.array([np.std(column, ddof=1) / math.sqrt(len(pairs)) for column in pairs.T])
+    return np.array([float(np.std(column, ddof=1)) / math.sqrt(len(pairs)) for column in pairs.T])
 
 
 def _order(game: _Game, active: Sequence[str], random: np.random.Generator) -> list[str]:

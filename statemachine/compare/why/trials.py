@@ -24,9 +24,9 @@ from ...measures import Deviation
 from ...processes import checked_jobs
 from ...processes.forks import forks_for, in_forks
 from ...runs import Trace
-from ...runs.rerun import Rerun, SideStart, commands_of, start_of
+from ...runs.rerun import Rerun, SideStart, beginning_with, commands_of, start_of
 from ...runs.scenarios import Controller, Scenario
-from ..alike import beginning_with, commands_alike, retold, translated
+from ..alike import commands_alike, retold, translated
 from ..matching import Matched
 from ..perturbed import RUNS, Uncertainty, perturbed_run
 from .causes import Cause, built, causes, differences_of
@@ -269,22 +269,14 @@ class Trials:
         new = [run for run in runs if run not in self._runs and run not in self._ahead]
         jobs = self._forks_for(len(new))
         if jobs > 1:
-            work = [partial(self._tried, run) for run in new]
+            work = [partial(self._outcome, run) for run in new]
             for run, outcome in zip(new, in_forks(work, jobs, self._ran, self._took), strict=True):
-                if not isinstance(outcome, Exception):  # it is raised when its run is asked for
-                    self._ahead[run] = outcome or _Outcome(None, _LOST)
+                self._ahead[run] = outcome or _Outcome(None, _LOST)
 
     def _forks_for(self, number: int) -> int:
         """How many forks are to share some runs."""
         alone = self._jobs is None and self._scenario.own  # it may keep something between runs
         return 1 if alone else forks_for(number, self._took, self._jobs)
-
-    def _tried(self, run: _Run) -> _Outcome | Exception:
-        """What became of a run, or what was raised, as something that a fork can give back."""
-        try:
-            return self._outcome(run)
-        except Exception as error:
-            return RuntimeError(str(error))
 
     def _run(self, run: _Run) -> Curves | None:
         """A run; None, with a reason in `ended`, if it cannot be made or did not stand."""
@@ -371,7 +363,11 @@ class Trials:
         if not own or ORDER in brought:
             told = retold(told, self._matched, start)
         # Without a keyframe of its own it starts with the commands of the left, too.
-        return told if self._keyframes[0] == self._keyframes[1] else beginning_with(start, told)
+        return (
+            told
+            if self._keyframes[0] == self._keyframes[1]
+            else beginning_with(lambda _: start, told)
+        )
 
     def repeats(self) -> bool:
         """Whether the left moves the same when it is run again, so that a gap can have causes."""
