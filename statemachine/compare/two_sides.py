@@ -137,7 +137,7 @@ def prepare_sides(
         controller = own(model if scenario.own else left)
         if matched and not scenario.own:
             controller = retold(controller, matched, own_start.ctrl)
-        return controller if begin is None else beginning_with(lambda _: begin.ctrl, controller)
+        return beginning_with(lambda _, ctrl=begin.ctrl: ctrl, controller) if begin else controller
 
     one, two = (
         Rerun(

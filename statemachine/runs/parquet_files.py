@@ -87,53 +87,36 @@ def _unfolded(metadata: Any, header: Header) -> int:
 
 def _table(trace: Trace, arrow: Any) -> Any:
     """Columns of one number, or of a list of as many as a row has; contacts as lists of rows."""
-    columns = {}
-    for name in COLUMNS:
-        if name in trace:
-            width = int(np.prod(trace.header.shape(name), dtype=int))
-            if width:  # a column of empty lists cannot be written
-                columns[name] = _fixed(arrow, trace[name], width, name == "time")
+    columns, offsets = {}, None
     if "contact_row" in trace:
         counts = np.bincount(trace["contact_row"], minlength=len(trace))
         offsets = arrow.array(np.concatenate([[0], np.cumsum(counts)]).astype(np.int32))
-        for name, shape in CONTACTS.items():
-            if name != "contact_row":
-                width = int(np.prod(shape, dtype=int))
-                values = _fixed(arrow, trace[name], width, not shape)
-                columns[name] = arrow.ListArray.from_arrays(offsets, values)
+    for name in (*COLUMNS, *CONTACTS):
+        shape = trace.header.shape(name)
+        width = int(np.prod(shape, dtype=int))  # a column of empty lists cannot be written
+        if name in trace and width and name != "contact_row":
+            values = arrow.array(np.ascontiguousarray(trace[name]).reshape(-1))
+            values = arrow.FixedSizeListArray.from_arrays(values, width) if shape else values
+            is_contact = name in CONTACTS
+            columns[name] = arrow.ListArray.from_arrays(offsets, values) if is_contact else values
     text = trace.header.as_json()
-    kept = {name: as_column(name, array) for name, array in trace.columns.items()}
-    value = (_digest(text, kept) + text).encode()
+    numbers = {name: as_column(name, array) for name, array in trace.columns.items()}
+    value = (_digest(text, numbers) + text).encode()
     return arrow.table(columns).replace_schema_metadata({_KEY: value})
-
-
-def _fixed(arrow: Any, values: Any, width: int, alone: bool) -> Any:
-    flat = arrow.array(np.ascontiguousarray(values).reshape(-1))
-    return flat if alone else arrow.FixedSizeListArray.from_arrays(flat, width)
 
 
 def _columns(table: Any, header: Header) -> dict[str, Any]:
     columns: dict[str, Any] = {}
-    for name in table.column_names:
+    for name in (name for name in table.column_names if name in COLUMNS or name in CONTACTS):
+        values, shape = table[name].combine_chunks(), header.shape(name)
         if name in CONTACTS:
-            _contacts(name, table[name].combine_chunks(), columns)
-        elif name in COLUMNS:
-            array = table[name].combine_chunks()
-            flat = array if name == "time" else array.flatten()
-            values = as_column(name, flat.to_numpy(zero_copy_only=False))
-            columns[name] = values.reshape(table.num_rows, *header.shape(name))
+            counts = np.diff(values.offsets.to_numpy())
+            columns["contact_row"] = np.repeat(np.arange(len(values)), counts)
+            values = values.flatten()
+        flat = values.flatten() if shape else values
+        numbers = as_column(name, flat.to_numpy(zero_copy_only=False))
+        columns[name] = numbers.reshape(-1, *shape)
     for name in ("qpos", "qvel", "ctrl", "xpos", "xquat", "site_xpos", "site_xmat"):
         if name not in columns and 0 in header.shape(name):
             columns[name] = np.empty((table.num_rows, *header.shape(name)))
     return columns
-
-
-def _contacts(name: str, array: Any, columns: dict[str, Any]) -> None:
-    counts = np.diff(array.offsets.to_numpy())
-    columns["contact_row"] = np.repeat(np.arange(len(array)), counts)
-    values = array.flatten()
-    if CONTACTS[name]:
-        values = values.flatten()
-    columns[name] = as_column(name, values.to_numpy(zero_copy_only=False)).reshape(
-        -1, *CONTACTS[name]
-    )
