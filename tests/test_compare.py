@@ -219,8 +219,7 @@ def test_the_whole_force_of_a_contact_is_the_engines(box: Trace) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_both_figures_of_a_force_are_given() -> None:
-    run = run_sides("hold")
-    one, two = run.left, run.right
+    one, two = run_sides("hold").traces
     assert "gripper on floor, normal force" in by_name(compare(one, two))
     # The greatest that the course's page shows, and that of the vectors.
     assert normal_forces(one)["gripper on floor"].max() == pytest.approx(351, abs=1)
@@ -229,8 +228,7 @@ def test_both_figures_of_a_force_are_given() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_hold_ends_pressed_on_one_engine_and_free_on_the_other() -> None:
-    run = run_sides("hold")
-    one, two = run.left, run.right
+    one, two = run_sides("hold").traces
     touch: Any = touches(one, two)[0]
     assert (touch.one.ends, touch.two.ends) == (True, False)
     assert touch.one.force > 10
@@ -333,10 +331,10 @@ def test_what_is_no_tolerance(word: str) -> None:
 def test_free_of_contact_the_engines_agree() -> None:
     for name in ("droop", "fall", "waves"):
         run = run_sides(name)
-        one, two, said = run.left, run.right, run.said
+        one, two = run.traces
         found = compare(one, two)
         assert found.agrees, name
-        assert not said
+        assert not run.said
         joints = [each.max for each in found.agreements if each.kind == "joint"]
         assert len(joints) == 6
         assert max(joints) < np.radians(1e-6)
@@ -344,8 +342,7 @@ def test_free_of_contact_the_engines_agree() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_hold_parts_when_the_finger_meets_the_floor() -> None:
-    run = run_sides("hold")
-    one, two = run.left, run.right
+    one, two = run_sides("hold").traces
     found = by_name(compare(one, two))
     assert found["gripper on floor, first touch"].verdict == "agrees"
     touch = found["gripper on floor, first touch"].at
@@ -359,8 +356,7 @@ def test_the_hold_parts_when_the_finger_meets_the_floor() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
-    run = run_sides(Request(("hold",), defaults="engine"))
-    one, two = run.left, run.right
+    one, two = run_sides(Request(("hold",), defaults="engine")).traces
     found = compare(one, two)
     # FINDINGS: POSITION_CONTROL is 13 to 41 degrees off in the transient, at 5 ms.
     assert np.degrees(by_name(found)["elbow_flex"].max) > 13
@@ -371,10 +367,10 @@ def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
 def test_one_trace_is_played_on_the_other_engine(tmp_path: Any) -> None:
     path = write(traced("waves", seed=2), tmp_path / "waves.npz")
     run = run_sides(Request((str(path),)))
-    one, two, said = run.left, run.right, run.said
+    one, two = run.traces
     assert (one.header.backend, two.header.backend) == ("mujoco", "pybullet")
     assert compare(one, two).agrees
-    assert "was played on pybullet" in said[0]
+    assert "was played on pybullet" in run.said[0]
 
 
 @pytest.mark.usefixtures("pinocchio")
@@ -419,16 +415,16 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
     no_pybullet: None, name: str, defaults: Any
 ) -> None:
     run = run_sides(Request((name,), defaults=defaults))
-    one, two, said = run.left, run.right, run.said
+    one, two = run.traces
     assert not one.header.recorded
     assert two.header.recorded
-    assert "recorded run that comes with the package" in said[0]
+    assert "recorded run that comes with the package" in run.said[0]
     found = compare(one, two)
     assert any("single precision" in note for note in found.notes)
     assert ", recorded" in found.two.label
     if defaults == "model":
         assert found.agrees == (name in ("droop", "fall", "waves"))
-    assert report.page(found, one, two, said=said).blocks
+    assert report.page(found, one, two, said=run.said).blocks
 
 
 def test_what_was_not_recorded_needs_the_engine(no_pybullet: None) -> None:

@@ -177,8 +177,7 @@ def test_both_sides_may_diverge(tmp_path: Path) -> None:
       <general joint="wheel" gainprm="1" biastype="affine" biasprm=".1 0 2" ctrlrange="-1 1"/>
       </actuator></mujoco>""",
     )
-    run = run_sides(Request(("droop",), model=str(path)))
-    one, two = run.left, run.right
+    one, two = run_sides(Request(("droop",), model=str(path))).traces
     found = compare_traces(one, two)
     assert found.one.ended
     assert found.two.ended

@@ -85,8 +85,7 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
             replace(side, options=with_more(side.options, given, times)) for side in request.sides
         )
         both = with_more(request.options, 1, times)
-        finer = run_sides(replace(request, options=both, sides=sides))
-        return finer.left, finer.right
+        return run_sides(replace(request, options=both, sides=sides)).traces
 
     with progress("converge") as told:
         found = convergence(run, progress=told)
@@ -105,8 +104,8 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
     check_junit(options)
 
     def compared(pair: tuple[str, str], *bar: Any) -> Any:
-        run = run_sides(replace(request, backends=pair), *bar)
-        return compare(run.left, run.right, tolerances=tolerances)
+        traces = run_sides(replace(request, backends=pair), *bar).traces
+        return compare(*traces, tolerances=tolerances)
 
     if options.bisect:
         backends = _around_a_change(published(options.versions), compared)

@@ -64,6 +64,11 @@ class SidesRun:
     said: tuple[str, ...] = ()
 
     @property
+    def traces(self) -> tuple[Trace, Trace]:
+        """The runs of the left and the right."""
+        return self.left, self.right
+
+    @property
     def is_apart(self) -> bool:
         """Whether the open loop is another run than the closed one."""
         return self.played is not self.right

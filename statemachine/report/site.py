@@ -96,9 +96,10 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
     for name in ("hold", "gravity", "box"):
         say(f"comparing: {name} ...")
         run = run_sides(Request((name,)))
-        one, two, said = run.left, run.right, run.said
-        asked = witness(one, two)
-        page = comparison.page(compare(one, two), one, two, said=said, witness=asked)
+        one, two = run.traces
+        page = comparison.page(
+            compare(one, two), one, two, said=run.said, witness=witness(one, two)
+        )
         curves = {
             curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())
             for curve in series(one, two)
