@@ -85,7 +85,9 @@ def _controller(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[
 
 
 SWING = Scenario(
-    "swing", "The servos are told two poses.", "", 1.0, _controller, lambda _model: "", own=True
+    *("swing", "The servos are told two poses.", "", 1.0, _controller),
+    *("", lambda _model: None),
+    own=True,
 )
 
 

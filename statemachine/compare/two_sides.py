@@ -345,7 +345,8 @@ def recorded_scenario(*traces: Trace) -> Scenario:
     return Scenario(
         *(header.experiment, header.says, "", seconds),
         lambda _model, _seed: commands_of(traces[0]),
-        lambda _: header.says,
+        header.says,
+        lambda _model: None,
         options=header.options,
     )
 

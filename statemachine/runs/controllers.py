@@ -69,7 +69,9 @@ def function_scenario(
     steps = "every step" if every == 1 else f"every {count(every, 'step')}"
     says = f"{called} is asked for ctrl at {steps}."
     return Scenario(
-        called, says, "", 2.0, controller_of, lambda _model: says, keyframe=keyframe, own=True
+        *(called, says, "", 2.0, controller_of, says, lambda _model: None),
+        keyframe=keyframe,
+        own=True,
     )
 
 

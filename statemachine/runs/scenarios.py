@@ -9,15 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..errors import BadInputError, check_name
 from ..interface import Array, Data, Model
-from ..measures.text import listed, sentence
-from .commands import hold_ctrl, home, is_servo, need_actuators, waves
+from .commands import hold_ctrl, home, need_actuators, waves
 from .drive import Controller
 from .robot import has_floor, is_the_arm
 
@@ -35,8 +33,8 @@ class Scenario:
         model: The model that it is meant for.
         seconds: How long it takes [s].
         controller: Makes the controller, from the Model and a seed.
-        elsewhere: The sentence for another robot than the arm; raises BadInputError if the
-            experiment makes no sense on it.
+        elsewhere: The sentence for any robot.
+        needs: Raises BadInputError for a Model on which it makes no sense.
         keyframe: Where it starts; None for the model's default state.
         options: What `Model.replace` is given.
         seeded: Whether the seed changes anything.
@@ -48,7 +46,8 @@ class Scenario:
     model: str
     seconds: float
     controller: Callable[[Model, int], Controller]
-    elsewhere: Callable[[Model], str]
+    elsewhere: str
+    needs: Callable[[Model], None]
     keyframe: str | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     seeded: bool = False
@@ -66,17 +65,16 @@ class Scenario:
         if self.own or (is_the_arm(model) and (has_floor(model) or not self.says.count("floor"))):
             return self
         try:
-            says = self.elsewhere(model)
+            self.needs(model)
         except BadInputError as error:
             others = fitting(model)
             known = f"; what makes sense on it: {', '.join(others)}" if others else ""
             raise BadInputError(f"{error}{known}") from None
         if is_the_arm(model):
-            return replace(self, says=says)
+            return replace(self, says=self.elsewhere)
         key = home(model)
-        if key is not None:
-            says = f"{says[:-1]}, from the keyframe {key!r}."
-        return replace(self, says=says, keyframe=key)
+        begins = "" if key is None else f" It starts in the keyframe {key!r}."
+        return replace(self, says=self.elsewhere + begins, keyframe=key)
 
 
 def fitting(model: Model) -> tuple[str, ...]:
@@ -84,7 +82,7 @@ def fitting(model: Model) -> tuple[str, ...]:
     names = []
     for each in SCENARIOS.values():
         with suppress(BadInputError):
-            each.elsewhere(model)
+            each.needs(model)
             names.append(each.name)
     return tuple(names)
 
@@ -95,27 +93,14 @@ def _hold(model: Model, _seed: int) -> Controller:
     return lambda _time, _data: target
 
 
-def _hold_says(model: Model) -> str:
-    _need_actuators(model)
-    if is_the_arm(model):
-        return "The arm is told one pose and goes there."
-    servos = is_servo(model)
-    pushes = bool(hold_ctrl(model)[~servos].any())
-    rest = "exerts what holds its joint at the start" if pushes else "is left at the start's ctrl"
-    says = ["each position servo is told a pose and goes there"] if servos.any() else []
-    says += [] if servos.all() else [f"each {'other ' if says else ''}actuator {rest}"]
-    return sentence("; ".join(says))
-
-
 def _box(_model: Model, _seed: int) -> Controller:
     target = np.array(MOVING)
     return lambda _time, _data: target
 
 
-def _box_says(model: Model) -> str:
+def _need_box(model: Model) -> None:
     if not is_the_arm(model) or all(frame.name != "held" for frame in model.keyframes):
         raise BadInputError(f"{model.path.name} has no SO-101 that holds a box (so101/scene_box)")
-    return "The jaws hold a box while the arm swings it aside."
 
 
 def _untouched(_model: Model, _seed: int) -> Controller:
@@ -133,34 +118,6 @@ def _need_actuators(model: Model) -> None:
     need_actuators(model)
 
 
-def _falls(model: Model, onto: bool) -> str:
-    _need_joints(model)
-    facts = [f"the {drives(model)} are off"] if model.nu else []
-    facts += [] if onto else ["nothing can touch anything"]
-    facts += [] if model.gravity.any() else ["there is no gravity"]
-    falls = "falls onto the floor" if onto and has_floor(model) else "falls"
-    falls = falls if model.gravity.any() else "coasts"
-    what = "the arm" if is_the_arm(model) else "what can move"
-    return sentence(f"{listed(facts) or 'nothing is driven'}: {what} {falls}")
-
-
-def drives(model: Model) -> str:
-    """What moves the robot, in a word: "servos" where one is among them, else "actuators"."""
-    return "servos" if is_servo(model).any() else "actuators"
-
-
-def _droop_says(model: Model) -> str:
-    _need_actuators(model)
-    where = "at zero" if home(model) is None else "where the keyframe's ctrl says"
-    servos, says = int(is_servo(model).sum()), []
-    if servos:
-        what = "the arm" if is_the_arm(model) else "their joints"
-        says.append(f"the servos hold {what} {where}")
-    if servos < model.nu:
-        says.append(f"{'other actuators' if servos else 'the actuators'} exert what ctrl says")
-    return f"Nobody writes ctrl: {listed(says)}."
-
-
 def _waves(model: Model, seed: int) -> Controller:
     """Every actuator follows a sum of three sines within the middle of its range."""
     middle, size, frequency, phase = waves(model, seed)
@@ -173,11 +130,6 @@ def _waves(model: Model, seed: int) -> Controller:
     return controller
 
 
-def _waves_says(model: Model) -> str:
-    _need_actuators(model)
-    return "Every actuator follows waves that a seed draws."
-
-
 SCENARIOS = {
     scenario.name: scenario
     for scenario in (
@@ -187,7 +139,9 @@ SCENARIOS = {
             "so101/scene",
             2.0,
             _hold,
-            _hold_says,
+            "Each position servo is told a pose and goes there; any other actuator exerts what "
+            "holds its joint at the start, or is left at the start's ctrl.",
+            _need_actuators,
         ),
         Scenario(
             "gravity",
@@ -195,7 +149,8 @@ SCENARIOS = {
             "so101/scene",
             4.0,
             _untouched,
-            partial(_falls, onto=True),
+            "No actuator acts: what can move is left to gravity and to what it touches.",
+            _need_joints,
             options={"actuation": False},
         ),
         Scenario(
@@ -204,7 +159,9 @@ SCENARIOS = {
             "so101/scene",
             2.0,
             _untouched,
-            _droop_says,
+            "Nobody writes ctrl: each servo holds, and any other actuator exerts, what the start's "
+            "ctrl says.",
+            _need_actuators,
         ),
         Scenario(
             "fall",
@@ -212,7 +169,8 @@ SCENARIOS = {
             "so101/scene",
             2.0,
             _untouched,
-            partial(_falls, onto=False),
+            "No actuator acts and nothing can touch anything: what can move is left to gravity.",
+            _need_joints,
             options={"actuation": False, "contacts": False},
         ),
         Scenario(
@@ -221,7 +179,8 @@ SCENARIOS = {
             "so101/scene_box",
             3.0,
             _box,
-            _box_says,
+            "The jaws hold a box while the arm swings it aside.",
+            _need_box,
             keyframe="held",
         ),
         Scenario(
@@ -230,7 +189,8 @@ SCENARIOS = {
             "so101",
             4.0,
             _waves,
-            _waves_says,
+            "Every actuator follows waves that a seed draws.",
+            _need_actuators,
             seeded=True,
         ),
     )
