@@ -137,9 +137,9 @@ def test_the_ruler_of_causes_has_a_floor_too(tmp_path: Path) -> None:
     ruler = Ruler(match_models(run.model, run.model), trace, trace)
     curves = ruler.curves(trace)
     assert curves is not None
-    floor = ruler.floor(curves, [*map(ruler.curves, perturbed_runs(run, derive=False))])
-    assert 0 < floor["joints"].worst < 1e-9
-    assert floor["joints"].unit == "rad"
+    again = [*map(ruler.curves, perturbed_runs(run, derive=False))]
+    assert 0 < ruler.floor(curves, again, "worst")["joints"] < 1e-9
+    assert ruler.units["joints"] == "rad"
 
 
 @pytest.mark.parametrize("word", ["0.1", "mm", "-1mm", "0deg", "1furlong", "nanmm"])

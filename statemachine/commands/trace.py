@@ -132,7 +132,7 @@ def run_record(options: argparse.Namespace) -> int:
             model,
             seconds=options.seconds,
             seed=options.seed,
-            command=_typed(options),
+            command=_typed(options, "record", *_named(options)),
             defaults=options.defaults,
             options={} if options.timestep is None else {"timestep": options.timestep},
             progress=told,
@@ -171,25 +171,12 @@ def run_play(options: argparse.Namespace) -> int:
         played = play(
             trace,
             model,
-            command=_typed_play(options),
+            command=_typed(options, "play", Path(options.file).name),
             defaults=options.defaults,
             options=trace.header.options,
             progress=told,
         )
     return _written(played, target)
-
-
-def _typed_play(options: argparse.Namespace) -> str:
-    """The command that plays this again, without paths of this machine."""
-    from ..measures.text import command
-
-    return one_line(
-        command(
-            [PROGRAM, "trace", "play", Path(options.file).name, "--backend", options.backend],
-            ("--defaults", options.defaults, "model"),
-            ("--model", options.model and Path(options.model).name, None),
-        )
-    )
 
 
 def run_show(options: argparse.Namespace) -> int:
@@ -256,25 +243,28 @@ def _written(trace: Any, target: Path) -> int:
     return 0
 
 
-def _typed(options: argparse.Namespace) -> str:
-    """The command that records this again, without paths of this machine."""
+def _named(options: argparse.Namespace) -> tuple[str, ...]:
+    """What is recorded, as typed, without the folder of a controller."""
+    if options.what:
+        return (options.what,)
+    file, colon, name = options.controller.partition(":")
+    return "--controller", Path(file).name + colon + name
+
+
+def _typed(options: argparse.Namespace, *words: str) -> str:
+    """The command that makes this trace again, without paths of this machine."""
     from ..measures.text import command
 
-    words = [PROGRAM, "trace", "record"]
-    if options.what:
-        words.append(options.what)
-    else:
-        file, colon, name = options.controller.partition(":")
-        words += ["--controller", Path(file).name + colon + name]
+    given = vars(options)
     return one_line(
         command(
-            words,
-            ("--backend", options.backend, DEFAULT),
+            [PROGRAM, "trace", *words],
+            ("--backend", options.backend, DEFAULT if options.picture == "record" else None),
             ("--defaults", options.defaults, "model"),
-            ("--keyframe", options.keyframe, None),
+            ("--keyframe", given.get("keyframe"), None),
             ("--model", options.model and Path(options.model).name, None),
-            ("--seconds", options.seconds, None),
-            ("--timestep", options.timestep, None),
-            ("--seed", options.seed, 0),
+            ("--seconds", given.get("seconds"), None),
+            ("--timestep", given.get("timestep"), None),
+            ("--seed", given.get("seed", 0), 0),
         )
     )

@@ -74,12 +74,6 @@ class Deviation:
         rms = float(np.sqrt(np.mean(sizes**2)))
         return cls(unit, worst, float(time[row]), rms, float(sizes[-1]))
 
-    def or_larger(self, other: Deviation) -> Deviation:
-        """Of each figure the larger one."""
-        most = other if other.worst > self.worst else self
-        rms, end = max(self.rms, other.rms), max(self.end, other.end)
-        return Deviation(self.unit, most.worst, most.at, rms, end)
-
 
 @dataclass(frozen=True, eq=False)
 class JointPlaces:

@@ -2,7 +2,7 @@
 
 - `explain`: the question, and its answer as a record
 - `causes`: what differs; `settings`: what an engine as it comes sets, and what can be left out
-- `trials`: the runs, each made once; `gap`: what they are measured by
+- `trials`: the runs, each made once; `gap`: what they are measured by, and what touches first
 - `shapley`: shares of a gap among causes; `locate`: where the rest comes from
 - `places`: the line of the file that says what a cause is of
 """
@@ -10,9 +10,9 @@
 from __future__ import annotations
 
 from .explain import UNEXPLAINED, CauseShare, Explanation, explain
+from .gap import FirstTouch
 from .locate import Located
 from .shapley import ADDS_UP
-from .touches import FirstTouch
 
 __all__ = [
     "ADDS_UP",

@@ -19,12 +19,11 @@ from ...runs.scenarios import Scenario
 from ..labels import files_apart
 from ..matching import match_alike, match_models, missing_parts
 from ..perturbed import EXACT, Uncertainty
-from .causes import Cause
+from .causes import Cause, order_of_joints
+from .gap import FirstTouch, touched_at_start
 from .locate import Located, locate
-from .of_the_run import order_of_joints
 from .places import Place, places_of
 from .shapley import Method, Shares, shapley
-from .touches import FirstTouch, touched_at_start
 from .trials import Measure, Trials
 
 # What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
@@ -229,8 +228,7 @@ def explain(
             f"{scenario.name} does not command the same twice, and so no gap has a cause; give "
             "what it draws a seed, and let it keep nothing from one run to the next"
         )
-    perturbed = {} if uncertain is None else trials.floor(uncertain)
-    floors = {name: getattr(gap, measure) for name, gap in perturbed.items()}
+    floors = {} if uncertain is None else trials.floor(uncertain, measure)
     if quantity is None:
         quantity = _quantity(trials, first, floors, measure, one)
     gap, floor = getattr(first[quantity], measure), floors.get(quantity, 0.0)

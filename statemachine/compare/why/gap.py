@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -173,28 +173,67 @@ class Ruler:
         """In every quantity."""
         return {name: self.gap(name, one, two) for name in self.units}
 
-    def floor(self, run: Curves, perturbed: Sequence[Curves | None]) -> dict[str, Deviation]:
-        """The chaos floor of every quantity: a gap that is no larger says nothing.
+    def floor(
+        self, run: Curves, perturbed: Sequence[Curves | None], measure: str
+    ) -> dict[str, float]:
+        """The chaos floor of every quantity, in its unit: a gap that is no larger says nothing.
 
         Args:
             run: The side as it comes.
             perturbed: The same side from `perturbed_runs`; None, which leaves no bound, for a run
                 that ended early.
-
-        Returns:
-            Of each figure the largest that a perturbed run has to `run`.
+            measure: Which figure of a Deviation; the largest of a perturbed run counts.
         """
-        boundless = np.full(len(self.time), np.inf)
+        stood = [curves for curves in perturbed if curves is not None]
+        bound = 0.0 if len(stood) == len(perturbed) else np.inf
         return {
-            name: reduce(
-                Deviation.or_larger,
-                [
-                    Deviation.of(boundless, self.time, unit)
-                    if curves is None
-                    else self.gap(name, run, curves)
-                    for curves in perturbed
-                ],
-                Deviation(unit),
-            )
-            for name, unit in self.units.items()
+            name: max([bound, *(getattr(self.gap(name, run, curves), measure) for curves in stood)])
+            for name in self.units
         }
+
+
+@dataclass(frozen=True)
+class FirstTouch:
+    """The first contact of anything, and how far apart the runs were until then.
+
+    Attributes:
+        time: Since the start [s]; 0 if something touches from the start.
+        what: What touched what.
+        before: The gap of the runs as they come, at the moments until then.
+        moments: How many these are.
+    """
+
+    time: float
+    what: str
+    before: float
+    moments: int
+
+
+def touched_at_start(trace: Trace, robot: frozenset[str]) -> frozenset[str]:
+    """Names of the bodies that some bodies of the robot touch from the start."""
+    pairs = [pair.split(" on ") for pair, rows in trace.touches().items() if rows[0]]
+    return frozenset(b for pair in pairs for b in pair if not robot.isdisjoint(pair)) - robot
+
+
+def first_touch(traces: Sequence[Trace], time: Array, apart: Array) -> FirstTouch | None:
+    """The first contact of some runs; None where nothing touches, or no engine tells of it.
+
+    Args:
+        traces: The runs.
+        time: (n,) moments since the start [s].
+        apart: (n,) how far apart the runs are there.
+    """
+    met = [
+        (float(trace.time[rows.argmax()] - trace.time[0]), pair)
+        for trace in traces
+        for pair, rows in trace.touches().items()
+        if rows.any()
+    ]
+    if not met:
+        return None
+    when, what = min(met)
+    if not when:  # no moment shows the rest alone
+        return FirstTouch(0.0, what, 0.0, 0)
+    # A contact found at a moment acts from that moment on: the moment itself is before it.
+    before = time <= when + 1e-9
+    return FirstTouch(when, what, float(apart[before].max()), int(np.sum(before)))

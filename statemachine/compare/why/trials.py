@@ -29,11 +29,19 @@ from ...runs.scenarios import Controller, Scenario
 from ..alike import commands_alike, retold, translated
 from ..matching import Matched
 from ..perturbed import RUNS, Uncertainty, perturbed_run
-from .causes import Cause, built, causes, differences_of
-from .gap import Curves, Ruler
-from .of_the_run import COMMANDS, ORDER, START, of_the_run, order_of_ctrl
+from .causes import (
+    COMMANDS,
+    ORDER,
+    START,
+    Cause,
+    built,
+    causes,
+    differences_of,
+    of_the_run,
+    order_of_ctrl,
+)
+from .gap import Curves, FirstTouch, Ruler, first_touch
 from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, Feature, OwnSettings, leave_out
-from .touches import FirstTouch, first_touch
 
 Measure = Literal["worst", "end", "rms"]
 # What the right is given of the left by `Model.replace`, by the name of its cause: the timestep,
@@ -97,7 +105,6 @@ class Trials:
     Attributes:
         traces: Both runs as they come, with what the engines derive.
         ruler: What all runs are measured by.
-        count: How many runs were made.
         ended: Why the last run that did not stand did not.
 
     Raises:
@@ -134,9 +141,8 @@ class Trials:
             self._recordings = first, (*recordings, translated(first, matched, right))[1]
             left, right = (SideStart(t.qpos[0], t.qvel[0], t.ctrl[0]) for t in self._recordings)
             self._starts = left, right
-        self.count, self.ended = 2, ""
-        self._runs: dict[_Run, _Outcome] = {}  # those that were asked for
-        self._ahead: dict[_Run, _Outcome] = {}  # those that will be
+        self.ended, self._repeated = "", 0
+        self._runs: dict[_Run, _Outcome] = {}
         self._by_name: dict[str, Cause] = {}
         self._replaced = _NONE  # causes that are brought over by `Model.replace`
         traces, began = [], time.perf_counter()
@@ -150,6 +156,11 @@ class Trials:
         for side, trace in enumerate(traces):
             self._runs[_Run(side, _NONE)] = self._measured(side, self._models[side], trace)
             self.ended = self.ended or trace.header.ended
+
+    @property
+    def count(self) -> int:
+        """How many runs were made, but for those of the floor."""
+        return self._repeated + sum(outcome.ran for outcome in self._runs.values())
 
     def causes(self, finer: bool) -> tuple[Cause, ...]:
         """All that can be one: of the files, of an engine's own settings, of the run.
@@ -266,12 +277,12 @@ class Trials:
     def ahead(self, wanted: Iterable[frozenset[str]]) -> None:
         """Make the runs now that `gaps` of some sets of causes will want, several at once."""
         runs = dict.fromkeys(run for brought in wanted for run in self._pair(brought))
-        new = [run for run in runs if run not in self._runs and run not in self._ahead]
+        new = [run for run in runs if run not in self._runs]
         jobs = self._forks_for(len(new))
         if jobs > 1:
             work = [partial(self._outcome, run) for run in new]
             for run, outcome in zip(new, in_forks(work, jobs, self._ran, self._took), strict=True):
-                self._ahead[run] = outcome or _Outcome(None, _LOST)
+                self._runs[run] = outcome or _Outcome(None, _LOST)
 
     def _forks_for(self, number: int) -> int:
         """How many forks are to share some runs."""
@@ -281,11 +292,8 @@ class Trials:
     def _run(self, run: _Run) -> Curves | None:
         """A run; None, with a reason in `ended`, if it cannot be made or did not stand."""
         if run not in self._runs:
-            if run not in self._ahead:
-                self._ahead[run] = self._outcome(run)
-                self._ran()
-            self._runs[run] = self._ahead.pop(run)
-            self.count += self._runs[run].ran
+            self._runs[run] = self._outcome(run)
+            self._ran()
         outcome = self._runs[run]
         if outcome.curves is None:
             self.ended = outcome.reason or self.ended
@@ -373,15 +381,15 @@ class Trials:
         """Whether the left moves the same when it is run again, so that a gap can have causes."""
         run = _Run(0, _NONE)
         again, first = self._outcome(run).curves, self._runs[run].curves
-        self.count += 1
+        self._repeated = 1
         self._ran()
         assert first is not None  # it has gaps
         return again is not None and all(
             np.array_equal(values, again[name]) for name, values in first.items()
         )
 
-    def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
-        """The chaos floor of each quantity: a gap that is no larger says nothing."""
+    def floor(self, uncertain: Uncertainty, measure: Measure) -> dict[str, float]:
+        """The chaos floor of each quantity, in its unit: a gap that is no larger says nothing."""
         base = _Run(0, _NONE)
         first = self._runs[base].curves
         assert first is not None  # it has gaps
@@ -400,7 +408,7 @@ class Trials:
         )
         if None in curves:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
-        return self.ruler.floor(first, [each[0] for each in curves if each])
+        return self.ruler.floor(first, [each[0] for each in curves if each], measure)
 
     def _measured(self, side: int, model: Model, trace: Trace) -> _Outcome:
         curves = self.ruler.curves(trace, self._posed(model), side)
