@@ -66,15 +66,15 @@ def write(
     from ..report import compare as pages
     from ..report.html import report, write_report
 
-    found, why_not = None, ""
+    explanation, why_not = None, ""
     if not (options.no_why or comparison.ended):
-        found, why_not = _why(options, request, traces)
+        explanation, why_not = _why(options, request, traces)
     page = pages.page(
         comparison,
         *traces,
         said=said,
         witness=witness,
-        explanation=found,
+        explanation=explanation,
         why_not=why_not,
         models=_models(request, traces),
         command=_typed(options, request),

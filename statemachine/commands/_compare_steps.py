@@ -66,9 +66,9 @@ def _one_step(options: argparse.Namespace, request: Any) -> int:
 
     (left, right), _, _ = prepare_sides(request)
     with progress("one step") as told:
-        found = one_step(left, right.model, names=request.names, progress=told)
+        result = one_step(left, right.model, names=request.names, progress=told)
     labels = numbered(tuple(side.label for side in request.sides) or request.backends)
-    return show(page(found, labels, _name(request)), found, options.json)
+    return show(page(result, labels, _name(request)), result, options.json)
 
 
 def _converge(options: argparse.Namespace, request: Any) -> int:
@@ -88,8 +88,8 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
         return run_sides(replace(request, options=both, sides=sides)).traces
 
     with progress("converge") as told:
-        found = convergence(run, progress=told)
-    return show(page(found, _name(request)), found, options.json)
+        result = convergence(run, progress=told)
+    return show(page(result, _name(request)), result, options.json)
 
 
 def _versions(options: argparse.Namespace, request: Any) -> int:

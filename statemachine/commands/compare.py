@@ -304,18 +304,20 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
     with progress("compare") as told:
         run = run_sides(request, told)
     one, two, said = run.left, run.right, run.said
-    found = compare(one, two, tolerances=tolerances)
+    comparison = compare(one, two, tolerances=tolerances)
     played = compare(one, run.played, tolerances=tolerances) if run.is_apart else None
     if options.json:
         for line in (*run.unmatched, *said):
             complain(line, 0)
     asked = witness(one, two, run.file)
-    floor = _floor(options, found, run)
+    floor = _floor(options, comparison, run)
     given = run if request.sides else None
     if options.html:
-        _compare_html.write(options, request, found, (one, two), said, asked, given, played, floor)
+        _compare_html.write(
+            options, request, comparison, (one, two), said, asked, given, played, floor
+        )
     page = report.page(
-        found,
+        comparison,
         one,
         two,
         said=said,
@@ -323,10 +325,10 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
         run=given,
         played=played,
         floor=floor,
-        why_not="" if found.ended else why_not,  # which the page says itself
+        why_not="" if comparison.ended else why_not,  # which the page says itself
     )
     result = {
-        "comparison": found,
+        "comparison": comparison,
         "witness": asked,
         "touches": touches(one, two),
         "floor": floor,
@@ -335,13 +337,13 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
         result |= {
             "sides": request.sides,
             "commands": run.commands,
-            "open_loop": found if played is None else played,
+            "open_loop": comparison if played is None else played,
             "unmatched": run.unmatched,
             "only": run.matched.only if run.matched else ({}, {}),
         }
-    write_junit(options, [found])
+    write_junit(options, [comparison])
     code = show(page, result, options.json)
-    pictures.write(renderer, options, one, two, found, request, floor)
+    pictures.write(renderer, options, one, two, comparison, request, floor)
     return code
 
 

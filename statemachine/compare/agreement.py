@@ -109,7 +109,9 @@ class Comparison:
     @property
     def agrees(self) -> bool:
         """Whether every quantity agrees at every moment, and both runs came to their end."""
-        return not self.ended and all(found.verdict == "agrees" for found in self.agreements)
+        return not self.ended and all(
+            agreement.verdict == "agrees" for agreement in self.agreements
+        )
 
     @property
     def ended(self) -> bool:
@@ -144,27 +146,27 @@ def compare(
     if not any(QUANTITIES[curve.kind].own for curve in curves):
         raise TraceError("the traces have no joint in common: nothing can be compared")
     longest = max(one.timestep, two.timestep)
-    found = []
+    agreements = []
     for curve in curves:
         reach = max(_reach(one, curve), _reach(two, curve)) if curve.kind == "tip" else 0.0
         allowed = tolerance_of(curve.kind, curve.one, curve.two, reach, longest, tolerances)
-        found.append(_agreement(curve.name, curve.kind, curve.difference, curve.time,
+        agreements.append(_agreement(curve.name, curve.kind, curve.difference, curve.time,
                                 _settled(curve), allowed))  # fmt: skip
     common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     labels = labels_of(one.header, two.header)
     allowed = tolerance_of("contact", common.time, common.time, 0.0, longest, tolerances)
-    found += _first_touches(one, two, float(common.time[-1]), allowed, labels.short)
+    agreements += _first_touches(one, two, float(common.time[-1]), allowed, labels.short)
     strange = [
-        f"{each.name}: {each.note}, so it cannot agree"
-        for each in found
-        if each.note.startswith("no number")
+        f"{agreement.name}: {agreement.note}, so it cannot agree"
+        for agreement in agreements
+        if agreement.note.startswith("no number")
     ]
     return Comparison(
         one=_side(one, labels.long[0], labels.short[0]),
         two=_side(two, labels.long[1], labels.short[1]),
         moments=len(curves[0].time),
         until=float(curves[0].time[-1]),
-        agreements=tuple(found),
+        agreements=tuple(agreements),
         notes=tuple(notes_on(one, two, common, strange)),
     )
 
@@ -219,7 +221,7 @@ def _first_touches(
     one: Trace, two: Trace, until: float, allowed: Tolerance, labels: tuple[str, str]
 ) -> list[Agreement]:
     """When each pair of bodies first touches, on either side."""
-    found = []
+    agreements = []
     for touch in touches(one, two):
         first, note = [touch.one.first, touch.two.first], ""
         known = [time for time in first if time is not None]
@@ -230,8 +232,8 @@ def _first_touches(
             known.append(until)
         gap = abs(known[0] - known[1])
         name, at = f"{touch.pair}, first touch", np.array([min(known)])
-        found.append(_agreement(name, "contact", np.array([gap]), at, gap, allowed, note))
-    return found
+        agreements.append(_agreement(name, "contact", np.array([gap]), at, gap, allowed, note))
+    return agreements
 
 
 def _side(trace: Trace, label: str, short: str) -> SideRun:

@@ -80,7 +80,7 @@ class TimestepConvergence:
     @property
     def vanishes(self) -> bool:
         """Whether no gap is more than discretisation, over the whole run."""
-        return all(each.verdict in ("rounding", "discretisation") for each in self.whole)
+        return all(quantity.verdict in ("rounding", "discretisation") for quantity in self.whole)
 
 
 def convergence(
@@ -163,10 +163,9 @@ def _limit(
 ) -> QuantityLimit:
     """One quantity at some of the moments (n,)."""
     name = curve.name
-    gaps = [float(each[name][chosen].max()) for each in between]
+    gaps = [float(run[name][chosen].max()) for run in between]
     left, right = (
-        [float(each[name][chosen].max()) if name in each else np.nan for each in side]
-        for side in own
+        [float(run[name][chosen].max()) if name in run else np.nan for run in side] for side in own
     )
     values = curve.one[chosen] if curve.one.size else np.ones(1)
     rounding = _ROUNDING * max(1.0, float(np.abs(values).max()))

@@ -123,14 +123,14 @@ def chaos_floor(
                 widths[name] = np.maximum(widths[name], far)
     reach = round(_WINDOW * (len(common.time) - 1))
     bands = []
-    for found in comparison.agreements:
-        width, time = widths[found.name], common.time
-        if found.kind == "contact":
+    for agreement in comparison.agreements:
+        width, time = widths[agreement.name], common.time
+        if agreement.kind == "contact":
             time = np.zeros(1)
         else:  # the largest within some rows to either side
             padded = np.pad(width, reach, mode="edge")
             width = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
-        bands.append(_band(found, gaps[found.name], width, time))
+        bands.append(_band(agreement, gaps[agreement.name], width, time))
     return ChaosFloor(runs, seed, ROUNDING, uncertain, ended, tuple(bands), common.time)
 
 
@@ -141,32 +141,32 @@ def _distances(
 
     Of a first touch it is one number [s]: a touch that does not come has no time.
     """
-    found: dict[str, Array] = {}
+    distances: dict[str, Array] = {}
     try:
         curves, count = series(one, perturbed, tip), len(perturbed)
         for touch in touches(one, perturbed):
             first, other = touch.one.first, touch.two.first
             gap = until if first is None or other is None else abs(first - other)
-            found[f"{touch.pair}, first touch"] = np.array([gap])
+            distances[f"{touch.pair}, first touch"] = np.array([gap])
     except TraceError:  # it ended at once
         curves, count = series(one, one, tip), 0
     for curve in curves:
         far = np.full(len(one), np.inf)
         far[:count] = np.nan_to_num(curve.difference[:count], nan=np.inf)
-        found[curve.name] = far[rows]
-    return found
+        distances[curve.name] = far[rows]
+    return distances
 
 
-def _band(found: Agreement, gap: Array, width: Array, time: Array) -> FloorBand:
+def _band(agreement: Agreement, gap: Array, width: Array, time: Array) -> FloorBand:
     outside = np.flatnonzero(~(gap <= width))
     last = int(outside[-1]) + 1 if len(outside) else 0
     return FloorBand(
-        name=found.name,
-        kind=found.kind,
-        unit=found.unit,
+        name=agreement.name,
+        kind=agreement.kind,
+        unit=agreement.unit,
         most=float(width.max()),
         end=float(width[-1]),
         inside_from=float(time[last]) if last < len(time) else None,
-        beyond=bool((~(gap <= np.maximum(width, found.tolerance))).any()),
+        beyond=bool((~(gap <= np.maximum(width, agreement.tolerance))).any()),
         width=width,
     )

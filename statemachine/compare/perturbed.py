@@ -43,16 +43,16 @@ def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
     Raises:
         BadInputError: A word is none, or a length or an angle is given twice.
     """
-    found: dict[str, float] = {}
+    sizes: dict[str, float] = {}
     for word in words:
         value, unit = amount(word)
         kind = {"m": "length", "rad": "angle"}.get(unit)
         if kind is None or np.isnan(value):
             raise BadInputError(f"an uncertainty reads like 0.1mm or 0.1deg; got {word!r}")
-        if kind in found:
+        if kind in sizes:
             raise BadInputError(f"the {kind} that is uncertain is given twice: {word!r}")
-        found[kind] = value
-    return Uncertainty(**found)
+        sizes[kind] = value
+    return Uncertainty(**sizes)
 
 
 def perturbed_runs(

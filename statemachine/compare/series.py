@@ -76,19 +76,19 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
     """
     common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     time, sides = common.time, ((one, common.one), (two, common.two))
-    found: list[Series] = []
+    curves: list[Series] = []
     theirs = two.header.joint_labels
     for name in one.header.joint_labels:
         if name in theirs:
-            found += _joint(name, time, sides)
+            curves += _joint(name, time, sides)
     site = default_tip(one.header, two.header) if tip is None else tip
     if site and tell(one, two, "site_xpos") and tell(one, two, "site_xmat"):
         (p, r), (q, s) = ([part[rows] for part in trace.site(site)] for trace, rows in sides)
-        found.append(_curve(f"{site}, position", "tip", time, p, q))
-        found.append(_turned(f"{site}, rotation", "tip rotation", time, r, s))
+        curves.append(_curve(f"{site}, position", "tip", time, p, q))
+        curves.append(_turned(f"{site}, rotation", "tip rotation", time, r, s))
     if tell(one, two, "energy"):
         totals = (trace["energy"].sum(axis=1)[rows] for trace, rows in sides)
-        found.append(_curve("energy", "energy", time, *totals))
+        curves.append(_curve("energy", "energy", time, *totals))
     if tell(one, two, "contact_force"):
         forces = [normal_forces(one), normal_forces(two)]
         forces[1] = same_pairs(forces[0], forces[1])
@@ -97,8 +97,8 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
                 force.get(pair, np.zeros(len(trace)))[rows]
                 for force, (trace, rows) in zip(forces, sides, strict=True)
             )
-            found.append(_curve(f"{pair}{NORMAL}", "force", time, *values))
-    return found
+            curves.append(_curve(f"{pair}{NORMAL}", "force", time, *values))
+    return curves
 
 
 def _curve(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
@@ -121,17 +121,17 @@ def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
     values = [t.qpos[rows, joint.qpos] for (t, rows), joint in zip(sides, joints, strict=True)]
     if kind in (JointType.HINGE, JointType.SLIDE):
         what = "joint" if kind is JointType.HINGE else "slide"
-        return [_curve(name, what, time, *(each[:, 0] for each in values))]
-    found = []
+        return [_curve(name, what, time, *(side[:, 0] for side in values))]
+    curves = []
     if kind is JointType.FREE:
-        found.append(_curve(f"{name}, position", "body", time, *(each[:, :3] for each in values)))
+        curves.append(_curve(f"{name}, position", "body", time, *(side[:, :3] for side in values)))
     with np.errstate(invalid="ignore"):  # all zero is no rotation: NaN, which never agrees
         turned = (
             matrix_from_quat(q[:, -4:] / np.linalg.norm(q[:, -4:], axis=1, keepdims=True))
             for q in values
         )
-        found.append(_turned(f"{name}, rotation", "body rotation", time, *turned))
-    return found
+        curves.append(_turned(f"{name}, rotation", "body rotation", time, *turned))
+    return curves
 
 
 def default_tip(*headers: Header) -> str:
@@ -239,7 +239,7 @@ def _of(trace: Trace, until: float) -> dict[str, Contact]:
     time = time[time <= until + SAME * trace.header.timestep]
     tail = np.flatnonzero(time >= until * (1 - SETTLED) - SAME * trace.header.timestep)
     forces, totals = normal_forces(trace), total_forces(trace)
-    found = {}
+    contacts = {}
     for pair, touching in trace.touches().items():
         rows = touching[: len(time)].nonzero()[0]
         if not len(rows):
@@ -248,7 +248,7 @@ def _of(trace: Trace, until: float) -> dict[str, Contact]:
         places = places[trace["contact_row"][places] < len(time)]
         distance = np.nan_to_num(trace["contact_dist"][places])
         deepest = int(np.argmin(distance))
-        found[pair] = Contact(
+        contacts[pair] = Contact(
             first=float(time[rows[0]]),
             last=float(time[rows[-1]]),
             share=len(rows) / len(time),
@@ -258,4 +258,4 @@ def _of(trace: Trace, until: float) -> dict[str, Contact]:
             deepest=max(0.0, -float(distance[deepest])),
             deepest_at=float(time[trace["contact_row"][places[deepest]]]),
         )
-    return found
+    return contacts

@@ -80,12 +80,12 @@ def _readable(file: Path, header: Header, site: str) -> Kinematics:
     """The robot from a scene's file, or from one that it includes, or from its numbers."""
     for path in model_files(file):
         try:
-            found = Kinematics(path)
-            names = [header.joints[k] for k in shared_joints(found, header.joints)]
+            kinematics = Kinematics(path)
+            names = [header.joints[k] for k in shared_joints(kinematics, header.joints)]
         except StateMachineError:
             continue
-        if site in found.site_names:
-            return found if found.joint_names == tuple(names) else Kinematics(path, names)
+        if site in kinematics.site_names:
+            return kinematics if kinematics.joint_names == tuple(names) else Kinematics(path, names)
     return Kinematics.same_reading(load(file))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -44,26 +44,25 @@ def _write_columns(file: str, trace: Trace) -> None:
 
 
 def _write_contacts(file: str, trace: Trace) -> None:
-    geoms, header = trace["contact_geom"].tolist(), trace.header
+    header = trace.header
     labels = ["time", "geom_1", "geom_2", "body_1", "body_2", "dist"]
     labels += [f"pos.{axis}" for axis in "xyz"]
     labels += ["force.normal", "force.tangent_1", "force.tangent_2"]
-
-    def rows() -> Iterator[list[Any]]:
-        for k, row in enumerate(trace["contact_row"].tolist()):
-            one, two = geoms[k]
-            yield [
-                float(trace.time[row]),
-                header.geoms[one] or f"geom {one}",
-                header.geoms[two] or f"geom {two}",
-                header.bodies[header.geom_bodyid[one]],
-                header.bodies[header.geom_bodyid[two]],
-                float(trace["contact_dist"][k]),
-                *trace["contact_pos"][k].tolist(),
-                *trace["contact_force"][k].tolist(),
-            ]
-
-    _write_rows(file, labels, rows())
+    columns = (
+        trace[f"contact_{name}"].tolist() for name in ("row", "geom", "dist", "pos", "force")
+    )
+    rows = (
+        [
+            float(trace.time[row]),
+            *(header.geoms[geom] or f"geom {geom}" for geom in geoms),
+            *(header.bodies[header.geom_bodyid[geom]] for geom in geoms),
+            distance,
+            *position,
+            *force,
+        ]
+        for row, geoms, distance, position, force in zip(*columns, strict=True)
+    )
+    _write_rows(file, labels, rows)
 
 
 def column_labels(header: Header, column: str) -> list[str]:
@@ -88,15 +87,15 @@ def column_labels(header: Header, column: str) -> list[str]:
 
 def coordinate_labels(header: Header, positions: bool) -> list[str]:
     """A name for each coordinate: the joint's, with parts where it has several."""
-    found = []
+    labels = []
     ball = ("qw", "qx", "qy", "qz") if positions else ("wx", "wy", "wz")
     parts = {
         int(JointType.FREE): (*"xyz", *ball) if positions else ("vx", "vy", "vz", *ball),
         int(JointType.BALL): ball,
     }
     for label, kind in zip(header.joint_labels, header.jnt_type, strict=True):
-        found += [f"{label}.{part}" for part in parts.get(kind, ())] or [label]
-    return found
+        labels += [f"{label}.{part}" for part in parts.get(kind, ())] or [label]
+    return labels
 
 
 def _write_rows(name: str, labels: list[str], rows: Iterable[list[Any]]) -> None:

@@ -100,8 +100,8 @@ def _read(
 ) -> None:
     for name, values in kept.items():
         values.append(array_or_nan(data, name))
-    found = data.contacts
-    if len(found):
-        contacts["contact_row"].append(np.full(len(found), row))
+    touching = data.contacts
+    if len(touching):
+        contacts["contact_row"].append(np.full(len(touching), row))
         for name in ("geom", "dist", "pos", "frame", "force"):
-            contacts[f"contact_{name}"].append(np.array(getattr(found, name)))
+            contacts[f"contact_{name}"].append(np.array(getattr(touching, name)))

@@ -50,7 +50,7 @@ def energies(
                 )
             elif gravity is not None:
                 yardstick = yardstick.replace(gravity=gravity)
-        found = room(DEFAULT).energies(yardstick, qpos, qvel)
+        joules = room(DEFAULT).energies(yardstick, qpos, qvel)
     except StateMachineError:
         return unknown
-    return found, f"{DEFAULT} {yardstick.engine_version}"
+    return joules, f"{DEFAULT} {yardstick.engine_version}"

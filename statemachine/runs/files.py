@@ -118,22 +118,22 @@ def model_file(
         ModelFileError: It is nowhere.
     """
     known = header.provenance
-    found = list(dict.fromkeys(_candidates(known.model_file, menagerie, beside)))
-    for path in found:
+    candidates = list(dict.fromkeys(_candidates(known.model_file, menagerie, beside)))
+    for path in candidates:
         if model_digest(path) == known.model_sha256:
             return path, True
-    if not found:
+    if not candidates:
         raise ModelFileError(
             f"the trace's model {known.model_file} is not here: say which it is with --model"
         )
-    return found[0], False
+    return candidates[0], False
 
 
 def _known(path: str | os.PathLike[str]) -> Path:
-    found = Path(path)
-    if found.suffix.lower() not in SUFFIXES:
-        raise BadInputError(f"a trace is a file {' or '.join(SUFFIXES)}; got {found.name!r}")
-    return found
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        raise BadInputError(f"a trace is a file {' or '.join(SUFFIXES)}; got {target.name!r}")
+    return target
 
 
 def _missing(path: Path) -> TraceError:

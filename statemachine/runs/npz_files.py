@@ -49,17 +49,17 @@ def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
 
 def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     """The arrays by name."""
-    found: dict[str, zipfile.ZipInfo] = {}
+    entries: dict[str, zipfile.ZipInfo] = {}
     for entry in archive.infolist():
         name = entry.filename.removesuffix(".npy")
         if name == entry.filename:
             raise TraceError(f"holds {name[:40]!r}, which is no array")
         if entry.comment or entry.extra:  # where a damaged list of contents hides its next entries
             raise TraceError("has a damaged list of contents")
-        if name in found:
+        if name in entries:
             raise TraceError(f"holds two arrays {name[:40]!r}")
-        found[name] = entry
-    return found
+        entries[name] = entry
+    return entries
 
 
 def _describe(

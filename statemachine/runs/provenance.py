@@ -79,5 +79,5 @@ def model_files(path: Path) -> Iterator[Path]:
         except ElementTree.ParseError:  # a binary model
             continue
         parts = [*root.iter("include"), *root.iterfind("asset/model")]
-        found = [included_file(element.get("file", ""), path, file) for element in parts]
-        waiting += [each for each in found if each is not None]
+        included = [included_file(element.get("file", ""), path, file) for element in parts]
+        waiting += [part for part in included if part is not None]

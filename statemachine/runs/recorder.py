@@ -169,21 +169,21 @@ def _run(
         ended = str(error).partition(". This Data")[
             0
         ]  # without its advice, which is of no use here
-    found = {"time": np.array(times)}
+    inputs = {"time": np.array(times)}
     for name, parts, width in zip(
         ("qpos", "qvel", "ctrl"), rows, (model.nq, model.nv, model.nu), strict=True
     ):
-        found[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
+        inputs[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
     # The last rows may have finite numbers that no trace holds.
-    state = np.hstack([found["qpos"], found["qvel"]])
+    state = np.hstack([inputs["qpos"], inputs["qvel"]])
     stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
     rows_left = int(np.append(0, stands)[-1]) + 1  # the first is what it started from
     if rows_left < len(times):
         ended = ended or f"a coordinate left every bound at {times[-1]:g} s"
-        found = {name: array[:rows_left] for name, array in found.items()}
-    for name, array in found.items():
+        inputs = {name: array[:rows_left] for name, array in inputs.items()}
+    for name, array in inputs.items():
         # A step finds what is not finite itself, but the last row has no step.
         if not np.isfinite(array[-1]).all():
             raise BadInputError(f"the controller left {name} with an entry that is no number")
     progress(1.0)
-    return found, ended
+    return inputs, ended

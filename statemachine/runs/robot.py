@@ -89,16 +89,16 @@ def touching(
 
     Without `bodies`, whatever touches; with `each_other`, also what of them touches one another.
     """
-    found = contacts.geom.tolist()
+    pairs = contacts.geom.tolist()
     if bodies is not None:
-        owners = [[int(model.geom_bodyid[geom]) in bodies for geom in pair] for pair in found]
-        found = [
+        owners = [[int(model.geom_bodyid[geom]) in bodies for geom in pair] for pair in pairs]
+        pairs = [
             pair
-            for pair, (one, two) in zip(found, owners, strict=True)
+            for pair, (one, two) in zip(pairs, owners, strict=True)
             if one != two or (one and each_other)
         ]
-    names = ContactNames.of(model) if found else None
-    return tuple(dict.fromkeys(names.geoms(*pair) for pair in found)) if names else ()
+    names = ContactNames.of(model) if pairs else None
+    return tuple(dict.fromkeys(names.geoms(*pair) for pair in pairs)) if names else ()
 
 
 def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:

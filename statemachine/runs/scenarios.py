@@ -80,10 +80,10 @@ class Scenario:
 def fitting(model: Model) -> tuple[str, ...]:
     """Names of the scenarios that make sense on a Model."""
     names = []
-    for each in SCENARIOS.values():
+    for known in SCENARIOS.values():
         with suppress(BadInputError):
-            each.needs(model)
-            names.append(each.name)
+            known.needs(model)
+            names.append(known.name)
     return tuple(names)
 
 

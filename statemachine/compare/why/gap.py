@@ -103,19 +103,19 @@ class Ruler:
         if trace.header.ended or time[-1] < self.time[-1] - slack:
             return None
         qpos, places = at_moments(time, trace.qpos, self.time, slack), self._places[side]
-        found = {
+        curves = {
             "joints": qpos[:, places.hinges],
             "slides": qpos[:, places.slides],
             BALLS: qpos[:, places.balls[:, None] + np.arange(4)],
         }
         for name, start in zip(self._names, places.free, strict=True):
-            found[f"{name}, rotation"] = qpos[:, start + 3 : start + 7]
+            curves[f"{name}, rotation"] = qpos[:, start + 3 : start + 7]
         if self._tip or self._names:
             try:
-                found |= self._poses(qpos, model or self._model, side)
+                curves |= self._poses(qpos, model or self._model, side)
             except DivergedError:
                 return None
-        return {name: found[name] for name in self.units}
+        return {name: curves[name] for name in self.units}
 
     def _poses(self, qpos: Array, model: Model, side: int) -> Curves:
         """Where the tip and the free bodies are, and these in the axes of the tip."""
@@ -130,14 +130,14 @@ class Ruler:
         count = len(self._names)
         values = np.array(rows)
         where = values[:, : 3 * count].reshape(len(rows), count, 3)
-        found = {name: where[:, k] for k, name in enumerate(self._names)}
+        curves = {name: where[:, k] for k, name in enumerate(self._names)}
         if tip is not None:
-            found[self._tip] = site = values[:, 3 * count : 3 * count + 3]
+            curves[self._tip] = site = values[:, 3 * count : 3 * count + 3]
             turned = np.ascontiguousarray(values[:, 3 * count + 3 :]).reshape(-1, 3, 3)
             for k, name in enumerate(self._names):
                 relative = np.einsum("nij,ni->nj", turned, where[:, k] - site)
-                found[self._relative_to_tip(name)] = relative
-        return found
+                curves[self._relative_to_tip(name)] = relative
+        return curves
 
     def _relative_to_tip(self, body: str) -> str:
         """The quantity that is a free body's place in the axes of the tip."""

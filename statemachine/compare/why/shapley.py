@@ -216,8 +216,10 @@ def _drawn(game: _Game, active: Sequence[str], budget: int, random: np.random.Ge
     while failed < _FAILURES:
         order = _order(game, active, random)
         orders = order, _order(game, active, random) if game.needs else order[::-1]
-        game.expect(frozenset(each[:n]) for each in orders for n in range(len(each) + 1))
-        one, two = (_along(game, each) for each in orders)
+        game.expect(
+            frozenset(sequence[:n]) for sequence in orders for n in range(len(sequence) + 1)
+        )
+        one, two = (_along(game, sequence) for sequence in orders)
         pair = [(one[cause] + two[cause]) / 2 for cause in active]
         if math.isnan(sum(pair)):
             failed += 1
