@@ -15,6 +15,7 @@ from ._common import (
     add_table,
     file_name,
     json_of,
+    refuse,
     resumable,
     show,
 )
@@ -92,14 +93,17 @@ def add(parser: argparse.ArgumentParser) -> None:
         ),
         json_of("judgement"),
     )
-    parser.set_defaults(parser=parser)
     add_rules(parser, ("only", NEEDS, "mutants"))
 
 
 def run(options: argparse.Namespace) -> int:
     """Judge, and show."""
-    if (not options.files) == (options.mutants is None):
-        options.parser.error("expected one of FILE and --mutants TESTFILE")
+    refuse(
+        (
+            (not options.files) == (options.mutants is None),
+            "expected one of FILE and --mutants TESTFILE",
+        )
+    )
     from ..grading.classroom import is_one_students
     from ..runs.whole import check_place
 
@@ -109,12 +113,16 @@ def run(options: argparse.Namespace) -> int:
         folder and not table and is_one_students(Path(options.files[0]))
     )
     several = len(options.files) > 1 or (folder and not single)
-    if (options.mutants is not None or several) and options.gradescope:
-        options.parser.error("--gradescope goes with one FILE, or one FOLDER")
-    if not several and table and all(Path(file).exists() for file in options.files):
-        options.parser.error(
-            "--csv, --jobs, --roster and --tests go with several files, or a folder"
-        )
+    refuse(
+        (
+            (options.mutants is not None or several) and options.gradescope,
+            "--gradescope goes with one FILE, or one FOLDER",
+        ),
+        (
+            not several and table and all(Path(file).exists() for file in options.files),
+            "--csv, --jobs, --roster and --tests go with several files, or a folder",
+        ),
+    )
     if options.mutants is not None:
         return _mutants(options)
     for target in (options.csv, options.gradescope):

@@ -143,46 +143,39 @@ Where to go next:
 
 def run_path(options: argparse.Namespace) -> int:
     """All lessons of the path, one after the other."""
-    reader = _reader(options, PATH[0])
-    try:
-        return _path(options, reader)
-    finally:
-        if options.record:
-            print(reader.summary)
-
-
-def _path(options: argparse.Namespace, reader: Any) -> int:
     from ..report import terminal
+    from ..report.as_json import dumps
     from ..report.quiz import Stopped
 
+    reader = _reader(options, PATH[0])
     code, everything = 0, {}
     names = [lesson.name for lesson in PATH]
     first = names.index(options.start) if options.start else 0
-    for number, lesson in enumerate(PATH[first:], start=first + 1):
-        try:
+    lesson = PATH[first]
+    try:
+        for number, lesson in enumerate(PATH[first:], start=first + 1):
             if reader and number > first + 1:
                 reader.go_on(f"lesson {number}: {lesson.question}")
             if reader:
                 reader.lesson = lesson.name
-            page, results = _compute(options, lesson, lesson.model, lesson.defaults)
-            everything[lesson.name] = results
+            page, everything[lesson.name] = _compute(options, lesson, lesson.model, lesson.defaults)
             code = code if page.holds else SAYS_NO
             if not options.json:
                 title = f"{number} of {len(PATH)}, {page.title}"
                 terminal.show(replace(page, title=title), "", reader)
-        except (Stopped, KeyboardInterrupt) as stop:
-            if reader:
-                print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
-            if isinstance(stop, KeyboardInterrupt):
-                raise
-            return code
-    if options.json:
-        from ..report.as_json import dumps
-
-        print(dumps(everything))
-    elif code == 0:
-        with suppress(Stopped):
-            return _last_page(options, reader)
+        if options.json:
+            print(dumps(everything))
+        elif code == 0:
+            with suppress(Stopped):
+                code = _last_page(options, reader)
+    except (Stopped, KeyboardInterrupt) as stop:
+        if reader:
+            print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
+        if isinstance(stop, KeyboardInterrupt):
+            raise
+    finally:
+        if options.record:
+            print(reader.summary)
     return code
 
 

@@ -86,9 +86,9 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         # One for each world: what `np_random` and `np_random_seed` of the base class give.
-        made = [seeding.np_random() for _ in range(self.num_envs)]
-        self._np_random: Any = [rng for rng, _ in made]
-        self._np_random_seed: Any = [drawn for _, drawn in made]
+        generators, seeds = zip(*(seeding.np_random() for _ in range(self.num_envs)), strict=True)
+        self._np_random: Any = list(generators)
+        self._np_random_seed: Any = list(seeds)
         self._targets = np.zeros((self.num_envs, 3))
         self._seen = np.zeros((self.num_envs, len(self.task.low)))
         self._steps = np.zeros(self.num_envs, dtype=np.int64)

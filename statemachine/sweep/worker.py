@@ -206,6 +206,26 @@ def _cached(key: str, make: Callable[[], T]) -> T:
     return result
 
 
+_USED: dict[int, Data] = {}  # by the id of its Model, which it keeps
+
+
+@contextmanager
+def _used_before(model: Model) -> Iterator[Data]:
+    """A Data that an earlier cell has used, if there is one: to make one costs more than `reset`.
+
+    Not for a user's function, which may have changed what `reset` does not set back.
+    """
+    data = _USED.pop(id(model), None) or make_data(model)
+    try:
+        yield data
+    except BaseException:
+        data.close()
+        raise
+    _USED[id(model)] = data
+    if len(_USED) > _CACHED:
+        _USED.pop(next(iter(_USED))).close()
+
+
 def _run(
     ready: PreparedSweep,
     cell: SweepCell,
@@ -227,7 +247,7 @@ def _run(
     sampled = set(moments[moments > 0].tolist())
     row["sample_time"], samples = [], list[Array]()
     speed, fastest = np.zeros(model.nv), np.zeros(model.nv)
-    with make_data(model) as data:
+    with make_data(model) if ready.function else _used_before(model) as data:
         reset(model, data, scenario.keyframe)
         qpos, qvel = data.qpos, data.qvel  # the same arrays for the whole life of the Data
         starts = start_at(model, ready.settings(cell, "state"))
