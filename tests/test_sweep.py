@@ -274,6 +274,15 @@ def test_a_cell_is_the_run_of_a_trace(scene: sm.Model, backend: str) -> None:
     assert row["touch"]
 
 
+def test_a_cell_does_not_depend_on_the_one_before(backend: str) -> None:
+    """They use one Data, also of PyBullet, whose contacts remember."""
+    ready = prepared(Sweep("hold", (), (backend,), 3, model="so101/scene_box", seconds=0.5))
+    cells = list(ready.cells(backend))
+    rows, reversed_rows = (run_batch(ready, order, False) for order in (cells, cells[::-1]))
+    for row, other in zip(rows, reversed_rows[::-1], strict=True):
+        assert {**row, "wall_seconds": 0} == {**other, "wall_seconds": 0}
+
+
 @pytest.mark.usefixtures("bullet")
 def test_a_seed_draws_the_same_start_everywhere() -> None:
     sweep = Sweep("hold", backends=("mujoco", "pybullet"), seeds=3, seconds=0.005, moments=1)
