@@ -108,8 +108,8 @@ class _Examination:
     def _fault(self, words: str) -> None:
         self.row = replace(self.row, faults=(*self.row.faults, _line(words)[:300]))
 
-    def _put(self, backend: str, **found: Any) -> None:
-        row = replace(self.row.backends.get(backend, BackendRow()), **found)
+    def _put(self, backend: str, **facts: Any) -> None:
+        row = replace(self.row.backends.get(backend, BackendRow()), **facts)
         self.row = replace(self.row, backends={**self.row.backends, backend: row})
 
     def _any(self) -> dict[str, Model]:
@@ -140,11 +140,15 @@ class _Examination:
         self, backend: str, caught: Sequence[warnings.WarningMessage]
     ) -> tuple[str, ...]:
         """Warnings of a backend that the default one did not give, too, each once."""
-        texts = [_line(each.message) for each in caught if issubclass(each.category, EngineWarning)]
+        texts = [
+            _line(warning.message)
+            for warning in caught
+            if issubclass(warning.category, EngineWarning)
+        ]
         first = self.row.backends.get(DEFAULT)
         if first is not None and backend != DEFAULT:
             known = [text.partition(": ")[2] for text in first.warnings]
-            texts = [text for text in texts if not any(text.endswith(each) for each in known)]
+            texts = [text for text in texts if not any(text.endswith(end) for end in known)]
         return tuple(dict.fromkeys(texts))
 
     def _sizes(self, model: Model) -> None:
@@ -165,8 +169,8 @@ class _Examination:
         driver = InterfaceDriver(model, self.seed)
         point = self._start(model, _FUTURE)
         way = replace(driver.save_methods(point)[-1], travels=False)
-        found = trials.tried(driver, driver.run(point, _FUTURE), way)
-        return all(finding.holds for finding in found)
+        findings = trials.tried(driver, driver.run(point, _FUTURE), way)
+        return all(finding.holds for finding in findings)
 
     def _start(self, model: Model, run_in: int) -> SavePoint:
         """The start of a run, under the first command."""
@@ -177,12 +181,12 @@ class _Examination:
 
     def _gaps(self) -> None:
         """Each other backend against the default one."""
-        for kept, name, halve in (
+        for models, name, halve in (
             (self.without, "without_contacts", True),
             (self.models, "with_contacts", False),
         ):
-            first = kept.get(DEFAULT)
-            for backend, model in kept.items():
+            first = models.get(DEFAULT)
+            for backend, model in models.items():
                 if first is None or backend == DEFAULT:
                     continue
                 with self._part(f"gap {name.replace('_', ' ')}, {backend}"):
@@ -220,13 +224,13 @@ class _Examination:
 def _witness_row(model: Model, seed: int) -> WitnessRow:
     """Compare every end of the robot at random poses."""
     try:
-        found = certify(model, poses=_POSES, seed=seed)
+        certificate = certify(model, poses=_POSES, seed=seed)
     except StateMachineError as error:
         return WitnessRow(refusal=_line(error))
-    gap = found.position_worst
+    gap = certificate.position_worst
     if gap is None:  # its frame is another one than the engine's
-        gap = float("inf") if found.frames is None else found.frames.distance
-    return WitnessRow(found.grade, found.reason, len(found.tips), gap)
+        gap = float("inf") if certificate.frames is None else certificate.frames.distance
+    return WitnessRow(certificate.grade, certificate.reason, len(certificate.tips), gap)
 
 
 def _line(words: object) -> str:

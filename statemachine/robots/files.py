@@ -99,8 +99,8 @@ def _has_bodies(file: Path) -> bool:
     try:
         return any(
             element.tag in ("body", "attach", "replicate", "composite", "flexcomp")
-            for each in model_files(file)
-            for _, element in ElementTree.iterparse(each, events=("start",))
+            for part in model_files(file)
+            for _, element in ElementTree.iterparse(part, events=("start",))
         )
     except (ElementTree.ParseError, UnicodeError, ValueError, OSError):
         return True

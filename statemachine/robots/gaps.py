@@ -73,42 +73,42 @@ def run(model: Model, orders: Array, nudge: np.random.Generator | None = None) -
     return np.array(rows), ended
 
 
-def run_gap(one: Model, other: Model, seed: int, halve: bool = False) -> RunGap:
+def run_gap(left: Model, right: Model, seed: int, halve: bool = False) -> RunGap:
     """How far two Models of one file are apart, under the same commands.
 
     Args:
-        one: On one engine.
-        other: On another.
+        left: On one engine.
+        right: On another.
         seed: Of the commands.
         halve: Whether to repeat it at half the timestep, where they part.
     """
-    orders = commands(one, STEPS, seed)
-    first = run(one, orders)
-    found = _gap(one, first, run(other, orders))
-    if found.ended or found.largest <= TOLERANCE:
-        return found
-    again = run(one, orders, np.random.default_rng(seed))
-    found = replace(found, floor=_gap(one, first, again).largest)
-    if not halve or found.is_rounding:
-        return found
-    timestep = one.timestep / 2
+    orders = commands(left, STEPS, seed)
+    first = run(left, orders)
+    gap = _gap(left, first, run(right, orders))
+    if gap.ended or gap.largest <= TOLERANCE:
+        return gap
+    again = run(left, orders, np.random.default_rng(seed))
+    gap = replace(gap, floor=_gap(left, first, again).largest)
+    if not halve or gap.is_rounding:
+        return gap
+    timestep = left.timestep / 2
     try:
-        finer = [model.replace(timestep=timestep) for model in (one, other)]
+        finer = [model.replace(timestep=timestep) for model in (left, right)]
     except StateMachineError:
-        return found
-    orders = np.repeat(commands(one, STEPS, seed), 2, axis=0)
-    halved = _gap(one, run(finer[0], orders), run(finer[1], orders))
+        return gap
+    orders = np.repeat(commands(left, STEPS, seed), 2, axis=0)
+    halved = _gap(left, run(finer[0], orders), run(finer[1], orders))
     if halved.ended or not halved.largest:
-        return found
-    return replace(found, shrinks=found.largest / halved.largest)
+        return gap
+    return replace(gap, shrinks=gap.largest / halved.largest)
 
 
-def _gap(one: Model, left: tuple[Array, str], right: tuple[Array, str]) -> RunGap:
-    """How far two runs are apart, which `run` made of `one` and of another Model."""
+def _gap(model: Model, left: tuple[Array, str], right: tuple[Array, str]) -> RunGap:
+    """How far two runs are apart, which `run` made of a Model and of another."""
     (first, ended), (second, also_ended) = left, right
     rows = min(len(first), len(second))
-    a, b = first[:rows, : one.nq], second[:rows, : one.nq]
-    places = JointPlaces.of(one.jnt_type, one.jnt_qposadr)
+    a, b = first[:rows, : model.nq], second[:rows, : model.nq]
+    places = JointPlaces.of(model.jnt_type, model.jnt_qposadr)
     apart = {
         name: farthest(a[:, chosen], b[:, chosen])
         for name, chosen in (
@@ -125,6 +125,6 @@ def _gap(one: Model, left: tuple[Array, str], right: tuple[Array, str]) -> RunGa
         steps=rows - 1,
         **{name: largest_or_inf(sizes) for name, sizes in apart.items()},
         moved=float(np.abs(a - a[0]).max(initial=0.0)),
-        fastest=float(np.abs(second[:rows, one.nq :]).max(initial=0.0)),
+        fastest=float(np.abs(second[:rows, model.nq :]).max(initial=0.0)),
         ended=ended or also_ended,
     )

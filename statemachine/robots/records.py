@@ -223,5 +223,5 @@ class Survey:
     @property
     def wrong(self) -> Mapping[str, tuple[str, ...]]:
         """What must not be, by file."""
-        found = {row.file: row.wrong(self.default) for row in self.models}
-        return {file: said for file, said in found.items() if said}
+        by_file = {row.file: row.wrong(self.default) for row in self.models}
+        return {file: said for file, said in by_file.items() if said}

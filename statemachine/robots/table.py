@@ -97,7 +97,7 @@ def _built(kind: Any, value: Any) -> Any:
         hints = typing.get_type_hints(kind)
         return kind(**{name: _built(hints[name], value[name]) for name in hints if name in value})
     if typing.get_origin(kind) is dict:
-        return {name: _built(kind.__args__[1], each) for name, each in value.items()}
+        return {name: _built(kind.__args__[1], part) for name, part in value.items()}
     if typing.get_origin(kind) is tuple:
         return tuple(value.split("\n") if isinstance(value, str) else map(str, value))
     if kind is bool:

@@ -177,7 +177,7 @@ def sweep_report(
         units={label: unit for label, unit in facts.units.items() if unit},
         seeds=seeds,
         quantity=agreement,
-        quantities=tuple(each for each, _ in agreements.values()),
+        quantities=tuple(agreement for agreement, _ in agreements.values()),
         settings=settings,
         failed=data.failed,
         missing=data.missing,
@@ -186,7 +186,7 @@ def sweep_report(
         map=gap_map(data, main, widths.get(main), shares),
         sensitivity=shares,
         together=together,
-        ran=(floor.cells if floor else 0) + sum(each.cells for each in together),
+        ran=(floor.cells if floor else 0) + sum(fit.cells for fit in together),
         design=design,
     )
 

@@ -196,17 +196,17 @@ def length(name: str, difference: Array) -> Array:
     return largest_known(largest_known(np.abs(difference)))
 
 
-def gap_between(name: str, one: Runs, two: Runs) -> Array:
+def gap_between(name: str, left: Runs, right: Runs) -> Array:
     """The gap (…) of a quantity between runs.
 
     Of a first touch that only one side has it is the length of the run, and 0 if neither has one.
     """
     if RUN_QUANTITIES[name].kind != "contact":
-        return length(name, vectors(name, one) - vectors(name, two))
-    until = np.minimum(one["time"], two["time"])
-    never = np.isinf(one["touch"]).astype(int) + np.isinf(two["touch"])
+        return length(name, vectors(name, left) - vectors(name, right))
+    until = np.minimum(left["time"], right["time"])
+    never = np.isinf(left["touch"]).astype(int) + np.isinf(right["touch"])
     with np.errstate(invalid="ignore"):
-        gap = np.abs(one["touch"] - two["touch"])
+        gap = np.abs(left["touch"] - right["touch"])
     return np.where(never == 2, 0.0 * until, np.where(never == 1, until, gap))
 
 

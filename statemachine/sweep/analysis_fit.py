@@ -30,7 +30,7 @@ class FittedValue:
         edge: Whether it is at the end of the range.
         curves: From how many curves; of a sampled design, from how many settings.
         scan: (n,) values between the bounds, and (n,) the predicted gap there.
-        each: (c,) what is predicted at the value for each curve that was given; NaN without one.
+        by_curve: (c,) what is predicted at the value for each curve that was given, or NaN.
     """
 
     value: float
@@ -41,7 +41,7 @@ class FittedValue:
     edge: bool
     curves: int
     scan: tuple[tuple[float, ...], tuple[float, ...]] = field(repr=False, metadata={"json": False})
-    each: Array = field(repr=False, metadata={"json": False})
+    by_curve: Array = field(repr=False, metadata={"json": False})
 
     def within(self, good: float) -> tuple[float, float] | None:
         """The least and the largest value whose predicted gap is at most so much; None if none."""
@@ -71,12 +71,14 @@ def fit_curves(
     from scipy.interpolate import PchipInterpolator
 
     used = _comparable(left, right)
-    whole = np.flatnonzero(used.any(axis=(1, 2)))
-    if len(levels) < _LEAST or not len(whole):
+    complete = np.flatnonzero(used.any(axis=(1, 2)))
+    if len(levels) < _LEAST or not len(complete):
         return None
-    chosen = whole[np.linspace(0, len(whole) - 1, min(len(whole), MOST_CURVES)).astype(int)]
+    chosen = complete[
+        np.linspace(0, len(complete) - 1, min(len(complete), MOST_CURVES)).astype(int)
+    ]
     used = used[chosen]
-    left, right = (np.where(used[:, None], each[chosen], 0.0) for each in (left, right))
+    left, right = (np.where(used[:, None], side[chosen], 0.0) for side in (left, right))
     difference = PchipInterpolator(levels, right - left, axis=1)
 
     def gaps(values: Array) -> Array:
@@ -88,8 +90,8 @@ def fit_curves(
     table = gaps(scan)
     centre = table.mean(axis=1)
     value = _refined(lambda x: float(gaps(np.array([x])).mean()), scan, centre)
-    each = np.full(len(seeds), np.nan)
-    each[chosen] = gaps(np.array([value]))[0]
+    by_curve = np.full(len(seeds), np.nan)
+    by_curve[chosen] = gaps(np.array([value]))[0]
     own_seeds = np.array(seeds)[chosen]
     by_seed = [table[:, own_seeds == seed].mean(axis=1) for seed in np.unique(own_seeds)]
     for what, columns in (("seeds", np.array(by_seed).T), ("curves", table)):
@@ -105,12 +107,12 @@ def fit_curves(
         value=value,
         error=error,
         of=of,
-        gap=float(np.nanmean(each)),
+        gap=float(np.nanmean(by_curve)),
         bounds=(low, high),
         edge=not low + _EDGE * (high - low) < value < high - _EDGE * (high - low),
         curves=len(chosen),
         scan=(tuple(scan.tolist()), tuple(centre.tolist())),
-        each=each,
+        by_curve=by_curve,
     )
 
 
@@ -123,7 +125,7 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
         values: (n,) of the parameter.
         gaps: (n,) at these settings; NaN where there is none.
     """
-    each = np.full(len(gaps), np.nan)
+    by_curve = np.full(len(gaps), np.nan)
     known = np.isfinite(gaps)
     values, gaps = values[known], gaps[known]
     if len(values) < 8 or not np.ptp(values):
@@ -142,7 +144,7 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
     again = [scan[int(np.argmin(curve(rows)))] for rows in drawn_again(len(values))]
     predicted = np.sqrt(np.maximum(squares, 0.0))
     value = float(scan[place])
-    each[known] = predicted[place]
+    by_curve[known] = predicted[place]
     return FittedValue(
         value=value,
         error=float(np.std(again)),
@@ -152,7 +154,7 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
         edge=place in (0, _SCAN - 1),
         curves=len(values),
         scan=(tuple(scan.tolist()), tuple(predicted.tolist())),
-        each=each,
+        by_curve=by_curve,
     )
 
 
@@ -162,8 +164,8 @@ def _comparable(left: Array, right: Array) -> Flags:
     A short run keeps fewer moments. Where the runs of a curve have not the same number of them,
     only the last one is the same.
     """
-    there = [np.isfinite(each) for each in (left, right)]
-    counts = np.concatenate([each.any(axis=3).sum(axis=2) for each in there], axis=1)
+    there = [np.isfinite(side) for side in (left, right)]
+    counts = np.concatenate([side.any(axis=3).sum(axis=2) for side in there], axis=1)
     used = np.array(np.concatenate(there, axis=1).all(axis=1), dtype=bool)
     used[np.ptp(counts, axis=1) > 0, :-1] = False
     return used
@@ -175,9 +177,9 @@ def _refined(gap: Any, scan: Array, centre: Array) -> float:
 
     place = int(np.argmin(centre))
     low, high = scan[max(0, place - 1)], scan[min(len(scan) - 1, place + 1)]
-    found = minimize_scalar(gap, bounds=(low, high), method="bounded",
+    minimum = minimize_scalar(gap, bounds=(low, high), method="bounded",
                             options={"xatol": 1e-6 * (scan[-1] - scan[0])})  # fmt: skip
-    return float(found.x) if found.fun < centre[place] else float(scan[place])
+    return float(minimum.x) if minimum.fun < centre[place] else float(scan[place])
 
 
 def _best_again(scan: Array, table: Array) -> Array:

@@ -113,7 +113,7 @@ def agreement_of(
     """
     quantity, gap = RUN_QUANTITIES[name], data.gaps[name]
     tolerances = _tolerances(data, quantity.kind, facts, given)
-    tolerance = np.array([each.value for each in tolerances])
+    tolerance = np.array([tolerance.value for tolerance in tolerances])
     most_tolerant = tolerances[int(np.nanargmax(tolerance))]
     centre, most = median(gap), largest_known(gap)
     there, within = np.isfinite(gap), gap <= tolerance[:, None]
@@ -156,8 +156,8 @@ def _tolerances(
 
 def only_rounding(settings: Sequence[SettingGap]) -> bool:
     """Whether every gap is inside the chaos floor."""
-    there = [each for each in settings if each.median is not None]
-    return bool(there) and all(each.inside_floor for each in there)
+    there = [setting for setting in settings if setting.median is not None]
+    return bool(there) and all(setting.inside_floor for setting in there)
 
 
 def gap_map(

@@ -77,7 +77,7 @@ def sensitivity(data: SweepData, figures: Array) -> Sensitivity | None:
 
 def ranked(design: Design, shares: Sensitivity | None) -> list[Vary]:
     """What is varied, the most sensitive first."""
-    order = [each.label for each in shares.indices] if shares else []
+    order = [index.label for index in shares.indices] if shares else []
     return sorted(
         design.factors, key=lambda v: order.index(v.label) if v.label in order else len(order)
     )
@@ -131,7 +131,7 @@ def _factorial(design: Design, figures: Array) -> Sensitivity | None:
     seeds, error, drawn = cube.shape[-1], "", []
     if seeds >= _LEAST_SEEDS:
         again = (median(cube[..., chosen]) for chosen in drawn_again(seeds))
-        drawn = [variance_shares(each) for each in again if np.ptp(each) > 0]
+        drawn = [variance_shares(medians) for medians in again if np.ptp(medians) > 0]
         error = f"the {seeds} seeds drawn again"
     labels = [vary.label for vary in design.factors]
     shares = variance_shares(centre)

@@ -165,7 +165,7 @@ class _Case:
     ) -> None:
         self._data, self._vary, self._quantity, self._both = data, vary, quantity, varied == "both"
         self._own, self._runner, self._progress, self.cells = own, runner, progress, 0
-        self._place = [each.label for each in data.design.factors].index(vary.label)
+        self._place = [factor.label for factor in data.design.factors].index(vary.label)
         self._levels = np.sort(
             np.array(vary.values or np.linspace(*(vary.bounds or (0, 0)), 9), float)
         )
@@ -221,7 +221,9 @@ class _Case:
     def _run(self, groups: Sequence[tuple[int, Sequence[Setting]]], start: float) -> list[Runs]:
         """Runs of each group of settings on a side; all at once, as processes start slowly."""
         assert self._runner is not None
-        asked = [(self._data.sides[side], *each) for side, settings in groups for each in settings]
+        asked = [
+            (self._data.sides[side], *setting) for side, settings in groups for setting in settings
+        ]
         self.cells += len(asked)
         runs = self._runner.run(asked, progress=lambda f: self._progress(start + f / 4))
         return np.split(runs, np.cumsum([len(settings) for _, settings in groups])[:-1])
@@ -245,7 +247,7 @@ class _Case:
         values = [fit.value, self._own] if self._vary.kind == "option" else [fit.value]
         gap, *before = self._gaps([self._settings[k] for k in picked], values, 0.5)
         own = _mean(before[0]) if before else None
-        return own, _mean(gap), float(np.mean(fit.each[picked])), int(np.isfinite(gap).sum())
+        return own, _mean(gap), float(np.mean(fit.by_curve[picked])), int(np.isfinite(gap).sum())
 
     def refined(self, fit: FittedValue, measured: float) -> tuple[list[float], list[float], float]:
         """Run both sides between the neighbours of the value in the design.
@@ -267,7 +269,7 @@ class _Case:
 
     def _picked(self, fit: FittedValue) -> list[int]:
         """The settings that are run at a value."""
-        known = np.flatnonzero(np.isfinite(fit.each))
+        known = np.flatnonzero(np.isfinite(fit.by_curve))
         return known[evenly(len(known), CHECKED)].tolist()
 
     def own_gap(self) -> float | None:

@@ -64,7 +64,7 @@ def check_folder(folder: Path) -> None:
         OSError: It cannot be made.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    others = [each.name for each in folder.iterdir() if not each.name.startswith(".")]
+    others = [file.name for file in folder.iterdir() if not file.name.startswith(".")]
     if others and MANIFEST not in others:
         raise BadInputError(
             f"{folder} holds {others[0]} and no {MANIFEST}: put it back, or name another folder"
@@ -100,8 +100,8 @@ def design_of(manifest: Mapping[str, Any]) -> Design:
     """The design that a manifest tells, with the points of its dataset."""
     design = manifest["design"]
     factors = [
-        Vary(**{name: _tuple(each[name]) for name in Vary.__dataclass_fields__})
-        for each in manifest["factors"]
+        Vary(**{name: _tuple(factor[name]) for name in Vary.__dataclass_fields__})
+        for factor in manifest["factors"]
     ]
     return Design(tuple(factors), design["samples"], design["indices"], design["design_seed"])
 

@@ -82,7 +82,7 @@ class Sweep:
             flag = f"--{option.name.replace('_', '-').replace('backends', 'backend')}"
             value = getattr(self, option.name)
             values = value if option.name in ("vary", "backends") else [value]
-            given += [(flag, each, option.default) for each in values if value != option.default]
+            given += [(flag, word, option.default) for word in values if value != option.default]
         return command(["statemachine", "sweep", self.what], *given, ("--out", out, None))
 
 
