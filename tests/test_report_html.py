@@ -41,9 +41,9 @@ from statemachine.report.commanded import commanded
 from statemachine.report.compare import page as compared
 from statemachine.report.events import events_of
 from statemachine.report.finding import headline
-from statemachine.report.html import SideDrawing, check_target, report, write_report
+from statemachine.report.html import Look, check_target, report, write_report
 from statemachine.report.html.geometry import bones_of, mesh_as_data, mesh_of
-from statemachine.report.html.timeline import frames_of
+from statemachine.report.html.scene import moments_of, rows_at
 from statemachine.report.markdown import markdown
 from statemachine.report.over_time import CHARTS_SHOWN, charts_of
 from statemachine.report.why import answer, causes
@@ -54,7 +54,7 @@ from .browser import Tab, browser
 from .conftest import ROOT, Cli, assert_in, one_line, refused
 
 LIMIT = 2_000_000  # bytes
-Made = tuple[Comparison, Trace, Trace, SideDrawing]
+Made = tuple[Comparison, Trace, Trace, Look]
 Seen = Callable[..., Any]
 
 
@@ -62,8 +62,8 @@ def of(one: Trace, two: Trace) -> Made:
     return of_look(one, two, look_of(one))
 
 
-def look_of(trace: Trace) -> SideDrawing:
-    return SideDrawing(drawing_of(sm.load(trace.header.provenance.model_file)))
+def look_of(trace: Trace) -> Look:
+    return drawing_of(sm.load(trace.header.provenance.model_file))
 
 
 def page_of(made: Made, **more: Any) -> str:
@@ -218,7 +218,7 @@ def test_names_that_are_markup_do_nothing(hold: Made, seen: Seen) -> None:
         assert "onerror" in tab.locator("main").inner_text()
 
 
-def of_look(one: Trace, two: Trace, look: SideDrawing) -> Made:
+def of_look(one: Trace, two: Trace, look: Look) -> Made:
     return compare(one, two), one, two, look
 
 
@@ -244,8 +244,8 @@ def test_a_long_run_is_small_too_and_keeps_the_moments_that_count() -> None:
     assert len(page_of(made).encode()) <= LIMIT
     at = made[0].agreements[2].at
     assert at == pytest.approx(1234 * 0.005)
-    assert np.abs(frames_of(one, two, (at,)).time - at).min() < 1e-9
-    assert len(frames_of(one, two)) < len(one)
+    assert np.abs(moments_of(one, two, (at,))[0] - at).min() < 1e-9
+    assert len(moments_of(one, two)[0]) < len(one)
 
 
 @pytest.mark.slow
@@ -897,9 +897,10 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(seen: Seen) -> N
     one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
     two = shipped("hold", "pybullet", "engine")
     assert one.header.timestep != two.header.timestep
-    frames = frames_of(one, two)
-    assert len(frames) > 4 * compare(one, two).moments
-    assert frames.between
+    times, _ = moments_of(one, two)
+    assert len(times) > 4 * compare(one, two).moments
+    assert not rows_at(one, times)[1].any()
+    assert rows_at(two, times)[1].any()
     with seen(of(one, two)) as tab:
         go(tab, 7)
         assert tab.locator("#now").inner_text() == "0.035 s (figures of 0.025 s)"
@@ -910,7 +911,7 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(seen: Seen) -> N
 
 @pytest.mark.slow
 def test_without_the_model_there_are_sticks(hold: Made, seen: Seen) -> None:
-    none = SideDrawing(None, "there is no so101/scene.xml here")
+    none = "there is no so101/scene.xml here"
     with seen(hold, looks=(none, none)) as tab:
         assert "there is no so101/scene.xml here" in tab.locator("#picture").inner_text()
         tab.locator("#view-all").click()
@@ -992,7 +993,7 @@ def test_bones_reach_from_body_to_body(hold: Made) -> None:
     chain = [body for body, parent in enumerate(one.header.body_parentid) if body and parent]
     assert len(drawing.parts) == len(chain) + 2  # a knob at the end of each branch
     for body, part in zip(chain, drawing.parts, strict=False):
-        end = part.vertices[-1]
+        end = part.vertices[np.linalg.norm(part.vertices, axis=1).argmax()]
         apart = one["xpos"][0, body] - one["xpos"][0, one.header.body_parentid[body]]
         if not apart.any():
             continue  # the camera's mount has its origin where the gripper has

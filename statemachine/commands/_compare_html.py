@@ -137,9 +137,9 @@ def _looks(request: Any, traces: tuple[Any, Any]) -> tuple[Any, Any]:
 
 
 def _look(request: Any, trace: Any, place: int) -> Any:
+    """What a side is drawn as, or why that cannot be had."""
     from ..backends import load
     from ..drawing import drawing_of
-    from ..report.html import SideDrawing
     from ..runs.provenance import provenance
 
     header = trace.header
@@ -148,14 +148,14 @@ def _look(request: Any, trace: Any, place: int) -> Any:
     try:
         model = load(wanted, menagerie=request.menagerie)
         if model.nbody != len(header.bodies):
-            return SideDrawing(None, f"{file} as it is here has other bodies")
+            return f"{file} as it is here has other bodies"
         if provenance(model).model_sha256 != header.provenance.model_sha256:
-            return SideDrawing(None, f"{file} as it is here has another digest")
-        return SideDrawing(drawing_of(model))
+            return f"{file} as it is here has another digest"
+        return drawing_of(model)
     except MissingEngineError as error:
-        return SideDrawing(None, str(error))
+        return str(error)
     except StateMachineError:
-        return SideDrawing(None, f"there is no {file} here")
+        return f"there is no {file} here"
 
 
 def _typed(options: argparse.Namespace, request: Any) -> str:

@@ -35,7 +35,6 @@ class Part:
     """A visual geom.
 
     Attributes:
-        name: Of the geom or, if it has none, of its mesh; may be empty.
         kind: MuJoCo's word: plane, hfield, sphere, capsule, ellipsoid, cylinder, box, mesh.
         geom: Id of the geom.
         body: Id of the body that carries it; body 0 is the world.
@@ -45,7 +44,6 @@ class Part:
         endless: Whether it is a plane without an end, of which a piece is drawn.
     """
 
-    name: str
     kind: str
     geom: int
     body: int
@@ -53,6 +51,11 @@ class Part:
     faces: NDArray[np.int32]
     rgba: tuple[float, float, float, float]
     endless: bool = False
+
+    @property
+    def is_ground(self) -> bool:
+        """Whether it is an endless level plane of the world."""
+        return self.endless and self.body == 0 and bool(np.ptp(self.vertices[:, 2]) < 1e-6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +115,6 @@ def drawing_of(model: Model) -> Drawing:
         placed = _shapes.welded(shape.vertices @ turn.T + raw.geom_pos[geom], shape.faces)
         parts.append(
             Part(
-                name=raw.geom(geom).name or _mesh_name(raw, geom, kind),
                 kind="mesh" if kind == "sdf" else kind,
                 geom=geom,
                 body=int(raw.geom_bodyid[geom]),
@@ -156,11 +158,6 @@ def _shape(raw: Any, geom: int, kind: str) -> Surface | None:
             raw.mesh_face[face : face + int(raw.mesh_facenum[data])],
         )
     return None
-
-
-def _mesh_name(raw: Any, geom: int, kind: str) -> str:
-    data = int(raw.geom_dataid[geom])
-    return raw.mesh(data).name if kind in ("mesh", "sdf") and data >= 0 else ""
 
 
 def _colour(raw: Any, geom: int) -> tuple[float, float, float, float]:

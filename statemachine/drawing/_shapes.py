@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,8 +27,8 @@ class Surface:
         faces: (f, 3) int32, numbers of vertices.
     """
 
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.int32]
+    vertices: NDArray[Any]
+    faces: NDArray[Any]
 
     def __post_init__(self) -> None:
         for name, kind in (("vertices", np.float32), ("faces", np.int32)):
@@ -39,20 +40,19 @@ class Surface:
 def box(size: Sequence[float]) -> Surface:
     """A box; `size` are half of its edges."""
     faces = [triangle for a, b, c, d in _BOX for triangle in ((a, b, c), (a, c, d))]
-    return _shape(_CORNERS * np.asarray(size)[:3], faces)
+    return Surface(_CORNERS * np.asarray(size)[:3], np.array(faces))
 
 
 def rectangle(half_x: float, half_y: float) -> Surface:
     """A rectangle in the plane z = 0, seen from above."""
-    corners = [(-half_x, -half_y, 0), (half_x, -half_y, 0), (half_x, half_y, 0)]
-    return _shape([*corners, (-half_x, half_y, 0)], [(0, 1, 2), (0, 2, 3)])
+    return terrain(np.zeros((2, 2)), half_x, half_y)
 
 
 def ellipsoid(size: Sequence[float], around: int = AROUND) -> Surface:
     """An ellipsoid; `size` are its semi-axes. A sphere has three equal ones."""
     turn = np.linspace(0, np.pi, around // 2 + 1)
     unit = lathe(np.sin(turn), -np.cos(turn), around)
-    return _shape(unit.vertices * np.asarray(size)[:3], unit.faces)
+    return Surface(unit.vertices * np.asarray(size)[:3], unit.faces)
 
 
 def cylinder(radius: float, half: float, around: int = AROUND) -> Surface:
@@ -75,24 +75,15 @@ def lathe(radii: ArrayLike, heights: ArrayLike, around: int = AROUND) -> Surface
         heights: (n,) heights [m].
         around: Corners of a full turn.
     """
-    radius, height = np.asarray(radii)[1:-1], np.asarray(heights)
+    radius, height = np.array(radii, dtype=float), np.asarray(heights)
+    radius[[0, -1]] = 0  # exactly: each pole is one point
     angle = 2 * np.pi * np.arange(around) / around
     rings = np.empty((len(radius), around, 3))
     rings[..., 0] = radius[:, None] * np.cos(angle)
     rings[..., 1] = radius[:, None] * np.sin(angle)
-    rings[..., 2] = height[1:-1, None]
-    here = np.arange(around)
-    after = (here + 1) % around
-    faces = [np.stack([np.zeros_like(here), after + 1, here + 1], axis=1)]
-    for low in range(1, 1 + (len(radius) - 1) * around, around):
-        high = low + around
-        faces.append(np.stack([low + here, low + after, high + after], axis=1))
-        faces.append(np.stack([low + here, high + after, high + here], axis=1))
-    last = 1 + (len(radius) - 1) * around
-    top = np.full_like(here, last + around)
-    faces.append(np.stack([last + here, last + after, top], axis=1))
-    poles = np.array([(0, 0, height[0])]), np.array([(0, 0, height[-1])])
-    return _shape(np.concatenate([poles[0], rings.reshape(-1, 3), poles[1]]), np.concatenate(faces))
+    rings[..., 2] = height[:, None]
+    number = np.arange(len(radius) * around).reshape(-1, around)
+    return welded(rings, _triangles(np.column_stack([number, number[:, 0]])))
 
 
 def terrain(heights: ArrayLike, half_x: float, half_y: float) -> Surface:
@@ -106,11 +97,13 @@ def terrain(heights: ArrayLike, half_x: float, half_y: float) -> Surface:
     z = np.asarray(heights)
     rows, columns = z.shape
     x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
-    number = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (n.ravel() for n in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:],
-                                      number[1:, :-1]))  # fmt: skip
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return _shape(np.stack([x, y, z], axis=-1).reshape(-1, 3), faces)
+    return Surface(np.stack([x, y, z], axis=-1), _triangles(np.arange(z.size).reshape(z.shape)))
+
+
+def _triangles(number: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Two triangles for each square of a grid of numbered points (rows, columns)."""
+    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
+    return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
 
 def welded(vertices: ArrayLike, faces: ArrayLike) -> Surface:
@@ -127,7 +120,3 @@ def welded(vertices: ArrayLike, faces: ArrayLike) -> Surface:
     triangles = triangles[(a != b) & (b != c) & (c != a)]
     used, renumbered = np.unique(triangles, return_inverse=True)
     return Surface(unique[used], renumbered.reshape(-1, 3).astype(np.int32))
-
-
-def _shape(vertices: ArrayLike, faces: ArrayLike) -> Surface:
-    return Surface(np.asarray(vertices, np.float32), np.asarray(faces, np.int32))

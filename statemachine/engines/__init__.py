@@ -24,7 +24,7 @@ from ..errors import BadInputError, MissingEngineError, UnsupportedError
 from ..installed import raise_if_interrupted
 
 if TYPE_CHECKING:
-    from ..drawing.camera import Camera
+    from ..drawing.scene import Camera
     from ..drawing.shots import Drawer
     from ..interface import Array, Data, Model
     from .auditing import Driver

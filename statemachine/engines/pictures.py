@@ -25,8 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing.camera import Camera
-from ..drawing.motion import Motion
+from ..drawing.scene import Camera, Motion
 from ..drawing.shots import Pixels, compose, smaller
 from ..errors import EngineError, MissingEngineError, check_name
 from ..installed import DEFAULT, require
@@ -71,18 +70,17 @@ def renderer_here(name: str | None = None) -> Renderer:
         UnknownNameError: There is no such renderer.
         MissingEngineError: It, or every one, does not work here.
     """
-    known = renderers()
     if name is not None:
-        check_name("renderer", name, known)
+        check_name("renderer", name, renderers())
     require(DEFAULT)  # it reads the models, whoever draws them
+    if name is not None:
+        return Renderer(name, room(name).opengl())
     reasons: list[MissingEngineError] = []
-    for engine in known if name is None else (name,):
+    for engine in renderers():
         try:
             return Renderer(engine, room(engine).opengl())
         except MissingEngineError as error:
             reasons.append(error)
-    if name is not None:
-        raise reasons[0]
     because = "; ".join(map(str, reasons))
     raise MissingEngineError(
         f"nothing here can draw a film: {because}", engine=reasons[0].engine

@@ -9,8 +9,7 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from ..drawing.camera import Camera
-from ..drawing.motion import poses_through
+from ..drawing.scene import Camera, poses_through
 from ..engines.pictures import LivePictures, renderer_here
 from ..errors import ClosedDataError, check_name
 from ..interface import Array

@@ -24,11 +24,11 @@ _WIDE = 30.0  # times the least value: beyond, colours are logarithmic
 _WRITTEN, _LONG = 150, 60  # cells whose figures are written; letters that fit under a map
 _UP = 24  # letters that fit beside a map
 _DARK = 0.7  # of the scale: beyond, figures are white
-_POWERS = 8  # that the colours of a map name, at most
 _WRITTEN_OUT = range(-3, 4)  # powers of ten; others as 1e6
 _TITLE = 80  # letters of a line of it
 _LINES = ("-", "--", ":", "-.")
 _FLOOR = "#bdbdbd"
+_CENTRE: dict[str, Any] = {"ha": "center", "va": "center"}
 # A colour-blind-safe pair, pale and broad under dark and dashed: told apart in grey too.
 SIDES: tuple[dict[str, Any], ...] = (
     {"color": "#f0a830", "linewidth": 2.0, "linestyle": "-", "solid_capstyle": "butt"},
@@ -265,31 +265,27 @@ def _parted(x: Array, y: Array) -> tuple[Array, Array]:
 def _slots(axes: Any, picture: Slots) -> None:
     """Rows of numbered boxes, one above the other, coloured by owner."""
     owners = list(dict.fromkeys(owner for row in picture.rows.values() for owner, _, _ in row))
-    widest = max(stop for row in picture.rows.values() for _, _, stop in row)
     for level, (name, row) in enumerate(picture.rows.items()):
         y = -2.0 * level
-        axes.text(-0.3, y + 0.5, name, ha="right", va="center", family="monospace", color=INK)
+        axes.text(-0.3, y + 0.5, name, ha="right", va="center", family="monospace")
         for owner, start, stop in row:
+            slots = range(start, stop)
             colour = _COLOURS[owners.index(owner) % len(_COLOURS)]
-            for slot in range(start, stop):
-                axes.add_patch(_box(slot, y, 1, 1, colour))
-                axes.text(slot + 0.5, y + 0.5, str(slot), ha="center", va="center", color=INK)
+            boxes = axes.bar(slots, 1, 1, y, align="edge", **_pale(colour))
+            axes.bar_label(boxes, slots, label_type="center")
             if level == 0:
-                alone = stop == start + 1  # a name does not fit over one slot
-                axes.text(
-                    (start + stop) / 2,
-                    y + 1.15,
-                    owner,
-                    ha="left" if alone else "center",
-                    va="bottom",
-                    rotation=35 if alone else 0,
-                    fontsize="small",
-                    color=INK,
-                )
+                # A name does not fit over one slot.
+                slope = {"ha": "left", "rotation": 35} if len(slots) == 1 else {"ha": "center"}
+                axes.text((start + stop) / 2, y + 1.15, owner, fontsize="small", **slope)
+    widest = max(stop for row in picture.rows.values() for _, _, stop in row)
     axes.set_xlim(-1.5, widest + 0.5)
     axes.set_ylim(-2.0 * len(picture.rows) + 1.7, 3.2)
     axes.set_aspect("equal")
     axes.axis("off")
+
+
+def _pale(colour: str) -> dict[str, str]:
+    return {"facecolor": colour + "30", "edgecolor": colour}
 
 
 def _pipeline(axes: Any, picture: Pipeline) -> None:
@@ -297,26 +293,21 @@ def _pipeline(axes: Any, picture: Pipeline) -> None:
     deepest = max(len(content) for _, content in picture.stages)
     top = deepest * 0.32 + 0.9
     for k, (heading, content) in enumerate(picture.stages):
-        x = 3.2 * k
-        axes.add_patch(_box(x, 0, 2.6, top, _COLOURS[k % len(_COLOURS)]))
-        axes.text(x + 1.3, top - 0.35, heading, ha="center", va="center", weight="bold", color=INK)
+        x, colour = 3.2 * k, _COLOURS[k % len(_COLOURS)]
+        axes.bar(x, top, 2.6, align="edge", **_pale(colour))
+        axes.text(x + 1.3, top - 0.35, heading, ha="center", va="center", weight="bold")
         for line, text in enumerate(content):
             y = top - 0.85 - 0.32 * line
-            axes.text(x + 0.2, y, text, va="center", family="monospace", fontsize=8, color=INK)
+            axes.text(x + 0.2, y, text, va="center", family="monospace", fontsize=8)
         if k:
-            axes.annotate(
-                "", (x - 0.05, top / 2), (x - 0.55, top / 2),
-                arrowprops={"arrowstyle": "->", "color": INK},
-            )  # fmt: skip
+            arrow = {"arrowstyle": "->", "color": INK}
+            axes.annotate("", (x - 0.05, top / 2), (x - 0.55, top / 2), arrowprops=arrow)
     for k, (name, first, last) in enumerate(picture.spans):
         y, left, right = -0.5 - 0.6 * k, 3.2 * first, 3.2 * last + 2.6
-        axes.annotate(
-            "", (right, y), (left, y), arrowprops={"arrowstyle": "|-|, widthA=.3, widthB=.3"}
-        )
-        axes.text(
-            (left + right) / 2, y, name, ha="center", va="center", family="monospace",
-            bbox={"facecolor": _PAPER, "edgecolor": "none", "pad": 2}, color=INK,
-        )  # fmt: skip
+        ends = {"arrowstyle": "|-|, widthA=.3, widthB=.3"}
+        axes.annotate("", (right, y), (left, y), arrowprops=ends)
+        paper = {"facecolor": _PAPER, "edgecolor": "none", "pad": 2}
+        axes.text((left + right) / 2, y, name, family="monospace", bbox=paper, **_CENTRE)
     axes.set_xlim(-0.2, 3.2 * len(picture.stages) - 0.4)
     axes.set_ylim(-0.6 * len(picture.spans) - 0.5, top + 0.1)
     axes.axis("off")
@@ -327,9 +318,11 @@ def _heat_map(axes: Any, picture: HeatMap) -> None:
     import matplotlib
     from matplotlib.colors import ListedColormap, LogNorm, Normalize
     from matplotlib.patches import Rectangle
+    from matplotlib.ticker import LogLocator
 
     values = np.array([[np.nan if v is None else v for v in row] for row in picture.values])
-    shown = np.ma.masked_where(~np.isfinite(values) | np.array(picture.hatched, bool), values)
+    hatched = np.array(picture.hatched, bool)
+    shown = np.ma.masked_where(~np.isfinite(values) | hatched, values)
     low, high = (float(shown.min()), float(shown.max())) if shown.count() else (0.0, 1.0)
     wide = low > 0 and high > _WIDE * low
     norm = (LogNorm if wide else Normalize)(low if wide else 0.0, high or 1.0)
@@ -337,38 +330,30 @@ def _heat_map(axes: Any, picture: HeatMap) -> None:
     rows, columns = (np.arange(n + 1) - 0.5 for n in values.shape)
     cells = axes.pcolormesh(columns, rows, shown, norm=norm, cmap=pale, edgecolors="face")
     axes.set_facecolor(_BELOW)
-    for r, c in np.ndindex(*values.shape):
-        value, corner = values[r, c], (c - 0.5, r - 0.5)
-        centre: dict[str, Any] = {"ha": "center", "va": "center"}
+    for (r, c), value in np.ndenumerate(values):
         if not np.isfinite(value):
-            axes.text(c, r, "no run", fontsize=6, color=INK, **centre)
+            axes.text(c, r, "no run", fontsize=6, **_CENTRE)
             continue
-        paper: dict[str, Any] = {"fill": False}
-        if picture.hatched[r][c]:
-            paper = {"facecolor": _PAPER, "hatch": "////"}
-        axes.add_patch(Rectangle(corner, 1, 1, edgecolor="#999999", linewidth=0.3, **paper))
+        look: dict[str, Any] = {"edgecolor": "#999999", "linewidth": 0.3, "fill": False}
+        if hatched[r, c]:
+            look |= {"fill": True, "facecolor": _PAPER, "hatch": "////"}
+        axes.add_patch(Rectangle((c - 0.5, r - 0.5), 1, 1, **look))
         if picture.framed[r][c]:
             inner = c - 0.46, r - 0.46
             axes.add_patch(Rectangle(inner, 0.92, 0.92, fill=False, edgecolor=_COLOURS[2], lw=1.6))
         if values.size <= _WRITTEN:
-            dark = not picture.hatched[r][c] and norm(value) > _DARK
-            colour = _PAPER if dark else INK
-            axes.text(c, r, f"{value:.3g}", fontsize=7, color=colour, **centre)
-    axes.set_xticks(range(len(picture.columns)), picture.columns, fontsize=8,
-                    rotation=45 if len("".join(picture.columns)) > _LONG else 0)  # fmt: skip
+            colour = _PAPER if not hatched[r, c] and norm(value) > _DARK else INK
+            axes.text(c, r, f"{value:.3g}", fontsize=7, color=colour, **_CENTRE)
+    slope = 45 if len("".join(picture.columns)) > _LONG else 0
+    axes.set_xticks(range(len(picture.columns)), picture.columns, fontsize=8, rotation=slope)
     axes.set_yticks(range(len(picture.rows)), picture.rows, fontsize=8)
     axes.set_xlabel(picture.across)
     axes.set_ylabel(textwrap.fill(picture.up, _UP))
+    steps = LogLocator(subs=(1, 2, 5) if high < 1e4 * low else (1,)) if wide else None
     # Beside its map, whatever room the legends of other panels take.
-    bar = axes.figure.colorbar(cells, cax=axes.inset_axes((1.02, 0.0, 0.02, 1.0)))
-    if wide:
-        every = 1 + int(np.log10(high / low)) // _POWERS
-        mantissas = (1, 2, 5) if high < 1e4 * low else (1,)
-        steps = [m * 10.0**e for e in range(-15, 16, every) for m in mantissas]
-        bar.set_ticks([step for step in steps if low <= step <= high], minor=False)
-        bar.ax.minorticks_off()
-    bar.ax.yaxis.set_major_formatter(lambda tick, _place: f"{tick:g}")
-    bar.set_label(picture.unit)
+    beside = axes.inset_axes((1.02, 0.0, 0.02, 1.0))
+    bar = axes.figure.colorbar(cells, beside, ticks=steps, format="{x:g}", label=picture.unit)
+    bar.minorticks_off()
 
 
 def _bars(axes: Any, picture: Bars) -> None:
@@ -387,12 +372,6 @@ def _bars(axes: Any, picture: Bars) -> None:
     axes.grid(alpha=0.3, axis="x")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
-
-
-def _box(x: float, y: float, width: float, height: float, colour: str) -> Any:
-    from matplotlib.patches import Rectangle
-
-    return Rectangle((x, y), width, height, facecolor=colour + "30", edgecolor=colour)
 
 
 _DRAW = {

@@ -18,8 +18,7 @@ import numpy as np
 
 from ..compare import Comparison, labels_of, series
 from ..drawing import drawing_of
-from ..drawing.camera import Camera
-from ..drawing.motion import Motion, camera_for, poses_through
+from ..drawing.scene import Camera, Motion, camera_for, poses_through
 from ..drawing.shots import Pixels
 from ..engines.pictures import Renderer, drawn
 from ..errors import BadInputError, EngineError, TraceError

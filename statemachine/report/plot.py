@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..compare import ChaosFloor, Comparison, default_tip, series
-from ..interface import JointType
-from ..measures import COUNT
+from ..interface import Array, JointType
+from ..measures import COUNT, distances
 from ..measures.text import few, milliseconds, reading, short_time
 from ..page import Traces
-from ..runs import Header, Trace
+from ..runs import Trace
 from ..runs.whole import replace_bytes
 from . import template
 from .figures import SETTINGS, SIDES, check_suffix, draw_picture, saved
@@ -44,11 +45,8 @@ _PAIRS_SHOWN = 8
 COMMAND = "the command"
 
 
-class TouchSpans(NamedTuple):
-    """When two bodies touch: spans of time, (from, to) [s], on each side."""
-
-    name: str
-    spans: Sequence[Sequence[Sequence[float]]]
+# Of each side: from when to when it lasts [s].
+Spans = Sequence[Sequence[Sequence[float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +58,7 @@ class Plot:
         lines: What made it, in short lines.
         labels: Names of the sides, in the order of the styles.
         rows: Charts, from top to bottom; one in a row is wide.
-        touches: In rows of one panel at the bottom.
+        touches: When two bodies touch, by their names, in rows of one panel at the bottom.
         seconds: End of the axis of time [s].
         part: When they part [s], or None.
         notes: What the reader must know, below.
@@ -70,7 +68,7 @@ class Plot:
     lines: Sequence[str]
     labels: Sequence[str]
     rows: Sequence[Sequence[Traces]]
-    touches: Sequence[TouchSpans]
+    touches: Mapping[str, Spans]
     seconds: float
     part: float | None
     notes: Sequence[str]
@@ -107,33 +105,37 @@ def of_comparison(
 def of_trace(trace: Trace) -> Plot:
     """The figure of one trace: fingertip, joints and what they were told, energy, touches."""
     header, time = trace.header, trace.time - trace.time[0]
-    charts = []
+    charts: list[Traces] = []
+
+    def add(title: str, values: Array, command: Array | None = None, least: float = 0.0) -> None:
+        curves = {header.label: (time, values)}
+        if command is not None:
+            curves[COMMAND] = (time, command)
+        charts.append(Traces(title, "", "", curves, sides=True, least=least))
+
     site = default_tip(header)
     if site and "site_xpos" in trace:
         where = trace.site(site)[0]
-        away = 1000 * np.linalg.norm(where - where[0], axis=1)
-        curves = {header.label: (time, away)}
-        charts.append(Traces(f"{site}, from its start [mm]", "", "", curves, sides=True))
-    told = {joint: k for k, joint in enumerate(header.actuator_jntid) if joint >= 0}
+        add(f"{site}, from its start [mm]", 1000 * distances(where, where[0]))
+    servos = {joint: k for k, joint in enumerate(header.actuator_jntid) if joint >= 0}
     kinds = JointType.HINGE, JointType.SLIDE
     joints = [k for k, kind in enumerate(header.jnt_type) if kind in kinds]
     for joint in joints[:CHARTS_SHOWN]:
         hinge = header.jnt_type[joint] == JointType.HINGE
         scale, unit = reading("rad" if hinge else "m")
-        curves = {header.label: (time, scale * trace.qpos[:, header.jnt_qposadr[joint]])}
-        if joint in told:
-            curves[COMMAND] = (time, scale * trace.ctrl[:, told[joint]])
-        title = f"{header.joints[joint] or f'joint {joint}'} [{unit.strip()}]"
-        # What the robot itself would not notice is not blown up to the height of a chart.
-        least = 20 * scale * COUNT if hinge else 0.0
-        charts.append(Traces(title, "", "", curves, sides=True, least=least))
+        add(
+            f"{header.joints[joint] or f'joint {joint}'} [{unit.strip()}]",
+            scale * trace.qpos[:, header.jnt_qposadr[joint]],
+            scale * trace.ctrl[:, servos[joint]] if joint in servos else None,
+            # What the robot itself would not notice is not blown up to the height of a chart.
+            20 * scale * COUNT if hinge else 0.0,
+        )
     if "energy" in trace and np.isfinite(trace["energy"]).all():
-        energy = {header.label: (time, trace["energy"].sum(axis=1))}
-        charts.append(Traces("energy [J]", "", "", energy, sides=True))
+        add("energy [J]", trace["energy"].sum(axis=1))
     return Plot(
         header.experiment,
         _origin(trace),
-        [header.label, COMMAND] if told else [header.label],
+        [header.label, COMMAND] if servos else [header.label],
         [charts[k : k + 2] for k in range(0, len(charts), 2)],
         _touches([trace], float(time[-1])),
         float(time[-1]),
@@ -148,37 +150,43 @@ def _notes(**slots: object) -> list[str]:
     return template.texts("plot", **(none | slots))
 
 
-def _touches(traces: Sequence[Trace], until: float) -> list[TouchSpans]:
+def _touches(traces: Sequence[Trace], until: float) -> dict[str, Spans]:
     """Spans of each pair of bodies; those that touch first come first."""
     touching = [trace.touches() for trace in traces]
-    rows = []
-    for pair in dict.fromkeys(name for touch in touching for name in touch):
-        sides = [
+    pairs: dict[str, Spans] = {
+        pair: [
             spans(touch[pair], trace.time - trace.time[0], trace.header.timestep, until)
             if pair in touch
             else []
             for touch, trace in zip(touching, traces, strict=True)
         ]
-        if any(sides):
-            rows.append(TouchSpans(pair, sides))
-    rows.sort(key=lambda touch: min(span[0] for side in touch.spans for span in side))
-    return rows[:_PAIRS_SHOWN]
+        for pair in dict.fromkeys(itertools.chain(*touching))
+    }
+    first = {
+        pair: min(start for side in sides for start, _ in side)
+        for pair, sides in pairs.items()
+        if any(sides)
+    }
+    return {pair: pairs[pair] for pair in sorted(first, key=first.__getitem__)[:_PAIRS_SHOWN]}
 
 
 def _origin(*traces: Trace) -> list[str]:
     """The model, the steps and the version that computed it."""
-    headers: list[Header] = [trace.header for trace in traces]
-    models = {h.provenance.model_file: h.provenance.model_sha256[:8] for h in headers}
+    headers = [trace.header for trace in traces]
+    sources = [header.provenance for header in headers]
+    models = {source.model_file: source.model_sha256[:8] for source in sources}
     steps = dict.fromkeys(milliseconds(header.timestep) for header in headers)
-    seeds = dict.fromkeys(
-        f"seed {header.provenance.seed}" for header in headers if header.provenance.seed is not None
-    )
-    versions = dict.fromkeys(
-        f"statemachine {header.provenance.versions.get('statemachine', '')}" for header in headers
-    )
+    seeds = {f"seed {source.seed}": None for source in sources if source.seed is not None}
+    versions = dict.fromkeys(source.versions.get("statemachine", "") for source in sources)
     return [
         ", ".join(f"{name} ({digest})" for name, digest in models.items()),
-        ", ".join([f"step {' and '.join(steps)}", *seeds, *versions]),
+        ", ".join(
+            [
+                f"step {' and '.join(steps)}",
+                *seeds,
+                *(f"statemachine {version}" for version in versions),
+            ]
+        ),
     ]
 
 
@@ -243,13 +251,13 @@ def _draw_touches(axes: Any, plot: Plot) -> None:
     """Bars while two bodies touch: above of the first side, below, hatched, of the second."""
     axes.set_title("who touches when")
     least = plot.seconds / 300  # a touch of one step is seen too
-    for row, touch in enumerate(plot.touches):
-        for side, times in enumerate(touch.spans):
+    for row, (pair, sides) in enumerate(plot.touches.items()):
+        for side, times in enumerate(sides):
             colour, base = SIDES[side]["color"], row + (0.42, 0.7)[side]
             bars = [(begin, max(end - begin, least)) for begin, end in times]
             look = {"hatch": "////////", "facecolor": "white"} if side else {"facecolor": colour}
             axes.broken_barh(bars, (base, 0.26), edgecolor=colour, linewidth=0.4, **look)
-        axes.text(0.0, row + 0.38, touch.name, size=5.2)
+        axes.text(0.0, row + 0.38, pair, size=5.2)
     axes.set_ylim(len(plot.touches), 0)
     axes.set_yticks([])
     axes.spines[["top", "right"]].set_visible(False)

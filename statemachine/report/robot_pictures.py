@@ -9,8 +9,7 @@ import numpy as np
 
 from ..backends import load
 from ..drawing import drawing_of
-from ..drawing.camera import Camera, framed
-from ..drawing.motion import Motion, camera_for, poses_through
+from ..drawing.scene import Camera, Motion, camera_for, framed, poses_through
 from ..engines.pictures import drawn, renderer_here
 from ..errors import MissingEngineError
 from ..installed import require_extra

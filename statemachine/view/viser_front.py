@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing import Drawing, Part
-from ..drawing.camera import Camera
+from ..drawing.scene import Camera
 from ..measures.text import millimetres, position, short_time
 from .live import Command, Tempo
 from .session import FASTEST, SLOWEST, Session, Snapshot
@@ -105,7 +105,7 @@ class ViserFront:
 
     def _add_fixed(self, part: Part) -> None:
         name = f"/world/{part.geom}"
-        if not part.endless or np.ptp(part.vertices[:, 2]) > 1e-6:
+        if not part.is_ground:
             self._add_part(part, name, False)
             return
         cell = float(10.0 ** np.floor(np.log10(self._extent) - 0.5))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...backends import load
-from ...drawing.camera import Camera
+from ...drawing.scene import Camera
 from ...drawing.shots import GHOST, Shot
 from ...installed import require
 from ...interface import Array

@@ -11,6 +11,6 @@ is made here.
 from __future__ import annotations
 
 from .page import SUFFIXES, check_target, report, write_report
-from .scene import SideDrawing
+from .scene import Look
 
-__all__ = ["SUFFIXES", "SideDrawing", "check_target", "report", "write_report"]
+__all__ = ["SUFFIXES", "Look", "check_target", "report", "write_report"]

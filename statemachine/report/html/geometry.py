@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 
 from ...drawing import Drawing, Part, lathe
 from ...interface import Array
+from ...rotations import matrix_from_quat
 from ...runs import Trace
+
+_GREY = (0.6, 0.6, 0.6, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,13 +25,13 @@ class Mesh:
     Attributes:
         vertices: (v, 3) [m].
         faces: (f, 3) numbers of vertices.
-        parts: (body, first index, count of indices, colour) of each part.
+        parts: (body, first index, count of indices, red, green, blue) of each part.
         simplified: How many triangles there were before, if they were too many; else 0.
     """
 
     vertices: NDArray[np.float32]
     faces: NDArray[np.int64]
-    parts: tuple[tuple[int, int, int, tuple[float, float, float]], ...]
+    parts: Sequence[tuple[float, ...]]
     simplified: int
 
 
@@ -39,26 +42,23 @@ def mesh_of(drawing: Drawing, most: int = 24_000) -> Mesh:
     """
     parts = [part for part in drawing.parts if not part.endless]
     before = sum(len(part.faces) for part in parts)
-    shapes = [(part.vertices, part.faces.astype(np.int64)) for part in parts]
+    shapes: list[tuple[Any, Any]] = [(part.vertices, part.faces.astype(np.int64)) for part in parts]
     cell = max(drawing.extent, 1e-6) / 2000
     while sum(len(faces) for _, faces in shapes) > most:
         shapes = [_snapped(part, cell) for part in parts]
         cell *= 1.4
-    vertices: list[Any] = []
-    faces: list[Any] = []
+    vertices: list[Any] = [np.empty((0, 3))]
+    faces: list[Any] = [np.empty((0, 3))]
     placed, corner, index = [], 0, 0
     for part, (points, triangles) in zip(parts, shapes, strict=True):
-        if not len(triangles):
-            continue
         vertices.append(points)
         faces.append(triangles + corner)
-        placed.append((part.body, index, triangles.size, part.rgba[:3]))
+        placed.append((part.body, index, triangles.size, *(round(c, 3) for c in part.rgba[:3])))
         corner, index = corner + len(points), index + triangles.size
-    none = np.empty((0, 3))
     return Mesh(
-        np.concatenate([none, *vertices]).astype(np.float32),
-        np.concatenate([none, *faces]).astype(np.int64),
-        tuple(placed),
+        np.concatenate(vertices).astype(np.float32),
+        np.concatenate(faces).astype(np.int64),
+        placed,
         before if before > most else 0,
     )
 
@@ -70,12 +70,11 @@ def _snapped(part: Part, cell: float) -> tuple[Any, Any]:
     number = number.reshape(-1)
     means = np.zeros((len(count), 3))
     np.add.at(means, number, part.vertices)
-    means /= count[:, None]
     faces = number[part.faces]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    return means, faces[np.sort(first)]
+    return means / count[:, None], faces[np.sort(first)]
 
 
 def bones_of(trace: Trace) -> Drawing:
@@ -83,29 +82,18 @@ def bones_of(trace: Trace) -> Drawing:
 
     It is what the trace itself tells: where the bodies are in the first row.
     """
-    header = trace.header
-    pos, quat = trace["xpos"][0], trace["xquat"][0]
-    moving = [k for k, parent in enumerate(header.body_parentid) if k and parent]
-    spans = [float(np.linalg.norm(pos[k] - pos[header.body_parentid[k]])) for k in moving]
-    size = max([*spans, 0.05])
-    parts = []
-    grey = (0.6, 0.6, 0.6, 1.0)
-
-    def add(body: int, end: Any) -> None:
-        vertices, faces = _bone(np.asarray(end, dtype=np.float64), 0.12 * size)
-        parts.append(Part(header.bodies[body], "bone", -1, body, vertices, faces, grey))
-
-    for body in moving:
-        parent = header.body_parentid[body]
-        add(parent, _rotation(quat[parent]).T @ (pos[body] - pos[parent]))
-    carried = {header.body_parentid[body] for body in moving}
-    for body in range(1, len(header.bodies)):
-        if body not in carried:  # the last of a chain, or one that is alone
-            add(body, (0.0, 0.0, 0.12 * size))
-    centre = pos[1:].mean(axis=0) if len(pos) > 1 else np.zeros(3)
-    x, y, z = centre.tolist()
+    header, pos = trace.header, trace["xpos"][0]
+    turn = matrix_from_quat(unit_quat(trace["xquat"][0]))
+    moving = [(k, parent) for k, parent in enumerate(header.body_parentid) if k and parent]
+    bones = [(parent, turn[parent].T @ (pos[body] - pos[parent])) for body, parent in moving]
+    size = max([0.05, *(float(np.linalg.norm(end)) for _, end in bones)])
+    # The last of a chain, or one that is alone, has a knob.
+    knobs = sorted(set(range(1, len(header.bodies))) - {parent for _, parent in moving})
+    bones += [(body, np.array([0.0, 0.0, 0.12 * size])) for body in knobs]
+    parts = tuple(Part("bone", -1, body, *_bone(end, 0.12 * size), _GREY) for body, end in bones)
+    x, y, z = pos[1:].mean(axis=0).tolist() if len(pos) > 1 else (0.0, 0.0, 0.0)
     extent = max(size, float(np.ptp(pos, axis=0).max()))
-    return Drawing(tuple(parts), (x, y, z), extent, azimuth=-90.0, elevation=-15.0)
+    return Drawing(parts, (x, y, z), extent, azimuth=-90.0, elevation=-15.0)
 
 
 def _bone(end: Array, thick: float) -> tuple[Any, Any]:
@@ -122,11 +110,11 @@ def _bone(end: Array, thick: float) -> tuple[Any, Any]:
     return turned.astype(np.float32), shape.faces
 
 
-def _rotation(quat: Array) -> Array:
-    from ...rotations import matrix_from_quat
-
-    length = float(np.linalg.norm(quat))
-    return matrix_from_quat(quat / length if length > 0 else np.array([1.0, 0, 0, 0]))
+def unit_quat(quat: Array) -> Array:
+    """Quaternions (..., 4) of unit length; of what is no rotation, the one that turns nothing."""
+    quat = np.nan_to_num(quat)
+    length = np.linalg.norm(quat, axis=-1, keepdims=True)
+    return np.where(length > 0, quat / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])
 
 
 def packed(array: Any, kind: str) -> str:
@@ -142,18 +130,14 @@ def quantised(values: Any, low: Any, span: Any) -> Any:
 
 def mesh_as_data(mesh: Mesh) -> dict[str, Any]:
     """A mesh as JSON."""
-    low = mesh.vertices.min(axis=0) if len(mesh.vertices) else np.zeros(3)
-    span = np.maximum(np.ptp(mesh.vertices, axis=0) if len(mesh.vertices) else 1.0, 1e-9)
-    wide = len(mesh.vertices) > 65535
+    points = mesh.vertices.astype(np.float64) if len(mesh.vertices) else np.zeros((1, 3))
+    low, span = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-9)
+    wide = len(points) > 65535
     return {
-        "position": packed(quantised(mesh.vertices, low, span), "u2"),
+        "position": packed(quantised(points, low, span), "u2"),
         "index": packed(mesh.faces.reshape(-1), "u4" if wide else "u2"),
         "wide": wide,
-        "low": _floats(low),
-        "span": _floats(np.broadcast_to(span, 3)),
-        "parts": [[b, first, n, *(round(c, 3) for c in rgb)] for b, first, n, rgb in mesh.parts],
+        "low": low.tolist(),
+        "span": span.tolist(),
+        "parts": mesh.parts,
     }
-
-
-def _floats(values: Sequence[float] | Any) -> list[float]:
-    return [float(f"{float(value):.9g}") for value in values]

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping
 from importlib import resources
 from typing import Any
 
-_VOID = frozenset({"br", "hr", "img", "input", "meta", "col", "path", "line", "rect", "circle"})
-# What would end a script element, or a line of JavaScript, within a JSON text.
-_IN_SCRIPT = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028"}
-_IN_SCRIPT["\u2029"] = "\\u2029"
+_VOID = ("br", "hr", "img", "input", "meta", "col")
+_SPOKEN = ("aria_label", "aria_valuetext", "title")
+# What turns the text around, and halves of pairs of characters.
+_TURNS = re.compile("[\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 class Html(str):
@@ -61,15 +61,11 @@ def tag(name: str, *content: object, **attributes: object) -> Html:
             text = with_minus(str(value)) if key in _SPOKEN else str(value)
             said += f'="{html.escape(_printable(text))}"'
     if name in _VOID:
-        return Html(f"<{name}{said}>" if name not in _DRAWN else f"<{name}{said}/>")
+        return Html(f"<{name}{said}>")
     if name in ("code", "pre"):
         content = tuple(p if isinstance(p, Html) or p is None else literal(p) for p in content)
     inner = "".join(escaped(part) for part in content if part is not None)
     return Html(f"<{name}{said}>{inner}</{name}>")
-
-
-_SPOKEN = ("aria_label", "aria_valuetext", "title")
-_DRAWN = frozenset({"path", "line", "rect", "circle"})
 
 
 def joined(parts: Iterable[object], between: str = "") -> Html:
@@ -77,10 +73,10 @@ def joined(parts: Iterable[object], between: str = "") -> Html:
     return Html(escaped(between).join(escaped(part) for part in parts))
 
 
-def filled(name: str, slots: Mapping[str, Html]) -> Html:
-    """A template of this folder with markup in its slots."""
+def filled(name: str, slots: Mapping[str, object]) -> Html:
+    """A template of this folder, with texts, which are escaped, and markup in its slots."""
     text = template(name)
-    return Html(re.sub(r"\{\{(\w+)\}\}", lambda slot: slots[slot[1]], text))
+    return Html(re.sub(r"\{\{(\w+)\}\}", lambda slot: escaped(slots[slot[1]]), text))
 
 
 def template(name: str) -> str:
@@ -89,17 +85,11 @@ def template(name: str) -> str:
 
 
 def data_of(value: Any) -> Html:
-    """A value as JSON that can stand in a script element."""
-    text = json.dumps(value, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
-    for character, instead in _IN_SCRIPT.items():
-        text = text.replace(character, instead)
-    return Html(text)
+    """A value as JSON that can stand in a script element, which "<" could end."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    return Html(text.replace("<", "\\u003c"))
 
 
 def _printable(text: str) -> str:
     """Without characters that a browser refuses, or that turn the text around."""
-    return "".join(c if c >= " " and not _turns(c) else " " for c in text)
-
-
-def _turns(c: str) -> bool:
-    return "\u202a" <= c <= "\u202e" or "\u2066" <= c <= "\u2069" or "\ud800" <= c <= "\udfff"
+    return _TURNS.sub(" ", "".join(c if c >= " " else " " for c in text))

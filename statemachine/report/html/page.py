@@ -18,16 +18,16 @@ from ..finding import long_labels
 from ..over_time import BothRuns, QuantityChart
 from .blocks import drawn, headline
 from .charts import quantity_row
-from .markup import Html, data_of, escaped, filled, joined, non_breaking, tag, template
-from .scene import SideDrawing
+from .markup import Html, data_of, filled, joined, non_breaking, tag, template
+from .scene import Look
 from .stage import StagePart, staged
 
 SUFFIXES = (".html", ".htm")
 _SCRIPTS = ("gl.js", "scene.js", "page.js")
-_NO_LOOK = SideDrawing(None, "no model was given")
+_NO_LOOK = "no model was given"
 
 
-def report(page: Page, looks: Sequence[SideDrawing] = (_NO_LOOK, _NO_LOOK)) -> str:
+def report(page: Page, looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK)) -> str:
     """A page as HTML.
 
     Args:
@@ -94,7 +94,7 @@ def _assembled(title: str, body: Html, stage: StagePart | None) -> str:
     )
     slots = {
         "policy": Html(policy),
-        "title": escaped(title),
+        "title": title,
         "style": Html(template("page.css")),
         "body": body,
         "data": data,

@@ -1,7 +1,5 @@
 // Both runs in one picture: the first solid, the second as a ghost over it.
 
-const OPENING = 0.6; // rad, from top to bottom; as in scene.py, with the picture's 1.45
-
 const colour_of = (name) => {
   const probe = document.createElement('canvas').getContext('2d');
   probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -196,9 +194,9 @@ class Scene {
     this.view = new Float32Array([right[0], up[0], back[0], 0, right[1], up[1], back[1], 0,
       right[2], up[2], back[2], 0, -dot(right, eye), -dot(up, eye), -dot(back, eye), 1]);
     const far = this.distance + 12 * this.data.extent, close = this.distance * 0.02;
-    // A picture higher than wide opens wider, so that its width shows as much.
+    // A picture higher than wide opens wider, so that its width shows as much; 1.45 as in scene.py.
     const tall = Math.min(1, this.canvas.width / this.canvas.height / 1.45);
-    const f = tall / Math.tan(OPENING / 2), aspect = this.canvas.width / this.canvas.height;
+    const f = tall / Math.tan(this.data.opening / 2), aspect = this.canvas.width / this.canvas.height;
     this.lens = new Float32Array([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0,
       (far + close) / (close - far), -1, 0, 0, (2 * far * close) / (close - far), 0]);
     this.up = unit([right[2], up[2], back[2]]);
