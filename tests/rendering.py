@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from statemachine.drawing.scene import Camera
 from statemachine.engines import room
 from statemachine.installed import DEFAULT
 
@@ -35,6 +36,14 @@ def rendering_environment() -> dict[str, str]:
         pytest.skip(how)
     chosen = {"MUJOCO_GL": how.rpartition("=")[2]} if "=" in how else {}
     return {**os.environ, **chosen, "PYTHONPATH": str(ROOT)}
+
+
+def seen_by(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
+    """Where points (n, 3) are in the picture: (n, 2), -1 to 1 from edge to edge."""
+    right, up, forward = camera.axes
+    offset, half = points - camera.eye, np.tan(np.radians(camera.fovy) / 2)
+    flat = np.stack([offset @ right / (half * aspect), offset @ up / half], axis=1)
+    return flat / (offset @ forward)[:, None]
 
 
 def overlaps_of_silhouettes(one: str | Path, other: str | Path) -> list[float]:

@@ -29,6 +29,7 @@ from statemachine.gym.tasks import TASKS, HeldBox, Reach
 from statemachine.gym.vector import ArmVectorEnv
 
 from .conftest import ROOT, refused, runs_in_silence
+from .rendering import seen_by
 
 IDS = [task.id for task in TASKS.values()]
 REACH, HELD_BOX = IDS
@@ -74,7 +75,7 @@ def test_the_target_is_in_the_picture(task: str) -> None:
     with closing(_make_vec(task, "mujoco", 2, render_mode="rgb_array")) as envs:
         seen, _ = envs.reset(seed=1)
         for picture, target in zip(envs.render(), seen[:, -6:-3], strict=True):
-            x, y = CAMERA.seen(target[None], SIZE[0] / SIZE[1])[0]
+            x, y = seen_by(CAMERA, target[None], SIZE[0] / SIZE[1])[0]
             column, row = np.round((np.array([x, -y]) + 1) / 2 * SIZE - 0.5).astype(int)
             red, green, blue = np.moveaxis(picture.astype(int), -1, 0)
             violet = (blue > green + 25) & (red > green + 10)

@@ -57,7 +57,7 @@ from .conftest import (
     soon,
     written,
 )
-from .rendering import rendering_environment, silhouettes
+from .rendering import rendering_environment, seen_by, silhouettes
 from .small_models import mjcf
 
 pytestmark = pytest.mark.slow  # a browser or a renderer at work
@@ -136,19 +136,11 @@ def test_a_trace_without_poses_has_them_from_its_qpos(
         motion_of(one, sm.load(ball), times)
 
 
-def _seen(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
-    """Where points (n, 3) are in the picture: (n, 2), -1 to 1 from edge to edge."""
-    right, up, forward = camera.axes
-    offset, half = points - camera.eye, np.tan(np.radians(camera.fovy) / 2)
-    flat = np.stack([offset @ right / (half * aspect), offset @ up / half], axis=1)
-    return flat / (offset @ forward)[:, None]
-
-
 def test_the_camera_has_everything_in_its_picture_and_is_as_near_as_can_be() -> None:
     cloud = np.random.default_rng(1).normal(size=(200, 3)) * (0.3, 0.1, 0.5) + (5, -3, 2)
     for aspect in (0.5, 4 / 3, 3):
         for azimuth, elevation in ((140, -20), (0, 0), (-75, -80), (10, 35)):
-            seen = np.abs(_seen(framed(cloud, aspect, azimuth, elevation), cloud, aspect))
+            seen = np.abs(seen_by(framed(cloud, aspect, azimuth, elevation), cloud, aspect))
             assert seen.max() == pytest.approx(0.9, abs=0.01)
     camera = framed(cloud, 1, 90, 0)
     right, up, forward = camera.axes  # azimuth 90 looks along +y
