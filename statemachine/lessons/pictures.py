@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,14 +21,13 @@ from ..runs.scenarios import SCENARIOS
 _ARM, _BOX = "so101/scene", "so101/scene_box"
 _EVERY = 16  # steps of 5 ms from one picture of a film to the next, which is shown 0.08 s later
 _SLOW = 4  # the same, for four times as slow
+_SWING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)  # what the keyframe "held" commands, but to the side
 
 
 def with_picture(page: Page, lesson: str) -> Page:
     """The page of a lesson, and after what its code printed a picture of the robot."""
-    if lesson not in PICTURES:
-        return page
     printed = [k for k, block in enumerate(page.blocks) if isinstance(block, Printed)]
-    if not printed:
+    if lesson not in PICTURES or not printed:
         return page
     at = printed[0] + 1
     return replace(page, blocks=[*page.blocks[:at], PICTURES[lesson], *page.blocks[at:]])
@@ -75,12 +73,6 @@ def _lag() -> tuple[Array, Array]:
         step(model, data)
         forward(model, data)
         return before, data.qpos[None].copy()
-
-
-def _twice() -> tuple[Array, Array]:
-    ctrl = load(_BOX).keyframes[0].ctrl + np.array((0.4, -0.2, 0, 0, 0, 0))
-    run = partial(_poses, _BOX, 16, ctrl, keyframe=0)
-    return run(), run()
 
 
 PICTURES: Mapping[str, RobotPicture] = {
@@ -147,7 +139,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "in the same place all the time.",
         "statemachine view --keyframe held",
         _BOX,
-        _twice,
+        lambda: (_poses(_BOX, 16, _SWING, keyframe=0), _poses(_BOX, 16, _SWING, keyframe=0)),
     ),
     "time": RobotPicture(
         "After 100 steps, and 0.2 s later by the clock: the second is drawn in violet.",

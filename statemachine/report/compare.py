@@ -156,9 +156,9 @@ def _over_time(
 def _sorted(charts: Sequence[QuantityChart], total: int) -> list[Block]:
     """Charts, those that differ first; those that agree folded away if they are not all."""
     order = {"differs": 0, "settles": 1, "agrees": 2}
-    ranked = sorted(charts, key=lambda c: (order[c.found.verdict], -c.found.tolerances()))
-    beyond: list[Block] = [chart for chart in ranked if chart.found.verdict != "agrees"]
-    within: list[Block] = [chart for chart in ranked if chart.found.verdict == "agrees"]
+    ranked = sorted(charts, key=lambda c: (order[c.agreement.verdict], -c.agreement.tolerances()))
+    beyond: list[Block] = [chart for chart in ranked if chart.agreement.verdict != "agrees"]
+    within: list[Block] = [chart for chart in ranked if chart.agreement.verdict == "agrees"]
     if beyond and within:
         within = [Section("", f"Those that agree: {len(within)}", within, folded=True)]
     left_out = total - len(charts)

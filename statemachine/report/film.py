@@ -250,7 +250,7 @@ def _strip(traces: Sequence[Trace], comparison: Comparison | None) -> QuantityCh
     charts = charts_of(comparison, one, two, series(one, two), None)
     return max(
         charts,
-        key=lambda chart: (chart.curve.kind == "tip", chart.found.tolerances()),
+        key=lambda chart: (chart.curve.kind == "tip", chart.agreement.tolerances()),
         default=None,
     )
 

@@ -124,7 +124,7 @@ def _gap_at(strip: QuantityChart, time: float) -> str:
     curve = strip.curve
     row = max(0, int(np.searchsorted(curve.time, time + 1e-9, side="right")) - 1)
     gap = quantity(float(curve.difference[row]), curve.unit)
-    tolerance = quantity(strip.found.tolerance, curve.unit)
+    tolerance = quantity(strip.agreement.tolerance, curve.unit)
     return f"{strip.title}: {gap} apart; dotted: the tolerance, {tolerance}"
 
 

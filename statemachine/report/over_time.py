@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from ..measures import same_pairs
 from ..measures.text import figure, quantity, reading, short_time
 from ..page import Interactive, Traces
 from ..runs import Trace
+from . import template
 from .events import Event
 from .finding import name_of
 
@@ -28,17 +30,15 @@ class QuantityChart(Interactive):
 
     Attributes:
         curve: Both sides at common moments.
-        found: The figures of the comparison.
+        agreement: The figures of the comparison.
         labels: What the sides are called.
-        said: What it shows, for those who do not see it.
         foot: A note under it; "" for none.
         floor: (n,) the width of its chaos floor at the moments of the curve, if that is known.
     """
 
     curve: Series
-    found: Agreement
+    agreement: Agreement
     labels: tuple[str, str]
-    said: str
     foot: str = ""
     floor: Array | None = None
 
@@ -46,6 +46,19 @@ class QuantityChart(Interactive):
     def unit(self) -> str:
         """What it is drawn in."""
         return reading(self.curve.unit)[1].strip()
+
+    @property
+    def said(self) -> str:
+        """What it shows, for those who do not see it."""
+        gap = self.agreement
+        far, settled, tolerance = (
+            quantity(size, gap.unit) for size in (gap.max, gap.settled, gap.tolerance)
+        )
+        since = "never" if gap.since is None else f"at {short_time(gap.since)}"
+        return (
+            f"{self.title}, difference over time: at most {far} at {short_time(gap.at)}, "
+            f"settled at {settled}; tolerance {tolerance}, left: {since}."
+        )
 
     def values(self) -> Traces | None:
         """Both sides: a position as the way from where the first side began; None without."""
@@ -57,7 +70,7 @@ class QuantityChart(Interactive):
             sides = [np.linalg.norm(side - curve.one[0], axis=1) for side in sides]
         curves = dict(zip(self.labels, ((curve.time, scale * side) for side in sides), strict=True))
         # What does not matter is not blown up to the height of the chart.
-        least = 20 * scale * self.found.tolerance
+        least = 20 * scale * self.agreement.tolerance
         title = f"{self.title}, from its start" if curve.one.ndim > 1 else self.title
         return Traces(f"{title} [{self.unit}]", "", "", curves, sides=True, least=least)
 
@@ -65,15 +78,15 @@ class QuantityChart(Interactive):
         """How far apart they are, with the tolerance and the chaos floor."""
         time, scale = self.curve.time, reading(self.curve.unit)[0]
         name = "" if self.curve.one.size else f"{self.title}: "
-        verdict = "DIFFERS" if self.found.verdict == "differs" else self.found.verdict
+        verdict = "DIFFERS" if self.agreement.verdict == "differs" else self.agreement.verdict
         return Traces(
-            f"{name}{verdict}, {quantity(self.found.max, self.found.unit)}",
+            f"{name}{verdict}, {quantity(self.agreement.max, self.agreement.unit)}",
             "",
             "",
             {GAP: (time, scale * self.curve.difference)},
             log=True,
             sides=True,
-            tolerance=scale * self.found.tolerance,
+            tolerance=scale * self.agreement.tolerance,
             floor=None if self.floor is None else (time, scale * self.floor),
         )
 
@@ -112,68 +125,39 @@ def charts_of(
 ) -> tuple[QuantityChart, ...]:
     """A chart for each quantity that is a number throughout; of many, those most beyond."""
     labels = comparison.one.label, comparison.two.label
-    found = {each.name: each for each in comparison.agreements}
+    agreements = {agreement.name: agreement for agreement in comparison.agreements}
     bands = {} if floor is None else {band.name: band.width for band in floor.bands}
     drawn = [curve for curve in curves if np.isfinite(curve.difference).all()]
-    ranked = sorted(drawn, key=lambda curve: (curve.kind != "tip", -found[curve.name].tolerances()))
-    kept = {curve.name for curve in ranked[:CHARTS_SHOWN]}
+    ranked = sorted(
+        drawn, key=lambda curve: (curve.kind != "tip", -agreements[curve.name].tolerances())
+    )
     return tuple(
-        chart_of(
+        QuantityChart(
+            name_of(curve.name),
             curve,
-            found[curve.name],
+            agreements[curve.name],
             labels,
             foot_of(curve, one, two, labels),
             bands.get(curve.name),
         )
         for curve in drawn
-        if curve.name in kept
+        if curve in ranked[:CHARTS_SHOWN]
     )
-
-
-def chart_of(
-    curve: Series,
-    found: Agreement,
-    labels: tuple[str, str],
-    foot: str = "",
-    floor: Array | None = None,
-) -> QuantityChart:
-    """The chart of a quantity."""
-    far, settled, tolerance = (
-        quantity(size, curve.unit) for size in (found.max, found.settled, found.tolerance)
-    )
-    since = "never" if found.since is None else f"at {short_time(found.since)}"
-    said = (
-        f"{name_of(curve.name)}, difference over time: at most {far} at {short_time(found.at)}, "
-        f"settled at {settled}; tolerance {tolerance}, left: {since}."
-    )
-    return QuantityChart(name_of(curve.name), curve, found, labels, said, foot, floor)
 
 
 def foot_of(curve: Series, one: Trace, two: Trace, labels: tuple[str, str]) -> str:
     """Under a chart of the energy by what it was computed; of a force its other figure."""
-    if curve.kind == "energy":
-        by = dict.fromkeys(trace.header.energy_by or trace.header.backend for trace in (one, two))
-        return (
-            f"Computed by {' and '.join(by)}, from the masses, the armature and the gravity of "
-            "the model."
-        )
-    if curve.kind != "force":
-        return ""
-    pair, sides = curve.name.removesuffix(NORMAL), []
-    for of in (normal_forces, total_forces):
-        left = of(one)
-        sides.append([_most(forces, pair) for forces in (left, same_pairs(left, of(two)))])
-    strongest = [
-        f"{label}: at most {normal} N; the whole force, friction added as vectors: at most "
-        f"{total} N."
-        for label, normal, total in zip(labels, *sides, strict=True)
-    ]
-    return " ".join(["Drawn is the sum of the normal forces.", *strongest])
-
-
-def _most(forces: Mapping[str, Array], pair: str) -> str:
-    """The largest force of a pair of bodies [N]."""
-    return figure(float(forces[pair].max()) if pair in forces else 0.0)
+    by = dict.fromkeys(trace.header.energy_by or trace.header.backend for trace in (one, two))
+    slots: dict[str, Any] = {"by": " and ".join(by) if curve.kind == "energy" else None}
+    slots |= {"left": labels[0] if curve.kind == "force" else None, "right": labels[1]}
+    if curve.kind == "force":
+        pair = curve.name.removesuffix(NORMAL)
+        for name, forces_of in (("normal", normal_forces), ("whole", total_forces)):
+            left = forces_of(one)
+            for side, forces in (("left", left), ("right", same_pairs(left, forces_of(two)))):
+                strongest = float(forces[pair].max()) if pair in forces else 0.0
+                slots[f"{side}_{name}"] = figure(strongest)
+    return " ".join(template.texts("over_time", **slots))
 
 
 def spans(mask: NDArray[np.bool_], time: Array, step: float, until: float) -> list[list[float]]:

@@ -88,7 +88,7 @@ def of_comparison(
         one.header.experiment,
         _origin(one, two),
         long_labels(comparison),
-        [[each for each in (chart.values(), chart.gap()) if each] for chart in charts],
+        [list(filter(None, (chart.values(), chart.gap()))) for chart in charts],
         _touches([one, two], comparison.until),
         comparison.until,
         first,

@@ -11,21 +11,21 @@ from ..sweep.analysis_gaps import GapMap
 from ..sweep.analysis_together import BroughtTogether
 
 
-def pictures(found: SweepReport) -> list[HeatMap | Bars | Traces]:
+def pictures(sweep: SweepReport) -> list[HeatMap | Bars | Traces]:
     """The pictures of the page, in its order."""
-    chosen = [map_picture(found), bars(found), *(fit_curve(found, t) for t in found.together)]
-    return [each for each in chosen if each is not None]
+    chosen = [map_picture(sweep), bars(sweep), *(fit_curve(sweep, t) for t in sweep.together)]
+    return [picture for picture in chosen if picture is not None]
 
 
-def map_picture(found: SweepReport) -> HeatMap | Traces | None:
-    chart, main = found.map, found.quantity
+def map_picture(sweep: SweepReport) -> HeatMap | Traces | None:
+    chart, main = sweep.map, sweep.quantity
     if chart is None:
         return None
     scale, unit = reading(main.unit)
-    title = f"Gap of the {main.says} between {listed(list(found.sides))}"
+    title = f"Gap of the {main.says} between {listed(list(sweep.sides))}"
     numbers = [value for value in chart.columns if not isinstance(value, (bool, str))]
     if not chart.up and len(numbers) == len(chart.columns) > 1:
-        return _curve(found, chart, title)
+        return _curve(sweep, chart, title)
     framed = [[v is not None and v <= main.tolerance for v in row] for row in chart.gap]
     title += f"; median over {listed(chart.others)}" if chart.others else ""
     if any(map(any, framed)):
@@ -34,10 +34,10 @@ def map_picture(found: SweepReport) -> HeatMap | Traces | None:
         title += "; hatched: inside the chaos floor"
     return HeatMap(
         title,
-        axis(found, chart.across),
-        axis(found, chart.up),
-        [setting_word(found, chart.across, value) for value in chart.columns],
-        [setting_word(found, chart.up, value) for value in chart.rows] or [""],
+        axis(sweep, chart.across),
+        axis(sweep, chart.up),
+        [setting_word(sweep, chart.across, value) for value in chart.columns],
+        [setting_word(sweep, chart.up, value) for value in chart.rows] or [""],
         [[None if v is None else v * scale for v in row] for row in chart.gap],
         f"gap [{unit.strip()}]",
         chart.inside,
@@ -45,17 +45,17 @@ def map_picture(found: SweepReport) -> HeatMap | Traces | None:
     )
 
 
-def _curve(found: SweepReport, chart: GapMap, title: str) -> Traces:
+def _curve(sweep: SweepReport, chart: GapMap, title: str) -> Traces:
     """The gap over one parameter."""
-    main, (scale, unit) = found.quantity, reading(found.quantity.unit)
-    place = found.parameters.index(chart.across)
-    known = [setting for setting in found.settings if setting.median is not None]
+    main, (scale, unit) = sweep.quantity, reading(sweep.quantity.unit)
+    place = sweep.parameters.index(chart.across)
+    known = [setting for setting in sweep.settings if setting.median is not None]
     known.sort(key=lambda setting: setting.values[place])
     x = [float(setting.values[place]) for setting in known]
     figures = {"median of the seeds": [setting.median for setting in known]}
-    if found.seeds > 1:
+    if sweep.seeds > 1:
         figures["worst seed"] = [setting.worst for setting in known]
-    if found.floor is not None:
+    if sweep.floor is not None:
         figures["chaos floor"] = [setting.floor for setting in known]
     if chart.sampled or not known:
         pairs = [pair for pair in zip(chart.columns, chart.gap[0], strict=True) if None not in pair]
@@ -64,59 +64,59 @@ def _curve(found: SweepReport, chart: GapMap, title: str) -> Traces:
         name: (x, [scale * (gap or 0.0) for gap in gaps]) for name, gaps in figures.items()
     }
     curves["tolerance"] = ([x[0], x[-1]], [main.tolerance * scale] * 2)
-    return Traces(title, axis(found, chart.across), f"gap [{unit.strip()}]", curves)
+    return Traces(title, axis(sweep, chart.across), f"gap [{unit.strip()}]", curves)
 
 
-def bars(found: SweepReport) -> Bars | None:
-    shares = found.sensitivity
+def bars(sweep: SweepReport) -> Bars | None:
+    shares = sweep.sensitivity
     if shares is None or shares.method == "rank" or len(shares.indices) == 1:
         return None
     return Bars(
         "What the gap is sensitive to",
         "share of the gap's variance",
-        [each.label for each in shares.indices],
+        [index.label for index in shares.indices],
         {
-            "first order": [(each.first, each.first_interval) for each in shares.indices],
-            "total": [(each.total, each.total_interval) for each in shares.indices],
+            "first order": [(index.first, index.first_interval) for index in shares.indices],
+            "total": [(index.total, index.total_interval) for index in shares.indices],
         },
     )
 
 
-def fit_curve(found: SweepReport, each: BroughtTogether) -> Traces | None:
+def fit_curve(sweep: SweepReport, parameter: BroughtTogether) -> Traces | None:
     """The predicted gap over a parameter, and what was measured."""
-    if each.fit is None:
+    if parameter.fit is None:
         return None
-    scale, unit = reading(found.quantity.unit)
-    x, y = each.fit.scan
+    scale, unit = reading(sweep.quantity.unit)
+    x, y = parameter.fit.scan
     curves: dict[str, tuple[Sequence[float], Sequence[float]]] = {
         "predicted": (x, [value * scale for value in y]),
-        "tolerance": ([x[0], x[-1]], [found.quantity.tolerance * scale] * 2),
+        "tolerance": ([x[0], x[-1]], [sweep.quantity.tolerance * scale] * 2),
     }
-    if each.tried is not None:
-        pairs = sorted(zip(*each.tried, strict=True))
+    if parameter.tried is not None:
+        pairs = sorted(zip(*parameter.tried, strict=True))
         curves["run"] = ([v for v, _ in pairs], [gap * scale for _, gap in pairs])
-    elif each.measured is not None:
-        value, width = each.fit.value, 0.01 * (x[-1] - x[0])
-        curves["run there"] = ([value - width, value + width], [each.measured * scale] * 2)
-    side = found.sides[1] if each.varied == "right" else "both"
+    elif parameter.measured is not None:
+        value, width = parameter.fit.value, 0.01 * (x[-1] - x[0])
+        curves["run there"] = ([value - width, value + width], [parameter.measured * scale] * 2)
+    side = sweep.sides[1] if parameter.varied == "right" else "both"
     return Traces(
-        f"The gap over {each.label} in {side}",
-        axis(found, each.label),
+        f"The gap over {parameter.label} in {side}",
+        axis(sweep, parameter.label),
         f"gap [{unit.strip()}]",
         curves,
     )
 
 
-def axis(found: SweepReport, label: str) -> str:
+def axis(sweep: SweepReport, label: str) -> str:
     """A parameter with what its values are in."""
-    if label in found.scaled:
+    if label in sweep.scaled:
         return f"{label} [times the model's own]"
-    return f"{label} [{unit}]" if (unit := found.units.get(label)) else label
+    return f"{label} [{unit}]" if (unit := sweep.units.get(label)) else label
 
 
-def setting_word(found: SweepReport, label: str, value: object) -> str:
+def setting_word(sweep: SweepReport, label: str, value: object) -> str:
     """A value of a parameter: "0.5x", "on", "euler"."""
     if isinstance(value, bool):
         return "on" if value else "off"
-    times = "x" if label in found.scaled else ""
+    times = "x" if label in sweep.scaled else ""
     return f"{value:.4g}{times}" if isinstance(value, float) else str(value)

@@ -93,15 +93,15 @@ class ViserFront:
             if part.body == 0:
                 self._add_fixed(part)
         for number, name in enumerate(self._session.names):
-            root = f"/{_plain(name)}" + (" ghost" if number else "")
-            bodies = {}
-            for body in drawing.bodies:
-                if body:
-                    bodies[body] = scene.add_frame(f"{root}/{body}", show_axes=False)
+            # A name for viser's tree, where slashes part.
+            root = f"/{name.replace('/', ' ')}" + (" ghost" if number else "")
+            bodies = [body for body in drawing.bodies if body]
+            self._frames.append(
+                {body: scene.add_frame(f"{root}/{body}", show_axes=False) for body in bodies}
+            )
             for part in drawing.parts:
                 if part.body:
                     self._add_part(part, f"{root}/{part.body}/{part.geom}", number > 0)
-            self._frames.append(bodies)
 
     def _add_fixed(self, part: Part) -> None:
         name = f"/world/{part.geom}"
@@ -307,8 +307,3 @@ def thinner(part: Part, by: float) -> NDArray[np.float32]:
     lengths = np.linalg.norm(sums, axis=1, keepdims=True)
     sums /= np.where(lengths > 0, lengths, 1)
     return (part.vertices - by * sums).astype(np.float32)
-
-
-def _plain(name: str) -> str:
-    """A name for viser's tree, where slashes part."""
-    return name.replace("/", " ")

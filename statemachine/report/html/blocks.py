@@ -86,13 +86,13 @@ def _section(block: Section, draw: Draw, level: int) -> Html:
     return tag("section", heading, inside, id=name, aria_labelledby=labelled)
 
 
-def headline(found: Headline) -> Html:
+def headline_as_html(headline: Headline) -> Html:
     """The answer of a page, above all else."""
     return tag(
         "h1",
-        non_breaking(f"{found.lead}."),
-        *(tag("span", non_breaking(f" {each}"), class_="cause") for each in found.causes),
-        tag("span", non_breaking(f" {found.end}"), class_="cause end") if found.end else None,
+        non_breaking(f"{headline.lead}."),
+        *(tag("span", non_breaking(f" {cause}"), class_="cause") for cause in headline.causes),
+        tag("span", non_breaking(f" {headline.end}"), class_="cause end") if headline.end else None,
         id="finding",
         tabindex="-1",
     )
@@ -101,7 +101,13 @@ def headline(found: Headline) -> Html:
 def table(block: Table) -> Html:
     """A table whose first column names its rows, as wide as it needs to be."""
     signed = _signed(block.rows)
-    top = tag("tr", *(_heading(k, text, block) for k, text in enumerate(block.headers)))
+    top = tag(
+        "tr",
+        *(
+            tag("th", text, scope="col", class_=_look(k, block) if k else "word")
+            for k, text in enumerate(block.headers)
+        ),
+    )
     rows = [
         tag(
             "tr",
@@ -110,21 +116,27 @@ def table(block: Table) -> Html:
         )
         for n, row in enumerate(block.rows)
     ]
-    caption = tag("caption", block.title)
-    made = tag("table", caption, tag("thead", top), tag("tbody", *rows))
-    return tag("div", made, class_="wide", tabindex="0", role="region", aria_label=block.title)
+    inside = tag("caption", block.title), tag("thead", top), tag("tbody", *rows)
+    return tag(
+        "div",
+        tag("table", *inside),
+        class_="wide",
+        tabindex="0",
+        role="region",
+        aria_label=block.title,
+    )
 
 
-def _heading(place: int, text: str, block: Table) -> Html:
-    is_word = place == 0 or place in block.words
-    return tag("th", text, scope="col", class_="word" if is_word else None)
+def _look(place: int, block: Table) -> str | None:
+    """The class of a column's cells: words are aligned to the left."""
+    return "word" if place in block.words else None
 
 
 def _cell(place: int, text: str, block: Table, signed: frozenset[int]) -> Html:
     content = _content(text, place in signed)
     if place == 0:
         return tag("th", content, scope="row")
-    return tag("td", content, class_="word" if place in block.words else None)
+    return tag("td", content, class_=_look(place, block))
 
 
 def _content(text: str, signed: bool) -> object:

@@ -30,7 +30,7 @@ _COLOURS = {
 
 def quantity_row(quantity: QuantityChart) -> Html:
     """A row of a quantity: how far apart over time, both sides, and the figures on demand."""
-    values = quantity.values()
+    values, agreement = quantity.values(), quantity.agreement
     one, two = quantity.labels
     keys = tag("i", class_="key one"), f"{one} ", tag("i", class_="key two"), two
     gap = f"how far apart, {quantity.unit}; log axis; dotted: the tolerance"
@@ -38,7 +38,7 @@ def quantity_row(quantity: QuantityChart) -> Html:
         gap += "; grey: the chaos floor"
     return tag(
         "section",
-        tag("h3", tag("span", quantity.title, class_="quantity"), badge(quantity.found.verdict)),
+        tag("h3", tag("span", quantity.title, class_="quantity"), badge(agreement.verdict)),
         tag(
             "div",
             _figure(quantity.gap(), gap, quantity.said),
@@ -76,7 +76,7 @@ def _figure(picture: Traces, caption: str, said: str) -> Html:
 
 def data_table(quantity: QuantityChart) -> Html:
     """The figures of its charts: moments evenly spaced, and that of the largest difference."""
-    time, tolerance = quantity.curve.time, quantity.found.tolerance
+    time, tolerance = quantity.curve.time, quantity.agreement.tolerance
     rows = np.linspace(0, len(time) - 1, min(_ROWS, len(time))).round().astype(int)
     worst = largest(quantity.curve.difference)[1]
     rows = np.unique([*rows, worst])

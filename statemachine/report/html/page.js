@@ -1,14 +1,14 @@
 // The slider, and all that follows it.
 
-const found = JSON.parse(document.getElementById('data').textContent);
+const facts = JSON.parse(document.getElementById('data').textContent);
 const $ = (name) => document.getElementById(name);
 const root = document.documentElement;
 root.classList.add('script');
 
-const times = numbers(found.time, Float64Array);
-const compared = numbers(found.compared, Float64Array);
+const times = numbers(facts.time, Float64Array);
+const compared = numbers(facts.compared, Float64Array);
 const frames = times.length;
-const quantities = found.quantities.map((q) => ({
+const quantities = facts.quantities.map((q) => ({
   ...q,
   apart: numbers(q.apart, Float32Array),
   one: q.one ? numbers(q.one, Float32Array) : null,
@@ -16,7 +16,7 @@ const quantities = found.quantities.map((q) => ({
 }));
 
 const slider = $('slider'), stage = $('stage'), play = $('play');
-let row = found.start, playing = 0, touched = false, scene = null;
+let row = facts.start, playing = 0, touched = false, scene = null;
 
 const moment = (t) => `${t.toFixed(3)} s`;
 const minus = (text) => text.replaceAll('-', '\u2212');
@@ -33,7 +33,7 @@ const gap = (q, k) => (q.apart[k] && q.apart[k] < 1e-6 * q.tolerance ? '\u2248 0
   : `${figure(q.apart[k])}${q.unit}`);
 const apart = (q, k) => `${q.name} ${gap(q, k)}`;
 const spoken = (k) => {
-  const lead = found.lead.map((n) => quantities[n]).filter(Boolean).map((q) => apart(q, k));
+  const lead = facts.lead.map((n) => quantities[n]).filter(Boolean).map((q) => apart(q, k));
   return `${moment(times[k])}: ${lead.join('; ')} apart`;
 };
 
@@ -88,7 +88,7 @@ const redraw = () => {
 };
 const show = (k, by_slider = false) => {
   row = Math.min(frames - 1, Math.max(0, k));
-  const share = found.until ? times[row] / found.until : 0;
+  const share = facts.until ? times[row] / facts.until : 0;
   document.body.style.setProperty('--t', share.toFixed(6));
   if (!by_slider) slider.value = row;
   slider.setAttribute('aria-valuetext', spoken(row));
@@ -170,7 +170,7 @@ const controls = () => {
   for (const area of document.querySelectorAll('.area, .lane:not(.slide):not(.axis) .track')) {
     const seek = (event) => {
       const box = area.getBoundingClientRect();
-      go_to(at_time(((event.clientX - box.left) / box.width) * found.until));
+      go_to(at_time(((event.clientX - box.left) / box.width) * facts.until));
     };
     area.addEventListener('pointerdown', (event) => {
       if (event.button) return;
@@ -203,7 +203,7 @@ const turn = (dx, dy) => {
   redraw();
 };
 const zoom = (factor) => {
-  const extent = found.scene.extent;
+  const extent = facts.scene.extent;
   scene.distance = Math.min(20 * extent, Math.max(0.05 * extent, scene.distance * factor));
   redraw();
 };
@@ -260,10 +260,10 @@ const view = (canvas) => {
 
 const begin_scene = () => {
   const canvas = $('scene');
-  if (!found.scene) return;
+  if (!facts.scene) return;
   canvas.hidden = false;
   try {
-    scene = new Scene(canvas, found.scene, frames);
+    scene = new Scene(canvas, facts.scene, frames);
   } catch (error) {
     canvas.hidden = true;
     const why = error.message === 'no WebGL' ? 'This browser has no WebGL 2'
@@ -274,7 +274,7 @@ const begin_scene = () => {
   }
   $('still').hidden = true;
   reveal('views', 'checks', 'arrows');
-  if (found.scene.begin_near && scene.sides[0].tip) scene.approach();
+  if (facts.scene.begin_near && scene.sides[0].tip) scene.approach();
   view(canvas);
 };
 
@@ -292,12 +292,12 @@ $('theme').addEventListener('click', () => {
 });
 dark.addEventListener('change', themed);
 
-let kept = null;
+let printed = null;
 addEventListener('beforeprint', () => {
   stop('Paused');
-  kept = { theme: root.dataset.theme, closed: [...document.querySelectorAll('details:not([open])')] };
+  printed = { theme: root.dataset.theme, closed: [...document.querySelectorAll('details:not([open])')] };
   root.dataset.theme = 'light';
-  for (const each of kept.closed) each.open = true;
+  for (const part of printed.closed) part.open = true;
   if (!scene) return;
   scene.draw();
   const picture = new Image();
@@ -307,11 +307,11 @@ addEventListener('beforeprint', () => {
   $('scene').before(picture);
 });
 addEventListener('afterprint', () => {
-  if (!kept) return;
-  if (kept.theme) root.dataset.theme = kept.theme; else delete root.dataset.theme;
-  for (const each of kept.closed) each.open = false;
+  if (!printed) return;
+  if (printed.theme) root.dataset.theme = printed.theme; else delete root.dataset.theme;
+  for (const part of printed.closed) part.open = false;
   $('printed')?.remove();
-  kept = null;
+  printed = null;
   redraw();
 });
 

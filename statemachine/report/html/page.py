@@ -16,7 +16,7 @@ from ...page import Block, Interactive, Items, Page, Section, Text
 from ...runs.whole import check_place, replace_text
 from ..finding import long_labels
 from ..over_time import BothRuns, QuantityChart
-from .blocks import drawn, headline
+from .blocks import drawn, headline_as_html
 from .charts import quantity_row
 from .markup import Html, data_of, filled, joined, non_breaking, tag, template
 from .scene import Look
@@ -76,7 +76,7 @@ def _header(page: Page, opening: Sequence[Block], draw: Any, runs: BothRuns | No
     return tag(
         "header",
         tag("p", *name, class_="kicker"),
-        headline(page.headline) if page.headline else tag("h1", page.title, id="finding"),
+        headline_as_html(page.headline) if page.headline else tag("h1", page.title, id="finding"),
         *(tag("p", non_breaking(block.text), class_="says") for block in lead),
         tag("div", drawn(opening[len(lead) :], draw), class_="words"),
     )

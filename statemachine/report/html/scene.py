@@ -195,11 +195,10 @@ def _drawings(
 
 def _held(pos: Array) -> Array:
     """Positions that are not finite are those of the last moment that were."""
-    pos = pos.copy()
-    for k in range(len(pos)):
-        bad = ~np.isfinite(pos[k]).all(axis=1)
-        pos[k][bad] = pos[k - 1][bad] if k else 0.0
-    return pos
+    row, good = np.arange(len(pos))[:, None], np.isfinite(pos).all(axis=2)
+    last = np.maximum.accumulate(np.where(good, row, 0))
+    held = pos[last, np.arange(pos.shape[1])]
+    return np.where(np.isfinite(held), held, 0.0)
 
 
 def _between(values: Array, rows: Ints, share: Array) -> Array:

@@ -49,7 +49,7 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> StagePart:
     until = runs.comparison.until
     # Of these moments the page tells: they must be among those that can be shown.
     agreements = runs.comparison.agreements
-    moments = {t for each in agreements for t in (each.at, each.since) if t is not None}
+    moments = {t for a in agreements for t in (a.at, a.since) if t is not None}
     times, left_out = moments_of(runs.one, runs.two, sorted(moments))
     start = int(np.argmin(np.abs(times - runs.start)))
     scene = scene_of(runs, looks, times, left_out, start)
@@ -143,7 +143,7 @@ def _lane(name: str, content: Sequence[Html], look: str, *key: object) -> Html:
 def _beyond(chart: QuantityChart, until: float) -> list[list[float]]:
     """When a quantity is beyond its tolerance, from and to [s]; tiny gaps are closed."""
     time = chart.curve.time
-    beyond = chart.curve.difference > chart.found.tolerance
+    beyond = chart.curve.difference > chart.agreement.tolerance
     seen: list[list[float]] = []
     for start, end in spans(beyond, time, float(time[-1]) / max(1, len(time) - 1), float(time[-1])):
         if seen and start - seen[-1][1] < _SEEN * until:
@@ -160,7 +160,7 @@ def _quantity_data(chart: QuantityChart, rows: Ints) -> dict[str, Any]:
     data: dict[str, Any] = {
         "name": chart.title,
         "unit": unit.replace(" ", "\u00a0"),
-        "tolerance": chart.found.tolerance * scale,
+        "tolerance": chart.agreement.tolerance * scale,
         "apart": packed(curve.difference[rows] * scale, "f4"),
     }
     if curve.one.ndim == 1 and curve.one.size:
