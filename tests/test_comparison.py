@@ -44,7 +44,7 @@ def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(trace: T
     }
     assert [touch.pair for touch in touches(trace, trace)] == [name]
     assert {event.what for event in events_of(found, touches(trace, trace)) if event.what} == {name}
-    assert [touch.name for touch in of_trace(trace).touches] == [name]
+    assert list(of_trace(trace).touches) == [name]
     # The lesson and freshness also say which of the gripper's geoms it is.
     model = sm.load("so101/scene")
     lesson = lesson_result("hold", model, seconds=0.5)
