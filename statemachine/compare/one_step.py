@@ -20,7 +20,7 @@ from ..runs.derived import put_row
 from ..runs.drive import Progress, silent
 from ..runs.rerun import Rerun
 from .matching import Matched, match_models
-from .stages import AFTER, FORCE, FOUND, STAGES, Reading, StageMeasure, StageReader, measures
+from .stages import AFTER, FORCE, FOUND, STAGES, StepReading, StageMeasure, StageReader, measures
 
 MOMENTS = 200
 RELATIVE = 1e-6  # of the scale of a stage: what is less is rounding
@@ -144,7 +144,7 @@ def one_step(
     inputs = {name: trace[name] for name in ("time", "qpos", "qvel", "ctrl")}
     primed, failed = "", False
     times: list[float] = []
-    readings: list[tuple[Reading, Reading, Reading]] = []
+    readings: list[tuple[StepReading, StepReading, StepReading]] = []
     with (
         make_data(matched.one) as running,
         make_data(matched.one) as left,

@@ -42,7 +42,7 @@ class StageColumn(NamedTuple):
     units: Sequence[str]
 
 
-class Reading(NamedTuple):
+class StepReading(NamedTuple):
     """One step of one side.
 
     Attributes:
@@ -103,7 +103,7 @@ class StageReader:
             engine.prime(model, data, given)
         return engine.primes
 
-    def step(self, side: int, data: Data, qpos: Array, qvel: Array) -> Reading:
+    def step(self, side: int, data: Data, qpos: Array, qvel: Array) -> StepReading:
         """Take a step, and read what it was made of.
 
         Args:
@@ -123,7 +123,7 @@ class StageReader:
             values, contacts = self._read(side, data, qpos), self._contacts(side, data)
             step(model, data)
         rate = (data.qvel - qvel) / model.timestep
-        return Reading([*values, rate[dofs, None]], contacts)
+        return StepReading([*values, rate[dofs, None]], contacts)
 
     def _read(self, side: int, data: Data, qpos: Array) -> list[Array]:
         """All columns but the velocity update."""
@@ -242,7 +242,9 @@ class StageMeasure:
 
 
 def measures(
-    reader: StageReader, readings: Sequence[tuple[Reading, Reading, Reading]], relative: float
+    reader: StageReader,
+    readings: Sequence[tuple[StepReading, StepReading, StepReading]],
+    relative: float,
 ) -> list[StageMeasure]:
     """What both sides tell, by stage and unit.
 
