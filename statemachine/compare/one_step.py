@@ -20,7 +20,7 @@ from ..runs.derived import put_row
 from ..runs.drive import Progress, silent
 from ..runs.rerun import Rerun
 from .matching import Matched, match_models
-from .stages import AFTER, FORCE, FOUND, STAGES, StepReading, StageMeasure, StageReader, measures
+from .stages import AFTER, FORCE, FOUND, STAGES, StageMeasure, StageReader, StepReading, measures
 
 MOMENTS = 200
 RELATIVE = 1e-6  # of the scale of a stage: what is less is rounding
