@@ -11,17 +11,19 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import statemachine as sm
 from statemachine.drawing.scene import Camera
 from statemachine.engines import room
 from statemachine.installed import DEFAULT
 
-from .conftest import REQUIRED, ROOT
+from .conftest import REQUIRED, ROOT, opened
 
 POSES = ((0, 0, 0, 0, 0, 0.2), (0.3, -0.8, 0.9, 0.6, 0.4, 0.8))
 VIEWS = ((90, -5), (180, -10), (135, -30), (160, -80))
@@ -46,27 +48,17 @@ def seen_by(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
     return flat / (offset @ forward)[:, None]
 
 
-def overlaps_of_silhouettes(one: str | Path, other: str | Path) -> list[float]:
-    """Intersection over union of two arms' silhouettes, from several sides, in poses."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.rendering", str(one), str(other)],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        env=rendering_environment(),
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
 def silhouettes(
-    model: Path, poses: Sequence[np.ndarray], camera: dict[str, Any], size: Sequence[int], at: Path
-) -> list[np.ndarray]:
-    """Where a model is seen in poses qpos, drawn by MuJoCo's own renderer: boolean masks."""
-    job = {"model": str(model), "poses": [q.tolist() for q in poses], "camera": camera}
+    model: str | Path, shots: Sequence[tuple[Any, Camera]], size: Sequence[int], at: Path
+) -> np.ndarray:
+    """Where a robot is seen in poses qpos, each by its camera, drawn by MuJoCo: boolean masks."""
+    job = {
+        "model": str(model),
+        "size": list(size),
+        "shots": [(np.asarray(qpos).tolist(), asdict(camera)) for qpos, camera in shots],
+    }
     done = subprocess.run(
-        [sys.executable, "-m", "tests.rendering", json.dumps({**job, "size": list(size)}), str(at)],
+        [sys.executable, "-m", "tests.rendering", json.dumps(job), str(at)],
         capture_output=True,
         text=True,
         cwd=ROOT,
@@ -74,69 +66,42 @@ def silhouettes(
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return list(np.load(at / "silhouettes.npy"))
+    return np.load(at / "silhouettes.npy")
 
 
-def _draw_silhouettes(job: dict[str, Any], at: Path) -> None:
-    import mujoco
-
-    import statemachine as sm
-
-    model, (width, height) = sm.load(job["model"]).raw, job["size"]
-    model.vis.global_.fovy = job["camera"]["fovy"]
-    camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation = job["camera"]["azimuth"], job["camera"]["elevation"]
-    camera.distance = job["camera"]["distance"]
-    camera.lookat[:] = job["camera"]["target"]
-    found = []
-    with mujoco.Renderer(model, height, width) as renderer:
-        renderer.enable_segmentation_rendering()
-        for qpos in job["poses"]:
-            data = mujoco.MjData(model)
-            data.qpos[:] = qpos
-            mujoco.mj_forward(model, data)
-            shown = mujoco.MjvOption()
-            shown.sitegroup[:] = 0
-            renderer.update_scene(data, camera, shown)
-            ids = renderer.render()[..., 0]
-            found.append((ids >= 0) & (model.geom_bodyid[ids] > 0))
-    np.save(at / "silhouettes.npy", np.array(found))
-
-
-def _silhouette(model: Any, qpos: Sequence[float], azimuth: float, elevation: float) -> np.ndarray:
-    """Where the arm is seen in a picture of 480 × 360, as a boolean mask."""
-    import mujoco
-
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
-    camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation, camera.distance = azimuth, elevation, 0.62
-    low, high = data.xpos[1:].min(axis=0), data.xpos[1:].max(axis=0)
-    camera.lookat[:] = (low + high) / 2
-    shown = mujoco.MjvOption()
-    shown.geomgroup[:] = (1, 1, 1, 0, 0, 0)
-    shown.sitegroup[:] = 0
-    with mujoco.Renderer(model, 360, 480) as renderer:
-        renderer.enable_segmentation_rendering()
-        renderer.update_scene(data, camera, shown)
-        return renderer.render()[..., 1] == int(mujoco.mjtObj.mjOBJ_GEOM)
+def overlaps_of_silhouettes(one: sm.Model, other: str | Path, at: Path) -> np.ndarray:
+    """Intersection over union of two arms' silhouettes, from several sides, in poses."""
+    shots = []
+    for qpos in POSES:
+        with opened(one, qpos=qpos) as (model, data):
+            sm.forward(model, data)
+            middle = (data.xpos[1:].min(axis=0) + data.xpos[1:].max(axis=0)) / 2
+        shots += [(qpos, Camera(tuple(middle), 0.62, *view, fovy=45)) for view in VIEWS]
+    masks = [silhouettes(path, shots, (480, 360), at) for path in (one.path, other)]
+    return (masks[0] & masks[1]).sum(axis=(1, 2)) / (masks[0] | masks[1]).sum(axis=(1, 2))
 
 
 def main() -> None:
-    """Print the overlaps of two models as JSON, or do a job of silhouettes."""
-    if sys.argv[1].startswith("{"):
-        _draw_silhouettes(json.loads(sys.argv[1]), Path(sys.argv[2]))
-        return
-    import statemachine as sm
+    """Draw silhouettes, as a job says."""
+    import mujoco
 
-    models = [sm.load(name).raw for name in sys.argv[1:3]]
-    overlaps = []
-    for qpos in POSES:
-        for view in VIEWS:
-            one, other = (_silhouette(model, qpos, *view) for model in models)
-            overlaps.append(float((one & other).sum() / (one | other).sum()))
-    print(json.dumps(overlaps))
+    job, found, shown = json.loads(sys.argv[1]), [], mujoco.MjvOption()
+    shown.sitegroup[:] = 0
+    model, (width, height) = sm.load(job["model"]).raw, job["size"]
+    with mujoco.Renderer(model, height, width) as renderer:
+        renderer.enable_segmentation_rendering()
+        for qpos, seen_by in job["shots"]:
+            model.vis.global_.fovy = seen_by["fovy"]
+            camera = mujoco.MjvCamera()
+            camera.azimuth, camera.elevation = seen_by["azimuth"], seen_by["elevation"]
+            camera.distance, camera.lookat[:] = seen_by["distance"], seen_by["target"]
+            data = mujoco.MjData(model)
+            data.qpos[:] = qpos
+            mujoco.mj_forward(model, data)
+            renderer.update_scene(data, camera, shown)
+            ids = renderer.render()[..., 0]
+            found.append((ids >= 0) & (model.geom_bodyid[ids] > 0))
+    np.save(Path(sys.argv[2]) / "silhouettes.npy", np.array(found))
 
 
 if __name__ == "__main__":

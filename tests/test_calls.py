@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import functools
 import gc
@@ -412,43 +411,6 @@ def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
         ("getJointStates", (1, [2]), {}, 0),
     ):
         assert watched.client_of(function, given, named) == client, function
-    pb: Any = installed.require("pybullet")
-    nowhere = pb.connect(pb.DIRECT)
-    pb.disconnect(nowhere)
-    for name, place in watched._BEFORE_CLIENT.items():
-        arguments: list[Any] = [0] * place
-        if name == "loadURDF":
-            arguments[:3] = ["no.urdf", (0, 0, 0), (0, 0, 0, 1)]
-        if name == "isConnected":
-            assert not pb.isConnected(nowhere)
-        else:  # the engine takes the number for a world's
-            with pytest.raises(pb.error, match="Not connected"):
-                getattr(pb, name)(*arguments, nowhere)
-        with pytest.raises(TypeError, match="at most"):  # and has no argument after it
-            getattr(pb, name)(*arguments, nowhere, nowhere)
-
-
-@pytest.mark.usefixtures("bullet")
-def test_every_call_of_the_backend_says_its_client() -> None:
-    from statemachine.engines.pybullet import calls as watched
-
-    folder = Path(backends.__file__).parent
-    seen = 0
-    for path in [*folder.glob("_bullet_*.py"), folder / "pybullet_backend.py"]:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
-                continue
-            if not (isinstance(node.func.value, ast.Name) and node.func.value.id == "pb"):
-                continue
-            name = node.func.attr
-            keywords = {each.arg for each in node.keywords}
-            if name == "connect" or "physicsClientId" in keywords:
-                continue
-            seen += 1
-            place = watched._BEFORE_CLIENT[name]
-            if not any(isinstance(each, ast.Starred) for each in node.args):
-                assert len(node.args) == place + 1, f"{path.name}:{node.lineno}"
-    assert seen > 20
 
 
 @around(MujocoData, "_recompute")

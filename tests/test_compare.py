@@ -250,14 +250,6 @@ def test_moments_that_both_have_are_compared_and_no_others() -> None:
 def test_what_makes_it_less_than_a_comparison_of_engines_is_said(hold: Trace, box: Trace) -> None:
     notes = " ".join(compare(hold, box).notes)
     assert_in(notes, "different model files", "missing on one side: box", "experiments are two")
-    qpos = hold.qpos.copy()
-    qpos[0, 0] = 0.1
-    assert "not start in the same state" in " ".join(compare(hold, changed(hold, qpos=qpos)).notes)
-    ctrl = hold.ctrl.copy()
-    ctrl[3] += 0.1
-    assert "commands differ" in " ".join(compare(hold, changed(hold, ctrl=ctrl)).notes)
-    ended = Trace(dataclasses.replace(hold.header, ended="it diverged"), hold.columns)
-    assert "ended early: it diverged" in " ".join(compare(hold, ended).notes)
 
 
 def test_traces_of_two_robots_share_nothing(hold: Trace) -> None:

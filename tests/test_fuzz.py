@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,13 +39,6 @@ def test_the_same_seed_draws_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in (1, 1, 2):
         assert command_lines.run(seed, 20).tried == 20
     assert seen[:20] == seen[20:40] != seen[40:]
-
-
-def test_a_digest_that_is_not_looked_at_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pyarrow")
-    monkeypatch.setattr(parquet_files, "_digest", lambda _text, _columns: "0" * 64)
-    monkeypatch.setattr(traces, "_CHANGES", [traces._flip] * 3)
-    assert any("other numbers" in line for line in traces.run(1, 40).failures)
 
 
 def test_a_binary_model_that_is_not_refused_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -91,16 +85,6 @@ sys.exit(cli.main(sys.argv[1:]))
 """
 
 
-@pytest.mark.slow
-def test_a_command_line_that_ends_in_a_traceback_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        command_lines, "command", lambda *words: [sys.executable, "-c", BROKEN_PARSER, *words]
-    )
-    monkeypatch.setattr(command_lines, "_furnish", lambda _folder: None)
-    monkeypatch.setattr(command_lines, "_BASES", [["doctor", "--json"]])
-    assert any("traceback" in line for line in command_lines.run(1, 4).failures)
-
-
 def test_what_is_no_good_end_of_a_command_is_said(tmp_path: Path) -> None:
     for code, says in (
         ("import sys; sys.exit(7)", "exit code 7"),
@@ -110,17 +94,6 @@ def test_what_is_no_good_end_of_a_command_is_said(tmp_path: Path) -> None:
     ):
         assert says in command_lines.examine([sys.executable, "-c", code], tmp_path)
     assert command_lines.examine([sys.executable, "-c", ""], tmp_path) == ""
-
-
-@pytest.mark.slow
-def test_a_reader_of_models_that_fails_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = "import statemachine as sm\nsm.load = sm.Kinematics = lambda *a, **k: {}[a]"
-    broken = models._READER.replace("import statemachine as sm", lines)
-    assert broken != models._READER
-    monkeypatch.setattr(models, "_READER", broken)
-    tally = models.run(1, 2)
-    assert len(tally.failures) == 2
-    assert "KeyError" in tally.failures[0]
 
 
 # Writes in place, and the second file after a moment.
@@ -134,10 +107,41 @@ whole.beside = csv_files.beside = beside
 """
 
 
-@pytest.mark.slow
-def test_a_writer_that_writes_in_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kills, "_WRITER", IN_PLACE + kills._WRITER)
-    assert any("half a file" in line for line in kills.run(1, 8).failures)
+BLIND_READER = "import statemachine as sm\nsm.load = sm.Kinematics = lambda *a, **k: {}[a]"
+PATCHES: dict[str, list[tuple[Any, str, Any]]] = {
+    "a digest is not looked at": [
+        (parquet_files, "_digest", lambda _text, _columns: "0" * 64),
+        (traces, "_CHANGES", [traces._flip] * 3),
+    ],
+    "a command line ends in a traceback": [
+        (command_lines, "command", lambda *of: [sys.executable, "-c", BROKEN_PARSER, *of]),
+        (command_lines, "_furnish", lambda _folder: None),
+        (command_lines, "_BASES", [["doctor", "--json"]]),
+    ],
+    "a reader of models fails": [
+        (models, "_READER", models._READER.replace("import statemachine as sm", BLIND_READER))
+    ],
+    "a writer writes in place": [(kills, "_WRITER", IN_PLACE + kills._WRITER)],
+}
+
+
+@pytest.mark.parametrize(
+    ("fault", "target", "tries", "says"),
+    [
+        ("a digest is not looked at", traces, 40, "other numbers"),
+        pytest.param("a command line ends in a traceback", command_lines, 4, "traceback",
+                     marks=pytest.mark.slow),
+        pytest.param("a reader of models fails", models, 2, "KeyError", marks=pytest.mark.slow),
+        pytest.param("a writer writes in place", kills, 8, "half a file", marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_a_fault_is_found(
+    fault: str, target: Any, tries: int, says: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pyarrow")
+    for patch in PATCHES[fault]:
+        monkeypatch.setattr(*patch)
+    assert any(says in line for line in target.run(1, tries).failures)
 
 
 def test_a_target_that_crashes_is_a_failure(tmp_path: Path) -> None:

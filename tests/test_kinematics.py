@@ -86,15 +86,6 @@ def test_definition_of_a_frame(mujoco_arm: sm.Model) -> None:
     assert np.abs(definition.pos - place).max() < 1e-15
 
 
-def test_a_urdf_is_read_too(tmp_path: Path) -> None:
-    text = """<robot name="r"><link name="base"/><link name="tip"/>
-    <joint name="j" type="continuous"><parent link="base"/><child link="tip"/>
-    <origin xyz="0 0 1"/><axis xyz="0 0 1"/></joint></robot>"""
-    pose = sm.Kinematics(_write(tmp_path, text, "r.urdf")).pose([0.7], "tip", "body")
-    assert np.abs(pose.pos - (0, 0, 1)).max() < 1e-15
-    assert abs(pose.mat[1, 0] - np.sin(0.7)) < 1e-15
-
-
 WORLD = "<mujoco><worldbody>{}</worldbody></mujoco>"
 
 

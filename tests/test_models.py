@@ -128,11 +128,7 @@ def test_a_model_is_constant(arm: sm.Model) -> None:
 
 
 def test_gains_and_ranges_are_the_servos(tmp_path: Path) -> None:
-    model = sm.load("so101")
-    assert np.allclose(model.actuator_kp, 998.22)
-    assert np.allclose(model.actuator_kv, 2.731)
-    assert np.allclose(model.actuator_forcerange, [-2.94, 2.94])
-    assert model.actuator_jntid.tolist() == [0, 1, 2, 3, 4, 5]
+    assert np.allclose(sm.load("so101").actuator_forcerange, [-2.94, 2.94])
     model = model_of(tmp_path, MOTORS)
     assert np.isnan(model.actuator_kp).all()
     assert np.isinf(model.actuator_ctrlrange).all()

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.backends import mujoco_backend
 from statemachine.errors import (
     BadInputError,
     DivergedError,
-    EngineWarning,
     ForeignStateError,
     UnknownNameError,
 )
@@ -190,24 +188,6 @@ def test_hidden_parts_of_a_state_must_be_numbers() -> None:
             sm.get_state(model, data)
 
 
-def test_activations_and_mocap_bodies_are_part_of_the_state(tmp_path: Path) -> None:
-    model = loaded(
-        tmp_path,
-        f"<body><joint name='j'/>{GEOM}</body><body mocap='true'>{GEOM}</body>",
-        "<actuator><general joint='j' dyntype='integrator' gainprm='1'/></actuator>",
-    )
-    with sm.make_data(model) as data, sm.make_data(model) as other:
-        data.ctrl[:] = 1.0
-        sm.step(model, data, 20)
-        data.raw.mocap_pos[0] = (1, 2, 3)
-        sm.set_state(model, other, sm.get_state(model, data))
-        assert other.raw.act[0] == data.raw.act[0] != 0
-        assert other.raw.mocap_pos[0].tolist() == [1, 2, 3]
-        for each in (data, other):
-            sm.step(model, each, 20)
-        assert np.array_equal(data.qpos, other.qpos)
-
-
 def test_an_actuator_on_a_tendon_drives_no_joint(tmp_path: Path) -> None:
     model = loaded(
         tmp_path,
@@ -218,18 +198,6 @@ def test_an_actuator_on_a_tendon_drives_no_joint(tmp_path: Path) -> None:
     assert model.actuator_jntid.tolist() == [-1, 0]
     assert model.actuator_kp[0] == 3
     assert np.isnan(model.actuator_kp[1])
-
-
-def test_warnings_of_compiling_come_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    right = mujoco_backend.compile_file
-
-    def noisy(path: object) -> object:
-        mujoco.get_mju_user_warning()("the mesh looks odd")
-        return right(path)  # pyright: ignore[reportArgumentType]
-
-    monkeypatch.setattr(mujoco_backend, "compile_file", noisy)
-    with pytest.warns(EngineWarning, match="looks odd"):
-        sm.load("so101")
 
 
 @pytest.mark.slow
@@ -289,16 +257,3 @@ def test_the_record_of_a_model_with_rk4_says_what_it_breaks(tmp_path: Path) -> N
         model.replace(integrator="rk4")
     better = model.replace(integrator="implicitfast")
     assert better.capabilities.behaviours["stale after a step"].support == "native"
-
-
-def test_memory_is_flat_over_many_data(mujoco_box: sm.Model) -> None:
-    import resource
-
-    def cycle(times: int) -> int:
-        for _ in range(times):
-            with sm.make_data(mujoco_box) as data:
-                sm.step(mujoco_box, data)
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-    before = cycle(300)
-    assert cycle(2000) - before < 20_000  # kilobytes

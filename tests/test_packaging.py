@@ -88,10 +88,6 @@ def test_the_installed_wheel_runs_a_lesson_from_another_folder(wheel: Path, tmp_
     assert not list(elsewhere.iterdir())
 
 
-def test_python_3_11_is_the_oldest() -> None:
-    assert PROJECT["requires-python"] == ">=3.11"
-
-
 def test_constraints_pin_every_dependency_without_addresses() -> None:
     text = (ROOT / "constraints.txt").read_text()
     assert "://" not in text

@@ -214,9 +214,8 @@ def test_the_ghost_is_the_second_side_in_its_own_pose(
         for traces in ([one], [one, two])
     )
     row = int(np.argmin(np.abs(one.time - 0.4)))
-    first, second = silhouettes(
-        model.path, [one.qpos[row], two.qpos[row]], dataclasses.asdict(camera), SIZE, tmp_path
-    )
+    shots = [(trace.qpos[row], camera) for trace in (one, two)]
+    first, second = silhouettes(model.path, shots, SIZE, tmp_path)
     changed = _differ(alone[1], together[1])
     outside = _grown(first, 2)
     assert (second & ~outside).sum() > 1000  # the poses lie apart: the test can fail

@@ -543,14 +543,18 @@ def _clients() -> int:
 
 @linux
 @pytest.mark.parametrize(
-    ("name", "cycles"),
-    [("so101", 400), pytest.param("so101/scene_box", 2_000, marks=pytest.mark.slow)],
+    ("backend", "name", "cycles"),
+    [
+        ("mujoco", "so101/scene_box", 2_000),
+        ("pybullet", "so101", 400),
+        pytest.param("pybullet", "so101/scene_box", 2_000, marks=pytest.mark.slow),
+    ],
 )
-def test_memory_stays_flat(name: str, cycles: int) -> None:
-    model = load(name)
+def test_memory_stays_flat(backend: str, name: str, cycles: int) -> None:
+    model = sm.load(name, backend=backend)
     clients, start = 0, 0.0
     for k in range(cycles):
-        if k == 50:  # by then allocators have what they want
+        if k == cycles // 8:  # by then allocators have what they want
             gc.collect()
             clients, start = _clients(), _memory()
         with sm.make_data(model) as data:

@@ -1,15 +1,16 @@
 """A check that cannot fail is a defect: each fault here is caught by the checks it names.
 
-The faults are put into the MuJoCo backend, one at a time, as a third-party backend that
-is registered under the name "faulty". Those that students' tests have to catch too come from
-`statemachine.grading.mutants`.
+The faults are put into the backend of an engine, one at a time, as a third-party backend that is
+registered under the name "faulty"; those of PyBullet's stand in `pybullet_faults`. Those that
+students' tests have to catch too come from `statemachine.grading.mutants`.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -23,7 +24,8 @@ from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
 from statemachine.interface import DERIVED, Model, State
 
-from .conftest import Patch, around, refused, registered
+from .conftest import Patch, around, need_engine, refused, registered
+from .pybullet_faults import PYBULLET_FAULTS
 
 
 def replaced(owner: type, name: str) -> Callable[[Callable[..., Any]], Patch]:
@@ -254,17 +256,23 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
 }
 
 
-@pytest.fixture
-def faulty() -> Iterator[str]:
-    with registered("faulty", "statemachine.backends.mujoco_backend:load") as name:
-        yield name
+# What the conformance checks cannot see, a test of the backend does.
+CAUGHT_BY: dict[tuple[str, str], tuple[Patch, set[str], tuple[Callable[..., None], ...]]] = {
+    **{("mujoco", fault): (*caught, ()) for fault, caught in FAULTS.items()},
+    **{("pybullet", fault): caught for fault, caught in PYBULLET_FAULTS.items()},
+}
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_fault_is_caught(fault: str, faulty: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    apply, catchers = FAULTS[fault]
+@pytest.mark.parametrize(("engine", "fault"), CAUGHT_BY)
+def test_fault_is_caught(
+    engine: str, fault: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    need_engine(engine)
+    apply, checks, tests = CAUGHT_BY[engine, fault]
     apply(monkeypatch)
-    with conformance.Lab(faulty) as lab:
+    loader = f"statemachine.backends.{engine}_backend:load"
+    with registered("faulty", loader) as name, conformance.Lab(name) as lab:
         refused(
-            *((AssertionError, "", partial(conformance.CHECKS[check], lab)) for check in catchers)
+            *((AssertionError, "", partial(conformance.CHECKS[check], lab)) for check in checks),
+            *((AssertionError, "", partial(test, tmp_path)) for test in tests),
         )

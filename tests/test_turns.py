@@ -29,7 +29,6 @@ from .conftest import (
     opened,
     raised_in_a_thread,
     refused,
-    registered,
     runs_in_silence,
 )
 from .small_models import crowded
@@ -118,16 +117,6 @@ def test_another_data_is_not_refused(model: sm.Model) -> None:
         raised = _meanwhile(data, use)
         sm.step(model, data)
         assert raised == [None]
-
-
-def test_a_third_partys_backend_gets_it_too() -> None:
-    with registered("hidden", "tests.hidden_world:load") as name:
-        model = sm.load("so101", backend=name)
-        for use in USES.values():
-            with sm.make_data(model) as data:
-                raised = _meanwhile(data, lambda use=use, data=data: use(model, data))
-                sm.step(model, data)
-                assert [type(error) for error in raised] == [BusyDataError]
 
 
 def test_a_hook_may_use_what_its_own_data_offers(

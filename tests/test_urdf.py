@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
-import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -21,9 +19,9 @@ from statemachine.backends import _bullet_urdf as urdf
 from statemachine.backends._bullet_plan import Plan
 from statemachine.errors import UnsupportedError
 from statemachine.models import models_dir
-from statemachine.rotations import matrix_from_quat, wxyz_from_xyzw
+from statemachine.rotations import matrix_from_quat
 
-from .conftest import ROOT, written
+from .conftest import written
 
 INERTIAL = '<inertial mass="0.3" pos="0.1 0.02 0.03" quat="0.6 0.1 -0.4 0.3" diaginertia="3 4 2"/>'
 # Anchored and slanted joints, a slide, a fixed body, every shape, a site called as a body.
@@ -90,49 +88,6 @@ def _by_pinocchio(model: sm.Model, file: Path) -> float:
     return worst
 
 
-def _by_pybullet(model: sm.Model, file: Path) -> float:
-    """Worst difference of any site's pose; the process is a fresh one, for the noise."""
-    code = f"""
-import json, sys, numpy as np, pybullet as pb
-from pathlib import Path
-poses = json.loads(sys.stdin.read())
-pb.connect(pb.DIRECT)
-body = pb.loadURDF({str(file)!r}, useFixedBase=1, flags=pb.URDF_USE_INERTIA_FROM_FILE)
-links = [pb.getJointInfo(body, i) for i in range(pb.getNumJoints(body))]
-joints = {{info[1].decode(): info[0] for info in links}}
-tips = {{info[12].decode(): info[0] for info in links}}
-# The base stands where its inertial frame says: put its link frame at the file's pose.
-out = []
-for qpos in poses["qpos"]:
-    for name, q in zip(poses["joints"], qpos): pb.resetJointState(body, joints[name], q)
-    states = [pb.getLinkState(body, tips[n], computeForwardKinematics=1) for n in poses["tips"]]
-    out.append([state[:2] for state in states])
-print("RESULT", json.dumps(out))
-"""
-    found = _poses(model, 2)
-    question = {
-        "qpos": [qpos.tolist() for qpos, _, _ in found],
-        "joints": model.joint_names,
-        "tips": [urdf.Names(model.raw).tips[site] for site in range(model.nsite)],
-    }
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        input=json.dumps(question),
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
-    answers = json.loads(done.stdout.rpartition("RESULT")[2])
-    worst = 0.0
-    for (_, pos, mat), sites in zip(found, answers, strict=True):
-        for site, (where, quat) in enumerate(sites):
-            turn = matrix_from_quat(wxyz_from_xyzw(quat))
-            worst = max(worst, float(np.abs(np.array(where) - pos[site]).max()))
-            worst = max(worst, float(np.abs(turn.ravel() - mat[site]).max()))
-    return worst
-
-
 def test_the_committed_file_is_what_the_script_writes(tmp_path: Path) -> None:
     home = models_dir() / "so101"
     raw = sm.load("so101").raw
@@ -144,15 +99,6 @@ def test_the_committed_file_is_what_the_script_writes(tmp_path: Path) -> None:
     assert number.sub("#", text) == number.sub("#", committed)
     new, old = (np.array(number.findall(each), dtype=float) for each in (text, committed))
     assert np.abs(new - old).max() < 1e-14
-
-
-def test_the_arm_by_pinocchio(pinocchio: None) -> None:
-    assert _by_pinocchio(sm.load("so101"), models_dir() / "so101" / "so101.urdf") < 1e-12
-
-
-@pytest.mark.usefixtures("bullet")
-def test_the_arm_by_pybullet() -> None:
-    assert _by_pybullet(sm.load("so101"), models_dir() / "so101" / "so101.urdf") < 1e-12
 
 
 def test_every_kind_of_joint(zoo: Any, zoo_urdf: Path, pinocchio: None) -> None:
@@ -184,18 +130,6 @@ def test_masses_and_inertias_survive(zoo: Any, zoo_urdf: Path, pinocchio: None) 
         bias = pin.nonLinearEffects(built, work, theirs_q, theirs_v)
         found = [bias[built.joints[place + 1].idx_v] for place in order]
         assert np.abs(found - data.qfrc_bias).max() < 1e-11
-
-
-def test_numbers_are_written_to_the_last_digit(mujoco_arm: sm.Model) -> None:
-    root = ET.parse(models_dir() / "so101" / "so101.urdf").getroot()
-    masses = [mass.get("value", "") for mass in root.iterfind("link/inertial/mass")]
-    assert set(map(float, masses)) == set(mujoco_arm.body_mass)
-    names = {link.attrib["name"] for link in root.findall("link")}
-    assert names >= {"gripperframe", "baseframe", *mujoco_arm.body_names[1:]}
-    for mesh in root.iter("mesh"):
-        assert (models_dir() / "so101" / mesh.attrib["filename"]).is_file()
-    (limit,) = root.iterfind("joint[@name='elbow_flex']/limit")
-    assert float(limit.attrib["effort"]) == 2.94
 
 
 def test_solids_of_a_capsule(zoo: Any, zoo_urdf: Path) -> None:

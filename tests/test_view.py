@@ -160,15 +160,6 @@ def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
         assert apart.max() < math.radians(1)
 
 
-def test_a_ghost_that_falls_is_far_away(mujoco_scene: sm.Model) -> None:
-    with LiveSession([mujoco_scene, mujoco_scene.replace(actuation=False)]) as session:
-        session.advance(200)
-        frame: Any = session.frame()
-        assert frame.joint_apart.where == "shoulder_lift"
-        assert 20 < frame.joint_apart.shown < 30  # 23.9°, as the lesson has it
-        assert frame.tips_apart > 0.1
-
-
 def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
     with LiveSession([odd, odd]) as session:
         session.advance(3)

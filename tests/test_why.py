@@ -256,10 +256,12 @@ def quietly(name: str, **options: Any) -> Model:
         return sm.load(name, backend="pybullet", **options)
 
 
-def path_of(model: Model, experiment: Scenario) -> np.ndarray:
-    """(n, nq) of an experiment, its options left to the caller."""
+def path_of(model: Model, experiment: Scenario, used: int = 0) -> np.ndarray:
+    """(n, nq) of an experiment, its options left to the caller; after steps and a reset."""
     controller, rows = experiment.controller(model, 0), []
-    with opened(model, experiment.keyframe) as (_, data):
+    with opened(model, nstep=used) as (_, data):
+        if used or experiment.keyframe:
+            sm.reset(model, data, experiment.keyframe)
         for _ in range(round(experiment.seconds / model.timestep)):
             rows.append(data.qpos.copy())
             wanted = controller(data.time, data)
@@ -512,14 +514,7 @@ def test_dials_outlive_a_reset() -> None:
     model = found.build({"inertia": "model"}, {})
     first = path_of(model, HOLD)
     assert (first != path_of(fresh, HOLD)).any()
-    controller, rows = HOLD.controller(model, 0), []
-    with opened(model, nstep=30) as (_, data):
-        sm.reset(model, data)
-        for _ in first:
-            rows.append(data.qpos.copy())
-            data.ctrl = controller(data.time, data)
-            sm.step(model, data)
-    np.testing.assert_array_equal(first, rows)
+    np.testing.assert_array_equal(first, path_of(model, HOLD, used=30))
 
 
 @pytest.fixture(scope="module")

@@ -121,12 +121,6 @@ def test_a_world_is_what_one_data_is(model: sm.Model) -> None:
         assert worlds.xpos[2].any()
 
 
-def test_with_substeps_a_timestep_and_latency(box: sm.Model) -> None:
-    model = box.replace(substeps=3, timestep=0.004, latency=0.02)
-    with worlds_of(model, 3) as worlds:
-        follow(model, worlds, 4)
-
-
 def test_states_move_between_worlds_and_data(worlds: many.Worlds) -> None:
     model = worlds.model
     # In contact.

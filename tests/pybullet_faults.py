@@ -1,7 +1,6 @@
 """Faults that a backend on PyBullet is likely to have; each is caught by what it names.
 
-They are put into our own, one at a time, and run as a third-party backend that is
-registered under the name "faulty". What the conformance checks cannot see, a test of
+`test_seeded_faults` puts them into our own. What the conformance checks cannot see, a test of
 test_pybullet_backend does: its name stands there then.
 """
 
@@ -9,23 +8,18 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Callable, Iterator
-from functools import partial
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from statemachine import conformance
 from statemachine.interface import POSES, Model
 from statemachine.rotations import matrix_from_quat
 
 from . import conftest
 from . import test_pybullet_backend as ours
-from .conftest import Patch, refused, registered
-
-pytestmark = pytest.mark.usefixtures("bullet")
+from .conftest import Patch
 
 
 def _parts() -> Any:
@@ -128,7 +122,7 @@ def contacts_are_not_observed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 # The fault, the conformance checks that see it, and the tests of the backend that do.
-FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...]]] = {
+PYBULLET_FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...]]] = {
     "xyzw for wxyz": (
         around("ghost", "wxyz_from_xyzw")(lambda right, quat: np.array(quat)),
         {"the_witness_agrees"},
@@ -202,23 +196,3 @@ FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...]]] = {
         (),
     ),
 }
-
-
-@pytest.fixture
-def faulty() -> Iterator[str]:
-    with registered("faulty", "statemachine.backends.pybullet_backend:load") as name:
-        yield name
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_fault_is_caught(
-    fault: str, faulty: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    apply, checks, tests = FAULTS[fault]
-    assert checks or tests
-    apply(monkeypatch)
-    with conformance.Lab(faulty) as lab:
-        refused(
-            *((AssertionError, "", partial(conformance.CHECKS[check], lab)) for check in checks),
-            *((AssertionError, "", partial(test, tmp_path)) for test in tests),
-        )
