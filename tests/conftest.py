@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import linecache
 import os
 import signal
@@ -10,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Container, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -26,6 +27,8 @@ from statemachine.installed import ENGINES, engine_version, require
 from statemachine.interface import Data, Model, make_data, reset, step
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import take
+from statemachine.page import Page
+from statemachine.report import terminal
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
@@ -204,6 +207,14 @@ def written_all(folder: Path, texts: dict[str, str]) -> Path:
     return folder
 
 
+def distribution(folder: Path, name: str, version: str, entries: str = "") -> Path:
+    """A folder that looks as if a distribution was installed into it."""
+    metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"
+    information = f"{name.replace('-', '_')}-{version}.dist-info"
+    texts = {"METADATA": metadata, "entry_points.txt": entries}
+    return written_all(folder / information, texts)
+
+
 @contextmanager
 def opened(
     model: Model, keyframe: int | str | None = None, *, nstep: int = 0, **inputs: Any
@@ -227,6 +238,13 @@ def started(model: Model) -> Iterator[Data]:
     """A Data in keyframe 0."""
     with opened(model, 0) as (_, data):
         yield data
+
+
+def shown(page: Page) -> str:
+    """A page as a terminal of 80 columns shows it."""
+    with redirect_stdout(io.StringIO()) as said:
+        terminal.show(page)
+    return said.getvalue()
 
 
 def lesson_result(name: str, model: Model, **options: Any) -> Any:

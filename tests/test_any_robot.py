@@ -27,7 +27,7 @@ from statemachine.runs import record_scenario
 from statemachine.runs.commands import hold_ctrl, is_servo
 from statemachine.runs.scenarios import SCENARIOS, fitting
 
-from .conftest import Cli, assert_not_in, one_line, opened, refused, written
+from .conftest import Cli, assert_not_in, one_line, opened, refused, written, written_all
 
 # A slide with a servo whose gear is 2, a hinge with a motor of gear 3 that holds a load, and a
 # hinge that a velocity servo drives.
@@ -324,9 +324,7 @@ class _Registry(types.ModuleType):
 @pytest.fixture
 def menagerie_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> _Registry:
     package = _Registry("mujoco_menagerie")
-    package.folder = tmp_path
-    for name in ("scene", "g1"):
-        (tmp_path / f"{name}.xml").write_text(PASSIVE)
+    package.folder = written_all(tmp_path, dict.fromkeys(("scene.xml", "g1.xml"), PASSIVE))
     monkeypatch.setitem(sys.modules, "mujoco_menagerie", package)
     return package
 

@@ -31,10 +31,9 @@ from statemachine.probes.calls import (
     recorded_engines,
 )
 from statemachine.report import calls as words
-from statemachine.report import terminal
 from statemachine.report.as_json import dumps
 
-from .conftest import Patch, around, assert_in, need_engine, refused
+from .conftest import Patch, around, assert_in, need_engine, refused, shown
 
 # A little of everything: a keyframe in mid-contact, a write, both verbs, each kind of
 # derived array, a State, a variant of the model, two Data.
@@ -521,11 +520,8 @@ def page_of(*engines_: str, code: str = "") -> tuple[Page, str]:
         need_engine(each)
     recordings = {each: record(SHORT.format(engine=each, code=code), each) for each in engines_}
     page = Page("calls", "", words.blocks(recordings))
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out):
-        terminal.show(page)
     assert dumps(recordings)
-    return page, out.getvalue()
+    return page, shown(page)
 
 
 def test_a_page_shows_the_same_line_in_both_engines_words() -> None:

@@ -346,8 +346,7 @@ def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) 
 
 
 def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
-    (tmp_path / "bob.py").write_text(SOLUTION.read_text(encoding="utf-8"), encoding="utf-8")
-    (tmp_path / "notes.txt").write_text("hello")
+    written_all(tmp_path, {"bob.py": SOLUTION.read_text("utf-8"), "notes.txt": "hello"})
     source = "exec(open({!r}).read(), n := {{}}); return n[{!r}]"
     beside = "exec(open(__file__.replace('student', 'bob')).read(), n := {}); return n"
     found = _grade(

@@ -7,6 +7,7 @@ import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -53,10 +54,7 @@ def test_what_no_command_expects_is_one_line(
     monkeypatch: pytest.MonkeyPatch,
     here: Cli,
 ) -> None:
-    def fails(_options: object) -> int:
-        raise error
-
-    monkeypatch.setattr("statemachine.commands.doctor.run", fails)
+    monkeypatch.setattr("statemachine.commands.doctor.run", Mock(side_effect=error))
     one_line(here("doctor"), says, code)
 
 

@@ -9,6 +9,7 @@ import tempfile
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from rich.cells import cell_len
@@ -462,10 +463,7 @@ def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     probe(["pybullet"])
     phrasebook.run(["pybullet"])
 
-    def broken(*_arguments: Any) -> None:
-        raise RuntimeError("as seeded")
-
-    monkeypatch.setattr(pybullet(), "stepSimulation", broken)
+    monkeypatch.setattr(pybullet(), "stepSimulation", Mock(side_effect=RuntimeError("as seeded")))
     refused(
         *(
             (RuntimeError, "as seeded", partial(ask, question, "pybullet"))

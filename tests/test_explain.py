@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,15 +66,19 @@ def test_one_cause_is_found_and_explains_all(name, tmp_path):
     assert found.located == 0
 
 
-def at_70_to_30(seed: int) -> tuple[str, str, float]:
-    """Two servos under weights that differ by 70 and 30 parts, and the gap between them [m]."""
+Game = tuple[str, str, dict[str, float]]
+
+
+def at_70_to_30(seed: int) -> Game:
+    """Two servos under weights that differ by 70 and 30 parts: a servo sags by their sum."""
     size = np.random.default_rng(seed).uniform(0.2, 0.6)
     left, right = servo(), servo(1.0 + 0.7 * size, 1.0 + 0.3 * size)
-    return left, right.replace(_kv(right), _kv(left)), 9.81 * size / 200
+    parts = {"mass of slider": 0.7, "mass of load": 0.3, "gap": 9.81 * size / 200}
+    return left, right.replace(_kv(right), _kv(left)), parts
 
 
-def that_interact(seed: int) -> tuple[str, str, float, float]:
-    """Two servos that differ in weight and in gain, and the Shapley value of either."""
+def that_interact(seed: int) -> Game:
+    """Two servos that differ in weight and in gain: a servo sags by weight over gain."""
     random = np.random.default_rng(seed)
     mass, kp = random.uniform(2, 3), random.uniform(80, 140)
 
@@ -83,34 +88,25 @@ def that_interact(seed: int) -> tuple[str, str, float, float]:
     whole = gap(mass, kp)
     heavier = ((whole - gap(1, kp)) + gap(mass, 200)) / 2 / whole
     left, right = servo(), servo(mass, 1.0, kp)
-    return left, right.replace(_kv(right), _kv(left)), heavier, 1 - heavier
+    parts = {"mass of slider": heavier, "gains of slider": 1 - heavier, "gap": whole}
+    return left, right.replace(_kv(right), _kv(left)), parts
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_two_causes_at_70_to_30(seed, tmp_path):
-    """What a servo sags by is the sum of the weights that it carries."""
-    left, right, sags = at_70_to_30(seed)
+@pytest.mark.parametrize(
+    ("game", "seconds", "method", "off"),
+    [(at_70_to_30, 3.0, "one at a time", 0.05), (that_interact, 6.0, "all sets", 0.01)],
+)
+def test_two_causes_get_their_shapley_value(
+    game: Any, seconds: float, method: str, off: float, seed: int, tmp_path: Path
+) -> None:
+    left, right, parts = game(seed)
     found = explained(
-        tmp_path, left, right, scenario=STILL, seconds=3.0, measure="end", quantity="slides"
+        tmp_path, left, right, scenario=STILL, seconds=seconds, measure="end", quantity="slides"
     )
-    assert found.gap == pytest.approx(sags, rel=1e-3)
-    told = shares(found)
-    assert told["mass of slider"] == pytest.approx(0.7, abs=0.05)
-    assert told["mass of load"] == pytest.approx(0.3, abs=0.05)
-    assert found.method == "one at a time"
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_causes_that_interact_get_their_shapley_value(seed, tmp_path):
-    """What a servo sags by is weight over gain: two causes, neither of which adds to the other."""
-    left, right, heavier, stiffer = that_interact(seed)
-    found = explained(
-        tmp_path, left, right, scenario=STILL, seconds=6.0, measure="end", quantity="slides"
-    )
-    told = shares(found)
-    assert found.method == "all sets"
-    assert told["mass of slider"] == pytest.approx(heavier, abs=0.01)
-    assert told["gains of slider"] == pytest.approx(stiffer, abs=0.01)
+    assert found.gap == pytest.approx(parts.pop("gap"), rel=1e-3)
+    assert found.method == method
+    assert {name: shares(found)[name] for name in parts} == pytest.approx(parts, abs=off)
 
 
 def _kv(text: str) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -153,10 +154,9 @@ def test_what_never_ends_in_a_fork_is_done_here(monkeypatch: pytest.MonkeyPatch)
 
 @forks
 def test_a_system_that_forks_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused() -> int:
-        raise BlockingIOError(11, "Resource temporarily unavailable")
-
-    monkeypatch.setattr(os, "fork", refused)
+    monkeypatch.setattr(
+        os, "fork", Mock(side_effect=BlockingIOError(11, "Resource temporarily unavailable"))
+    )
     assert in_forks([partial(int, k) for k in range(4)], 2, lambda: None) == [0, 1, 2, 3]
 
 
@@ -165,10 +165,9 @@ def test_a_function_is_run_here_unless_asked(
 ) -> None:
     """Its threads would not come along."""
 
-    def never(*_args: object) -> None:
-        raise AssertionError("forked")
-
-    monkeypatch.setattr("statemachine.compare.why.trials.in_forks", never)
+    monkeypatch.setattr(
+        "statemachine.compare.why.trials.in_forks", Mock(side_effect=AssertionError("forked"))
+    )
     monkeypatch.setattr("statemachine.processes.forks._PAYS", 1e-9)
     found = explained(tmp_path, ARM, _apart(ARM), seconds=0.1, scenario=replace(SWING, own=True))
     assert found.runs > 10

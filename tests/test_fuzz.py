@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -67,10 +68,7 @@ def test_two_threads_in_one_data_are_found() -> None:
 
 
 def test_a_data_that_stays_taken_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def step(_model: sm.Model, _data: sm.Data, _count: int = 1) -> None:
-        raise BusyDataError("taken for ever")
-
-    monkeypatch.setattr(sm, "step", step)
+    monkeypatch.setattr(sm, "step", Mock(side_effect=BusyDataError("taken for ever")))
     (failure,) = threads.run(1, 1).failures
     assert failure.endswith(": refused when all threads were gone")
 

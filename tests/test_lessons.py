@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -708,10 +709,7 @@ def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert quiz.Reader().ask(question) is None
     assert quiz.Reader().ask(question) == 1
 
-    def end(_: str) -> str:
-        raise EOFError
-
-    monkeypatch.setattr("builtins.input", end)
+    monkeypatch.setattr("builtins.input", Mock(side_effect=EOFError))
     assert quiz.Reader().ask(question) is None
     with pytest.raises(quiz.Stopped):
         quiz.Reader().go_on()
@@ -751,10 +749,7 @@ def short_path(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_nothing_follows_where_the_reader_stopped(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def stop(_: str) -> str:
-        raise quiz.Stopped
-
-    monkeypatch.setattr("builtins.input", stop)
+    monkeypatch.setattr("builtins.input", Mock(side_effect=quiz.Stopped))
     assert main(["lesson"]) == 0
     said = capsys.readouterr().out
     assert "Go on later with: statemachine lesson --from objects" in said

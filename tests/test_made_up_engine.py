@@ -18,7 +18,7 @@ from statemachine import backends, engines
 from statemachine.cli import main
 from statemachine.installed import ENGINES
 
-from .conftest import ROOT, assert_in
+from .conftest import ROOT, assert_in, distribution
 
 NAME = "hidden"
 ON = ("--backend", NAME)
@@ -27,20 +27,12 @@ BESIDE = ("--backends", "mujoco", NAME)
 SAYS_NO, BAD_INPUT = 1, 2
 
 
-def _declared(folder: Path, entries: str) -> None:
-    """Make a folder look like one into which a distribution was installed."""
-    information = folder / "made_up-1.0.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: made-up\nVersion: 1.0\n")
-    (information / "entry_points.txt").write_text(entries)
-
-
 @pytest.fixture
 def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder to work in, in which the engine is known; to the processes that are started too."""
     packages = tmp_path / "packages"
-    packages.mkdir()
-    _declared(packages, f"[statemachine.backends]\n{NAME} = tests.hidden_world:load\n")
+    entries = f"[statemachine.backends]\n{NAME} = tests.hidden_world:load\n"
+    distribution(packages, "made-up", "1.0", entries)
     monkeypatch.syspath_prepend(str(packages))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(packages), str(ROOT))))
     monkeypatch.setitem(ENGINES, NAME, replace(ENGINES["mujoco"], name=NAME, role="made up"))

@@ -23,7 +23,7 @@ from statemachine.kinematics import Kinematics
 from statemachine.models import models_dir
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, one_line, one_line_error, written
+from .conftest import Cli, one_line, one_line_error, written, written_all
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -367,19 +367,18 @@ def test_a_capsule_in_three_pieces(tmp_path: Path) -> None:
     ends = (
         '<collision><origin xyz="0 0 {}"/><geometry><sphere radius="0.02"/></geometry></collision>'
     )
-    (tmp_path / "c.urdf").write_text(
-        '<robot name="r"><link name="a"><collision><geometry><cylinder radius="0.02" length="0.1"/>'
-        f"</geometry></collision>{ends.format('0.05')}{ends.format('-0.05')}</link></robot>"
-    )
-    (tmp_path / "c.xml").write_text(
-        '<mujoco><worldbody><body name="a"><geom type="capsule" size="0.02 0.05" mass="0"/>'
-        "</body></worldbody></mujoco>"
-    )
-    result = compare(tmp_path / "c.urdf", tmp_path / "c.xml")
+    texts = {
+        "c.urdf": '<robot name="r"><link name="a"><collision><geometry>'
+        '<cylinder radius="0.02" length="0.1"/></geometry></collision>'
+        f"{ends.format('0.05')}{ends.format('-0.05')}</link></robot>",
+        "c.xml": '<mujoco><worldbody><body name="a">'
+        '<geom type="capsule" size="0.02 0.05" mass="0"/></body></worldbody></mujoco>',
+    }
+    result = compare(*(written_all(tmp_path, texts) / name for name in texts))
     assert result.equal, _differ(result)
 
 
-def _stl(path: Path, edge: float) -> None:
+def _stl(edge: float) -> str:
     """A cube about the origin, in ASCII."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * edge / 2
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -388,7 +387,7 @@ def _stl(path: Path, edge: float) -> None:
         for triangle in ((a, b, c), (a, c, d)):
             points = "".join(f"vertex {' '.join(map(str, corners[i]))}\n" for i in triangle)
             lines.append(f"facet normal 0 0 0\nouter loop\n{points}endloop\nendfacet")
-    path.write_text("\n".join([*lines, "endsolid cube"]))
+    return "\n".join([*lines, "endsolid cube"])
 
 
 def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
@@ -397,11 +396,9 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
         '<mesh filename="package://any/meshes/{}.stl" scale="0.001 0.001 0.001"/>'
         "</geometry></collision></link></robot>"
     )
-    (tmp_path / "meshes").mkdir()
-    _stl(tmp_path / "meshes" / "cube.stl", 100.0)
-    _stl(tmp_path / "meshes" / "big.stl", 110.0)
-    for name in ("cube", "big", "gone"):
-        (tmp_path / f"{name}.urdf").write_text(text.format(name))
+    texts = {"meshes/cube.stl": _stl(100.0), "meshes/big.stl": _stl(110.0)}
+    texts |= {f"{name}.urdf": text.format(name) for name in ("cube", "big", "gone")}
+    written_all(tmp_path, texts)
     found = {d.figure: d for d in _differ(compare(tmp_path / "cube.urdf", tmp_path / "big.urdf"))}
     assert found["volume"].one == pytest.approx(1e-3)
     assert found["volume"].two == pytest.approx(1.331e-3)
@@ -596,9 +593,9 @@ PLAIN = {
 
 
 def _pendula(folder: Path, **changes: str) -> list[Difference]:
-    for name, each in (("one", {}), ("two", changes)):
-        (folder / f"{name}.xml").write_text(PENDULUM.format(**{**PLAIN, **each}))
-    return _differ(compare(folder / "one.xml", folder / "two.xml"))
+    sides = {"one.xml": {}, "two.xml": changes}
+    texts = {name: PENDULUM.format(**PLAIN | side) for name, side in sides.items()}
+    return _differ(compare(*(written_all(folder, texts) / name for name in texts)))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from statemachine.engines.mujoco.description import read_file
 from statemachine.models import models_dir, resolve
 from statemachine.robots import find
 
-from .conftest import one_line_error, opened, refused, registered, written
+from .conftest import one_line_error, opened, refused, registered, written, written_all
 from .small_models import MOTORS, PACKAGED_URDF, model_of
 
 
@@ -35,10 +35,8 @@ def test_paths_are_made_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_menagerie_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    home = tmp_path / "robotstudio_so101"
-    home.mkdir()
-    for name in ("so101.xml", "scene.xml"):
-        (home / name).write_text("<mujoco/>")
+    texts = dict.fromkeys(("so101.xml", "scene.xml"), "<mujoco/>")
+    home = written_all(tmp_path / "robotstudio_so101", texts)
     for root in (tmp_path, home):
         assert resolve("so101/scene", root) == home / "scene.xml"
         assert resolve("so101", root) == home / "so101.xml"

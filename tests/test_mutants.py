@@ -22,7 +22,7 @@ from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
 from statemachine.report import mutants as report
 
-from .conftest import ROOT, Cli, one_line, one_line_error, opened
+from .conftest import ROOT, Cli, one_line, one_line_error, opened, shown, written_all
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -52,10 +52,7 @@ def write(tmp_path: Path) -> Write:
     """Tests of a student, in a folder of their own."""
 
     def write(text: str) -> Path:
-        path = tmp_path / "student" / "test_mine.py"
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-        return path
+        return written_all(tmp_path / "student", {"test_mine.py": text}) / "test_mine.py"
 
     return write
 
@@ -309,8 +306,7 @@ def test_another_pytests_settings_do_not_disturb(
         "conftest.py": "raise RuntimeError('a conftest')",
         "pytest.ini": "[pytest]\naddopts = --no-such-option\n",
     }
-    for name, text in beside.items():
-        (path.parent / name).write_text(text, encoding="utf-8")
+    written_all(path.parent, beside)
     odd = path.parent.rename(path.parent.with_name("with [brackets] and blanks")) / path.name
     monkeypatch.setenv("PYTEST_ADDOPTS", "--no-such-option")
     monkeypatch.setenv("PYTEST_PLUGINS", "no_such_plugin")
@@ -321,9 +317,7 @@ def test_another_pytests_settings_do_not_disturb(
 # The page and the command.
 
 
-def test_the_page_keeps_to_its_columns(capsys: pytest.CaptureFixture[str]) -> None:
-    from statemachine.report import terminal
-
+def test_the_page_keeps_to_its_columns() -> None:
     name = "test_" + "a_name_that_goes_on_and_on_" * 4
     one = Failure(name, "why")
     trials = tuple(
@@ -331,8 +325,7 @@ def test_the_page_keeps_to_its_columns(capsys: pytest.CaptureFixture[str]) -> No
     )
     page = report.page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
     assert not page.holds
-    terminal.show(page)
-    assert max(map(cell_len, capsys.readouterr().out.splitlines())) <= 80
+    assert max(map(cell_len, shown(page).splitlines())) <= 80
 
 
 @pytest.mark.slow

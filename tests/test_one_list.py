@@ -12,14 +12,13 @@ from statemachine.compare.matching import match_models
 from statemachine.compare.models import Difference, compare
 from statemachine.compare.why.causes import differences_of
 
-from .conftest import Cli
+from .conftest import Cli, written_all
 from .explained import ALONE, ARM, Case, changed
 
 
 def _listed(folder: Path, right: str, left: str = ARM) -> list[Difference]:
-    (folder / "left.xml").write_text(left)
-    (folder / "right.xml").write_text(right)
-    rows = compare(folder / "left.xml", folder / "right.xml").found.differences
+    texts = {"left.xml": left, "right.xml": right}
+    rows = compare(*(written_all(folder, texts) / name for name in texts)).found.differences
     return [row for row in rows if row.matters]
 
 

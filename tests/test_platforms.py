@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 from packaging.requirements import Requirement
@@ -21,7 +22,7 @@ from statemachine import installed
 from statemachine.errors import MissingEngineError
 from statemachine.installed import ENGINES, engine_version
 
-from .conftest import ROOT, Cli, assert_in
+from .conftest import ROOT, Cli, assert_in, distribution
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 PINS = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] != "#"]
@@ -153,9 +154,6 @@ def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str
 def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str, int], None]:
     """Another machine, as far as Python tells, on which no engine is installed."""
 
-    def version(name: str) -> str:
-        raise importlib.metadata.PackageNotFoundError(name)
-
     def go(system: str, processor: str, minor: int) -> None:
         monkeypatch.setattr(installed.sys, "platform", system)
         monkeypatch.setattr(machine, "machine", lambda: processor)
@@ -163,7 +161,11 @@ def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str, int], None
         monkeypatch.setattr(
             installed.sys, "version_info", SimpleNamespace(major=3, minor=minor, micro=0)
         )
-        monkeypatch.setattr(importlib.metadata, "version", version)
+        monkeypatch.setattr(
+            importlib.metadata,
+            "version",
+            Mock(side_effect=importlib.metadata.PackageNotFoundError("nothing")),
+        )
 
     return go
 
@@ -196,8 +198,7 @@ def test_two_distributions_at_once_are_an_error_that_says_what_to_type(
 ) -> None:
     both = tmp_path / "both"
     for name in ENGINES["pybullet"].distributions:
-        (folder := both / f"{name.replace('-', '_')}-3.2.9.dist-info").mkdir(parents=True)
-        (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 3.2.9\n")
+        distribution(both, name, "3.2.9")
     path = {"PYTHONPATH": os.pathsep.join((str(both), str(ROOT)))}
     done = cli("lesson", "gravity", "--backend", "pybullet", **path, code=3)
     (line,) = done.stderr.splitlines()

@@ -19,7 +19,7 @@ from statemachine.lessons import PATH
 from statemachine.lessons.questions import ASKED
 from statemachine.probes.conventions import QUESTIONS
 
-from .conftest import ROOT, Cli, assert_in, need_engine, opened, written
+from .conftest import ROOT, Cli, assert_in, need_engine, opened, written, written_all
 
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text("utf-8")
@@ -99,10 +99,8 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
         )
         words = [str(file) if word == "path/to/robot.xml" else word for word in words]
     if "submissions" in words:
-        (tmp_path / "submissions").mkdir()
-        for name in ("ann.py", "bob.py"):
-            solution = (ROOT / "teaching" / "solutions" / "step_loop.py").read_text()
-            (tmp_path / "submissions" / name).write_text(solution)
+        solution = (ROOT / "teaching" / "solutions" / "step_loop.py").read_text()
+        written_all(tmp_path / "submissions", dict.fromkeys(("ann.py", "bob.py"), solution))
     ours = ("exercises/", "models")
     words = [str(ROOT / word) if word.startswith(ours) else word for word in words]
     if words and words[0] in ("compare", "audit", "view", "trace", "sweep"):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, assert_in, need_engine
+from .conftest import ROOT, assert_in, distribution, need_engine, written_all
 
 RECIPES = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 # Where a recipe says "in QUANTITIES": how the line of the file begins after which its lines go.
@@ -125,11 +125,9 @@ def test_a_convention(copy: Copy) -> None:
 
 @pytest.mark.slow
 def test_a_backend(copy: Copy) -> None:
-    package = copy.folder / "my_package"
-    package.mkdir()
     text = (ROOT / "tests" / "hidden_world.py").read_text()
-    (package / "backend.py").write_text(text.replace('backend="hidden"', 'backend="mine"'))
-    (package / "__init__.py").write_text("")
+    backend = text.replace('backend="hidden"', 'backend="mine"')
+    package = written_all(copy.folder / "my_package", {"backend.py": backend, "__init__.py": ""})
     shutil.copytree(ROOT / "tests" / "made_up", package / "room")
     (register,) = code(recipe("Add a backend"))
     done = subprocess.run(
@@ -145,11 +143,8 @@ def test_a_backend(copy: Copy) -> None:
     (toml,) = re.findall(
         r"^ *```toml\n(.*?)^ *```", recipe("Add a backend"), re.DOTALL | re.MULTILINE
     )
-    information = copy.folder / "my_package-1.0.dist-info"  # as if it were installed
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
     entries = textwrap.dedent(toml).replace("project.entry-points.", "").replace('"', "")
-    (information / "entry_points.txt").write_text(entries)
+    distribution(copy.folder, "my-package", "1.0", entries)
     assert "mine" in copy.run("lesson", "hold", "--backend", "mine")
     words = ("compare", "hold", "--seconds", "0.3", "--backends", "mujoco", "mine")
     assert "mine" in copy.run(*words)

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -935,10 +936,10 @@ def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, seen: Seen) 
 def test_a_page_without_matplotlib_says_where_its_charts_are(
     hold: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def lacking(*_: object) -> None:
-        raise MissingEngineError("a figure needs matplotlib", engine="matplotlib")
-
-    monkeypatch.setattr("statemachine.report.html.charts.chart", lacking)
+    monkeypatch.setattr(
+        "statemachine.report.html.charts.chart",
+        Mock(side_effect=MissingEngineError("a figure needs matplotlib")),
+    )
     text = page_of(hold)
     assert "No chart: a figure needs matplotlib" in text
     assert "<polyline" not in text

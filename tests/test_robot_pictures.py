@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import shlex
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -83,10 +84,9 @@ def test_it_stands_after_what_the_code_printed() -> None:
 def test_without_a_renderer_a_page_has_the_words(
     tmp_path: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def none() -> None:
-        raise MissingEngineError("nothing draws", engine="OpenGL")
-
-    monkeypatch.setattr(robot_pictures, "renderer_here", none)
+    monkeypatch.setattr(
+        robot_pictures, "renderer_here", Mock(side_effect=MissingEngineError("nothing draws"))
+    )
     path = site._write(tmp_path, "page", Page("t", "o", [_picture()]), "", "x")  # pyright: ignore
     text = path.read_text()
     assert "the words" in text

@@ -19,7 +19,6 @@ import pytest
 from statemachine.backends import load
 from statemachine.errors import BadInputError
 from statemachine.report.robots import page
-from statemachine.report.terminal import show
 from statemachine.robots import (
     BackendRow,
     ExaminedModel,
@@ -44,8 +43,10 @@ from .conftest import (
     one_line,
     processes_with,
     refused,
+    shown,
     soon,
     written,
+    written_all,
 )
 from .small_models import mjcf
 
@@ -81,8 +82,7 @@ if "statemachine.robots.examine" in " ".join(sys.orig_argv):
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    home = tmp_path / "robots"
-    files = {
+    texts = {
         "good.xml": GOOD,
         "arm.urdf": URDF,
         "broken.xml": "<mujoco><worldbody><body></worldbody>",
@@ -95,18 +95,13 @@ def folder(tmp_path: Path) -> Path:
         ".git/old.xml": GOOD,
         "notes.txt": "none",
     }
-    for name, text in files.items():
-        (home / name).parent.mkdir(parents=True, exist_ok=True)
-        (home / name).write_text(text)
-    return home
+    return written_all(tmp_path / "robots", texts)
 
 
 @pytest.fixture
 def sabotage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Models of some names go wrong; the file in which the others are noted."""
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "sitecustomize.py").write_text(SABOTAGE)
-    monkeypatch.syspath_prepend(tmp_path / "site")
+    monkeypatch.syspath_prepend(written_all(tmp_path / "site", {"sitecustomize.py": SABOTAGE}))
     log = tmp_path / "examined.txt"
     log.touch()
     monkeypatch.setenv("EXAMINED", str(log))
@@ -133,13 +128,13 @@ def test_an_include_is_looked_for_beside_the_main_file_then_beside_its_includer(
 ) -> None:
     need_engine("mujoco")
 
-    def put(file: str, inside: str) -> None:
-        (tmp_path / file).parent.mkdir(exist_ok=True)
-        (tmp_path / file).write_text(f"<mujoco>{inside}</mujoco>")
-
-    put("main.xml", "<include file='parts/hand.xml'/>")
-    put("parts/hand.xml", "<include file='finger.xml'/>")
-    put("parts/finger.xml", "<worldbody><body name='beside its includer'/></worldbody>")
+    finger = "<mujoco><worldbody><body name='{}'/></worldbody></mujoco>"
+    texts = {
+        "main.xml": "<mujoco><include file='parts/hand.xml'/></mujoco>",
+        "parts/hand.xml": "<mujoco><include file='finger.xml'/></mujoco>",
+        "parts/finger.xml": finger.format("beside its includer"),
+    }
+    written_all(tmp_path, texts)
 
     def files() -> list[str]:
         paths = model_files(tmp_path / "main.xml")
@@ -147,7 +142,7 @@ def test_an_include_is_looked_for_beside_the_main_file_then_beside_its_includer(
 
     assert files() == ["main.xml", "parts/hand.xml", "parts/finger.xml"]
     assert "beside its includer" in load(tmp_path / "main.xml").body_names
-    put("finger.xml", "<worldbody><body name='beside main'/></worldbody>")
+    written(tmp_path / "finger.xml", finger.format("beside main"))
     assert files() == ["main.xml", "parts/hand.xml", "finger.xml"]
     assert "beside main" in load(tmp_path / "main.xml").body_names
 
@@ -225,8 +220,7 @@ def _empty(folder: Path) -> Path:
 @pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path: Path) -> None:
-    for name in ("crash", "hang", "memory"):
-        (folder / f"{name}.xml").write_text(GOOD)
+    written_all(folder, dict.fromkeys(("crash.xml", "hang.xml", "memory.xml"), GOOD))
     table = tmp_path / "table.json"
     survey = examine_all(find([folder]), quick=True, seconds=25, jobs=3, table=table)
     rows = {row.file: row for row in survey.models}
@@ -370,20 +364,18 @@ def test_what_is_wrong() -> None:
         assert bool(said) == bool(text), said
 
 
-def test_a_page_of_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_page_of_80_columns() -> None:
     long = replace(ROW, file="a_very_long_folder/" * 4 + "robot.xml")
     survey = Survey(
         "mujoco", (long, ROW, replace(ROW, file="c.xml", ended="x", witness=None)), (), "w"
     )
-    show(page(survey))
-    out = capsys.readouterr().out
+    out = shown(page(survey))
     assert max(map(len, out.splitlines())) <= 80
     assert_in(out, "…", "4e-4 h", "refused")
     assert "own 2e-16" in out or "own 1e-16" in out
     (row,) = [line for line in out.splitlines() if line.startswith("tendon")]
     assert row.split() == ["tendon", "3", "3", "3"]
-    show(page(Survey("mujoco", (ROW,), (), "w")))
-    out = capsys.readouterr().out
+    out = shown(page(Survey("mujoco", (ROW,), (), "w")))
     assert_in(out, "pybullet refuses it: it has a tendon", "pybullet warns: RK4")
     assert max(map(len, out.splitlines())) <= 80
 
@@ -444,13 +436,13 @@ def test_versions_and_settings_are_part_of_the_table(monkeypatch: pytest.MonkeyP
 def test_a_file_that_the_engine_alone_cannot_open_is_no_contradiction(tmp_path: Path) -> None:
     """Its mesh is in a ROS package, which the interface finds and MuJoCo does not look for."""
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n")
-    (tmp_path / "r.urdf").write_text(
+    mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"
+    arm = (
         '<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/>'
         f'{inertia}</inertial><collision><geometry><mesh filename="package://r/m.obj"/></geometry>'
         '</collision></link><joint name="j" type="continuous"><parent link="base"/>'
         '<child link="arm"/></joint></robot>'
     )
-    survey = examine_all(find([tmp_path]), quick=True)
+    survey = examine_all(find([written_all(tmp_path, {"m.obj": mesh, "r.urdf": arm})]), quick=True)
     assert survey.models[0].backends["mujoco"].equals_engine is None
     assert not survey.wrong

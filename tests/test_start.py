@@ -13,7 +13,7 @@ import pytest
 import statemachine as sm
 from statemachine.installed import ENGINES, require
 
-from .conftest import REQUIRED, ROOT, Cli, in_its_own_python, one_line
+from .conftest import REQUIRED, ROOT, Cli, in_its_own_python, one_line, written_all
 
 HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "viser", "xml.etree")
 
@@ -92,9 +92,7 @@ def test_a_clash_of_import_names_is_said_in_one_line(
 ) -> None:
     files = {name: THEIRS[name] for name in theirs}
     files |= {name: (ROOT / name).read_text() for name in ours}
-    for name, text in files.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(text)
+    written_all(tmp_path, files)
     done = subprocess.run(
         [sys.executable, *typed],
         capture_output=True,

@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -19,11 +20,10 @@ from statemachine.compare import Agreement, Comparison, compare, witness
 from statemachine.errors import ModelFileError, TraceError
 from statemachine.interface import JointType
 from statemachine.report import compare as report
-from statemachine.report import terminal
 from statemachine.runs import Trace, model_file, read, record, write
 from statemachine.runs.whole import check_place, replace_file
 
-from .conftest import Cli, one_line, one_line_error
+from .conftest import Cli, one_line, one_line_error, shown
 from .small_models import TWO_NAMELESS, model_of
 
 
@@ -62,9 +62,7 @@ def with_nan(array: Any, row: int) -> Any:
         ("contact_force", "gripper on box, normal force"),
     ],
 )
-def test_what_is_no_number_never_agrees(
-    column: str, quantity: str, box: Trace, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_number_never_agrees(column: str, quantity: str, box: Trace) -> None:
     other = changed(box, None, **{column: with_nan(box[column], 20)})
     found = compare(box, other)
     assert not found.agrees
@@ -72,8 +70,7 @@ def test_what_is_no_number_never_agrees(
     assert found.worst is not None
     assert found.worst.name == quantity
     assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
-    terminal.show(report.page(found, box, other))
-    assert "nan" not in capsys.readouterr().out
+    assert "nan" not in shown(report.page(found, box, other))
 
 
 def test_a_column_that_is_not_told_is_not_compared_and_that_is_said(box: Trace) -> None:
@@ -343,9 +340,9 @@ def test_what_is_no_file_is_written_into_and_stays(tmp_path: Path) -> None:
 def test_what_a_library_says_of_a_file_is_not_lost(tmp_path: Path) -> None:
     """Pillow and pyarrow raise an OSError that has words and no number."""
 
-    def fill(_file: object) -> None:
-        raise OSError("encoder error -2 when writing image file")
-
     with pytest.raises(OSError, match="encoder error -2"):
-        replace_file(tmp_path / "a.png", fill)
+        replace_file(
+            tmp_path / "a.png",
+            Mock(side_effect=OSError("encoder error -2 when writing image file")),
+        )
     assert list(tmp_path.iterdir()) == []

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 from collections.abc import Callable
-from contextlib import redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,11 +15,10 @@ from numpy.typing import NDArray
 
 from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
-from statemachine.page import HeatMap, Page, Traces
+from statemachine.page import HeatMap, Traces
 from statemachine.report.as_json import plain
 from statemachine.report.sweep_pictures import pictures
 from statemachine.report.sweep_report import page
-from statemachine.report.terminal import show
 from statemachine.sweep import Design, Sweep, Vary, run_sweep
 from statemachine.sweep.analysis import SweepReport, sweep_report
 from statemachine.sweep.analysis_data import SweepData, read_runs, sweep_data
@@ -33,7 +30,7 @@ from statemachine.sweep.folder import design_of, read_manifest
 from statemachine.sweep.request import MANIFEST_VERSION
 from statemachine.sweep.rows import DONE, FAILED, RowWriter, read_cells, schema_of
 
-from .conftest import Cli, assert_in, one_line, refused
+from .conftest import Cli, assert_in, one_line, refused, shown
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
@@ -113,14 +110,6 @@ def of(folder: Path, **given: Any) -> SweepReport:
     return sweep_report(folder, run=False, **given)
 
 
-def text(shown: Page) -> str:
-    """What a terminal shows of a page."""
-    out = io.StringIO()
-    with redirect_stdout(out):
-        show(shown)
-    return out.getvalue()
-
-
 def shares(found: SweepReport) -> dict[str, tuple[float, float]]:
     return {each.label: (each.first, each.total) for each in the(found.sensitivity).indices}
 
@@ -172,7 +161,7 @@ def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> 
     assert found.quantity.counts["no runs"] == 1
     assert the(found.sensitivity).samples == 128
     assert "1 of 256 samples" in the(found.sensitivity).notes[0]
-    assert "failed with DivergedError: 1" in text(page(found))
+    assert "failed with DivergedError: 1" in shown(page(found))
     assert shares(found)["y"][0] == pytest.approx(ISHIGAMI["y"][0], abs=0.15)
 
 
@@ -235,7 +224,7 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
         x, y = pair[::-1] if flipped else pair
         expected = None if (x, y) == (3.0, 0.0) else pytest.approx(1e-3 * (float(x) + float(y)))
         assert value == expected
-    said = text(page(found))
+    said = shown(page(found))
     assert_in(
         said,
         "In 2 of 10 settings mujoco and pybullet agree within 1.5 mm",
@@ -308,17 +297,17 @@ def test_its_error_is_that_of_the_seeds(tmp_path: Path) -> None:
     assert the(found.fit).error == pytest.approx(deviation / np.sqrt(seeds), rel=0.15)
     assert the(found.fit).of == "16 seeds drawn again"
     assert found.verdict == "closer"
-    said = text(page(report))
+    said = shown(page(report))
     assert "brings mujoco and pybullet closer, not together" in " ".join(said.split())
 
 
 def test_at_the_edge_and_no_value(tmp_path: Path) -> None:
     report = fitted(tmp_path / "edge", best=5.0)
     assert report.together[0].verdict == "edge"
-    assert "at the edge of the range" in " ".join(text(page(report)).split())
+    assert "at the edge of the range" in " ".join(shown(page(report)).split())
     report = fitted(tmp_path / "none", best=1.0, least=0.5)
     assert report.together[0].verdict == "none"
-    assert "No value of gain is better" in " ".join(text(page(report)).split())
+    assert "No value of gain is better" in " ".join(shown(page(report)).split())
 
 
 def test_one_curve_has_its_error_from_the_curvature(tmp_path: Path) -> None:
@@ -486,7 +475,7 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
     assert found.error == pytest.approx(0.25 / (REFINED - 1))
     assert found.verdict == "closer"
     assert found.cells == 2 * (1 + REFINED)
-    said = " ".join(text(page(dataclasses.replace(report, together=(found,)))).split())
+    said = " ".join(shown(page(dataclasses.replace(report, together=(found,)))).split())
     assert_in(
         said,
         "gain = 0.625 ± 0.031 in both brings mujoco and pybullet closer",

@@ -11,6 +11,7 @@ import tracemalloc
 import zipfile
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -259,11 +260,11 @@ def test_a_csv_and_its_contacts_are_replaced_together(
     assert seen == [{"box.csv"}, set()]  # never a new table beside old contacts
     assert "force.normal" in contacts.read_text()
 
-    def full(*_arguments: Any) -> None:
-        raise OSError(28, "No space left on device")
-
     before = table.read_bytes()
-    monkeypatch.setattr("statemachine.runs.csv_files._write_contacts", full)
+    monkeypatch.setattr(
+        "statemachine.runs.csv_files._write_contacts",
+        Mock(side_effect=OSError(28, "No space left on device")),
+    )
     with pytest.raises(OSError, match="No space"):
         export_csv(box, table)
     assert table.read_bytes() == before

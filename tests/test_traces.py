@@ -45,6 +45,7 @@ from .conftest import (
     refused,
     runs_in_silence,
     written,
+    written_all,
 )
 from .small_models import ROTOR_PENDULUM, model_of
 
@@ -504,7 +505,6 @@ def late(model, data):
 def test_mistakes_are_one_line(
     words: tuple[str, ...], says: str, code: int, cli: Cli, tmp_path: Path
 ) -> None:
-    (tmp_path / "c.py").write_text(CONTROLLERS)
-    (tmp_path / "e.py").write_text("def controller(:")
+    written_all(tmp_path, {"c.py": CONTROLLERS, "e.py": "def controller(:"})
     one_line(cli("trace", *words), says, code)
     assert not [file for file in tmp_path.iterdir() if file.suffix not in (".py", "")]

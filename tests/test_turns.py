@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -103,6 +104,12 @@ def test_a_reset_under_way_is_a_busy_data(
         USES[name](model, data)
 
 
+def _in_each_step(data: sm.Data, act: Callable[[], object]) -> None:
+    """Let something happen in a step, as in a callback or a signal handler."""
+    advance = data._advance
+    object.__setattr__(data, "_advance", lambda *args: (advance(*args), act()))
+
+
 def test_another_data_is_not_refused(model: sm.Model) -> None:
     """The Model, and what its Data share behind it, may be used by all threads."""
     with sm.make_data(model) as data, sm.make_data(model) as other:
@@ -123,15 +130,9 @@ def test_a_hook_may_use_what_its_own_data_offers(
     mujoco_arm: sm.Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A backend's hook, a callback, a signal handler: the same thread is no second one."""
-    seen: list[float] = []
+    seen: list[object] = []
     with sm.make_data(mujoco_arm) as data:
-        advance = data._advance
-
-        def looking(*args: object) -> None:
-            advance(*args)
-            seen.append(float(data.site_xpos[0, 0]) + sm.get_state(mujoco_arm, data).time)
-
-        object.__setattr__(data, "_advance", looking)
+        _in_each_step(data, lambda: seen.append((data.site_xpos, sm.get_state(mujoco_arm, data))))
         sm.step(mujoco_arm, data)
     assert len(seen) == 1
 
@@ -196,11 +197,8 @@ def test_a_state_that_is_refused_leaves_the_data_as_it_was() -> None:
     with opened(sm.load("so101"), nstep=3) as (model, data):
         before = sm.get_state(model, data)
 
-        def refuse(self: MujocoData, state: sm.State) -> None:
-            raise BadInputError("no")
-
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(MujocoData, "_set_state", refuse)
+            patch.setattr(MujocoData, "_set_state", Mock(side_effect=BadInputError("no")))
             with pytest.raises(BadInputError):
                 sm.set_state(model, data, before)
         assert sm.get_state(model, data) == before
@@ -288,13 +286,7 @@ raise SystemExit(status)
 def test_a_data_closed_by_a_signal_handler_in_a_step_says_so(mujoco_arm: sm.Model) -> None:
     """What a callback does to its own Data holds when the step around it has ended."""
     data = sm.make_data(mujoco_arm)
-    advance = data._advance
-
-    def closing(*args: object) -> None:
-        advance(*args)
-        data.close()
-
-    object.__setattr__(data, "_advance", closing)
+    _in_each_step(data, data.close)
     sm.step(mujoco_arm, data)
     with pytest.raises(ClosedDataError):
         sm.step(mujoco_arm, data)

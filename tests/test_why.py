@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-import io
 import json
 import warnings
 from dataclasses import replace
@@ -21,13 +19,12 @@ from statemachine.compare.why.settings import NEEDS, TITLES
 from statemachine.compare.why.shapley import shapley
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, UnknownNameError
 from statemachine.interface import Model
-from statemachine.report import terminal
 from statemachine.report import why as report
 from statemachine.report.as_json import dumps
 from statemachine.runs import record_scenario
 from statemachine.runs.scenarios import Scenario, scenario
 
-from .conftest import ROOT, Cli, need_engine, one_line, opened, refused, registered, written
+from .conftest import ROOT, Cli, need_engine, one_line, opened, refused, registered, shown, written
 
 HOLD = replace(scenario("hold"), seconds=0.6)  # long enough to touch the floor
 FALL = replace(scenario("fall"), seconds=5.0)  # and to meet a limit
@@ -45,13 +42,6 @@ def edited(model: Model, **arrays: Any) -> Model:
     for name, value in arrays.items():
         getattr(made.raw, name)[:] = value
     return made.replace()  # so that what the Model tells follows
-
-
-def rendered(page: Any) -> str:
-    """A page as a terminal of 80 columns shows it."""
-    with contextlib.redirect_stdout(io.StringIO()) as said:
-        terminal.show(page)
-    return said.getvalue()
 
 
 def shares(result: Explanation) -> dict[str, float]:
@@ -583,7 +573,7 @@ def test_the_parts_of_an_engines_settings_are_those_of_runs_by_hand(
 @pytest.mark.slow
 def test_pages_fit_and_say_what_was_found(explanations: Any) -> None:
     for result in explanations.values():
-        assert max(map(len, rendered(report.page(result)).splitlines())) <= 80
+        assert max(map(len, shown(report.page(result)).splitlines())) <= 80
         json.loads(dumps(result))
 
 
