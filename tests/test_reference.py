@@ -21,7 +21,7 @@ def _slow(group: str) -> Any:
     return group if group in QUICK else pytest.param(group, marks=pytest.mark.slow)
 
 
-@pytest.mark.parametrize("group", map(_slow, GROUPS))
+@pytest.mark.parametrize("group", [_slow(group) for group in GROUPS])
 def test_the_figures_are_those_of_the_reference(group: str) -> None:
     if absent(group):
         assert "shared" not in REQUIRED, f"{group} is not beside the checkout"
