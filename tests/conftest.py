@@ -393,13 +393,14 @@ def one_line(done: subprocess.CompletedProcess[str], says: str, code: int = 2) -
 
 
 @pytest.fixture
-def here(capsys: pytest.CaptureFixture[str]) -> Cli:
+def here(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Cli:
     """Run the command line in this process."""
 
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         words = [str(word) for word in arguments]
+        monkeypatch.setattr(sys, "argv", ["statemachine", *words])
         try:
-            code = main(words)
+            code = main()
         except SystemExit as end:  # of argparse
             code = int(end.code or 0)
         return subprocess.CompletedProcess(words, code, *capsys.readouterr())

@@ -34,7 +34,7 @@ from statemachine.probes.audit.points import points
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
-from .conftest import Cli, Patch, around, assert_in, need_engine, one_line, registered
+from .conftest import Cli, Patch, around, assert_in, need_engine, registered
 from .small_models import loaded, model_of
 
 SCENE = "so101/scene_box"
@@ -619,11 +619,6 @@ def test_a_broken_promise_is_exit_code_1(
     after("_set_state", forget_warm_start)(monkeypatch)
     assert main(["audit", "--steps", "10"]) == 1
     assert "yes, broken" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("wrong", [("--steps", "0"), ("--seed=-1",), ("--backend", "mujcoo")])
-def test_bad_input_is_one_line(cli: Cli, wrong: tuple[str, ...]) -> None:
-    one_line(cli("audit", *wrong), "")
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.grading.watch import engine_watched
 from statemachine.grading.worlds import ExerciseWorld, Scenes
 
-from .conftest import ROOT, Cli, assert_in, need_engine, one_line, processes_with, written_all
+from .conftest import ROOT, Cli, assert_in, need_engine, processes_with, written_all
 from .exercises import RIGHT, WRONG, Attempt
 
 for _module in ("gravity", "state", "forward", "replay"):
@@ -458,23 +458,6 @@ def test_the_students_file_is_still_to_be_written(cli: Cli) -> None:
     assert (found["right"], found["passed"]) == (0, False)
     assert [each["function"] for each in found["functions"]] == list(JUDGES)
     assert {each["written"] for each in found["functions"]} == {False}
-
-
-def test_bad_input_is_one_line(tmp_path: Path, here: Cli) -> None:
-    (tmp_path / "picture.py").write_bytes(b"\x89PNG\0\0")
-    (tmp_path / "notes.txt").write_text("hello")
-    (tmp_path / "empty").mkdir()
-    for arguments, word in (
-        (("nowhere.py",), "there is no file nowhere.py"),
-        ((str(tmp_path / "empty"),), "no Python files in"),
-        ((str(tmp_path / "picture.py"),), "no Python file"),
-        ((str(tmp_path / "notes.txt"),), "does not end in .py"),
-        ((str(STUDENT.with_name("test_arm.py")),), "did you mean statemachine check --mutants"),
-        ((str(SOLUTION), "--backend", "mujcoo"), "Did you mean 'mujoco'?"),
-        ((str(SOLUTION), "--time-limit", "0"), "above 0 s"),
-        ((str(SOLUTION), "--time-limit", "nan"), "above 0 s"),
-    ):
-        one_line(here("check", *arguments), word)
 
 
 def test_a_missing_engine_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -459,17 +459,3 @@ def test_where_to_write_is_asked_before_anything_is_judged(
     files = [str(SOLUTION)] if option == "--gradescope" else [str(SOLUTION), str(TEMPLATE)]
     one_line(here("check", *files, option, target), says)
     assert judged == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["exercises/step_loop.py", "--csv", "g.csv"], "several files, or a folder"),
-        (["exercises/a.py", "exercises/b.py", "--gradescope", "r.json"], "goes with one FILE"),
-        (["--mutants", "exercises/test_arm.py", "--jobs", "2"], "several files, or a folder"),
-        ([], "expected one of FILE and --mutants"),
-    ],
-)
-def test_options_that_do_not_go_together(here: Cli, arguments: list[str], says: str) -> None:
-    words = [ROOT / word if word.startswith("exercises") else word for word in arguments]
-    one_line(here("check", *words), says)

@@ -21,7 +21,7 @@ from rich.cells import cell_len
 from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import ROOT, Cli, assert_in, assert_not_in, need_engine, one_line, written
+from .conftest import ROOT, Cli, assert_in, assert_not_in, written
 from .small_models import mjcf
 
 QUICK = {
@@ -139,53 +139,6 @@ def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
     assert places == sorted(places)
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert done.stdout.count("\n") < 24  # beside the prompt of a small terminal
-
-
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (("lesson", "gravty"), "Did you mean gravity?"),
-        (("lesson", "hold", "--bakend", "pybullet"), "Did you mean --backend?"),
-        (("lesson", "11"), "no '11'"),
-        (("lesson", "--from", "gravty"), "Did you mean gravity?"),
-        (("check",), "expected one of FILE"),
-        (("check", "--mutants"), "expected one argument"),
-        (("compare", "hold", "--html"), "expected one argument: --html PAGE.html"),
-        (("compare", "hold", "--html", "--no-why"), "expected one argument: --html PAGE.html"),
-        (("lessn",), "Did you mean lesson?"),
-        (("gravity",), "Did you mean statemachine lesson gravity?"),
-        (("lesson", "fingertip"), "Did you mean statemachine fingertip?"),
-        (("lesson", "gravity", "--backend", "mujcoo"), "Did you mean 'mujoco'?"),
-        (("lesson", "gravity", "--model", "so101/scen"), "Did you mean 'so101/scene'?"),
-        (("lesson", "gravity", "--model", "nowhere.xml"), "does not exist"),
-        (("lesson", "gravity", "--menagerie", "nowhere"), "does not exist"),
-        (("lesson", "gravity", "--joint", "elbow"), "elbow_flex"),
-        (("lesson", "gravity", "--seconds", "-1"), "above 0"),
-        (("lesson", "gravity", "--seconds", "nan"), "above 0"),
-        (("lesson", "gravity", "--seconds", "inf"), "above 0"),
-        (("lesson", "gravity", "--seconds", "long"), "invalid float"),
-        (("lesson", "forward", "--value", "nan"), "not a finite number"),
-        (("lesson", "hold", "--target", "1,2"), "6 numbers"),
-        (("lesson", "hold", "--target", "a,b"), "not a list of numbers"),
-        (("lesson", "hold", "--target", "-1,2"), "--target=-1,2"),
-        (("lesson", "hold", "--target", ""), "6 numbers"),
-        (("lesson", "hold", "--seconds", "1e9"), "at most 10,000,000"),
-        (("lesson", "speed", "--steps", "9999999999"), "below"),
-        (("lesson", "replay", "--steps", "0"), "at least 1"),
-        (("lesson", "replay", "--break", "legs"), "extra-step"),
-        (("lesson", "replay", "--ctrl", "1,nan,0,0,0,0"), "not a finite number"),
-        (("lesson", "speed", "--steps", "1.5"), "invalid int"),
-        (("fingertip", "--poses", "0"), "at least 1"),
-        (("fingertip", "--poses", "1"), "at least 2"),
-        (("fingertip", "--seed", "-1"), "negative"),
-        (("fingertip", "--site", "tip"), "gripperframe"),
-        (("--colour",), "unrecognized"),
-    ],
-)
-def test_every_mistake_is_one_clear_line(cli: Cli, arguments: tuple[str, ...], word: str) -> None:
-    if arguments[0] == "fingertip":
-        need_engine("pinocchio")
-    one_line(cli(*arguments), word)
 
 
 def in_a_shell(command: str) -> subprocess.CompletedProcess[str]:

@@ -439,26 +439,6 @@ def test_the_command(cli: Cli) -> None:
     assert {each["verdict"] for each in found["agreements"]} == {"agrees"}
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ((), "compare what?"),
-        (("hodl",), "Did you mean 'hold'?"),
-        (("hold", "gravity"), "runs on both engines"),
-        (("hold", "x.npz"), "'hold' is no trace"),
-        (("x.npz",), "x.npz"),
-        (("hold", "--backends", "mujoco", "bullet"), "no backend named 'bullet'"),
-        (("hold", "--tolerance", "joint=1mm"), "joint is measured in deg, rad"),
-        (("hold", "--timestep", "-1"), "timestep must be above 0"),
-        (("hold", "--timestep", "10"), "a timestep of 10 s is longer than the run of 2 s"),
-        (("hold", "--seconds", "0"), "seconds must be above 0"),
-        (("hold", "--model", "so101/scene_box", "--defaults", "both"), "both"),
-    ],
-)
-def test_mistakes_are_one_line(words: tuple[str, ...], says: str, here: Cli) -> None:
-    one_line(here("compare", *words), says)
-
-
 # What does not move at all, and names that a plot could take for formulas.
 
 

@@ -303,35 +303,6 @@ def test_robots_that_share_nothing_are_refused(files: Path) -> None:
         run_sides(asked("gravity", Side(str(files / "arm.xml")), Side(str(files / "ball.xml"))))
 
 
-@pytest.mark.parametrize(
-    ("typed", "says"),
-    [
-        ("--models arm.xml,turned.xml", "two words: statemachine compare --models arm.xml turned"),
-        ("hold arm.xml,turned.xml", "two sides are two words: type arm.xml turned.xml"),
-        ("hold arm.xml@ turned.xml", "arm.xml@ names no engine: type arm.xml@mujoco, or arm.xml"),
-        ("hold arm.xml:mujoco turned.xml", "an engine stands behind an @: type arm.xml@mujoco"),
-        ("hold arm.xml turned.xml@bullet", "no engine named 'bullet'"),
-        ("--models arm.xml turned.xml@bullet", "no engine named 'bullet'"),
-        ("hold arm.xml timestep 0.001 turned.xml", "an option of a side: type timestep=VALUE"),
-        ("hold arm.xml timestep=abc turned.xml", "timestep=abc is no value"),
-        ("hold arm.xml turned.xml --map a", "--map wants A=B"),
-        ("hold arm.xml turned.xml --map elbow=nosuch", "in turned.xml named 'nosuch'"),
-        ("hodl arm.xml turned.xml", "Did you mean 'hold'?"),
-        ("hold . turned.xml", ". is a folder: name a file in it"),
-        ("hold arm.xml turned.xml ball.xml", "compare takes two"),
-        ("hold arm.xml", "one side only: name the other"),
-        ("hold arm.xml turned.xml --why --jobs 0", "jobs must be at least 1; got 0"),
-        ("hold arm.xml turned.xml --jobs 2", "--jobs goes with --why"),
-    ],
-)
-def test_what_is_mistyped_is_one_line(
-    files: Path, monkeypatch: pytest.MonkeyPatch, here: Cli, typed: str, says: str
-) -> None:
-    monkeypatch.chdir(files)
-    (files / "ball.xml").write_text((files / "arm.xml").read_text())
-    one_line(here("compare", *typed.split()), says)
-
-
 # What is run.
 
 
@@ -454,36 +425,6 @@ def test_words_are_sorted_into_what_and_sides() -> None:
     assert split_words(["x.py:f", "so101", "so101"])[0] == ("x.py:f",)
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("hold", "so101"), "name the other, as in: statemachine compare hold so101"),
-        (("x.py:f",), "runs on two sides, as in: statemachine compare x.py:f so101@mujoco so101@"),
-        (("hold", "so101", "so101", "so101"), "3 sides"),
-        (("arm.xml", "heavy.xml"), "statemachine compare hold arm.xml heavy.xml runs"),
-        (("arm.xml", "heavy.xml"), "statemachine compare --models arm.xml heavy.xml lists"),
-        (("so101", "so101/scene"), "two sides need something to do first"),
-        (("hold", "so101", "so101", "--model", "so101"), "--model goes without sides"),
-        (("hold", "so101", "so101", "--backends", "mujoco", "mujoco"), "FILE@ENGINE"),
-        (("hold", "so101", "so101", "--defaults", "engine"), "FILE@ENGINE:engine"),
-        (("hold", "--model", "a.xml", "--model", "b.xml"), "compare hold a.xml b.xml"),
-        (("hold", "--map", "a=b"), "--map is of two sides"),
-        (("hold", "--every", "2"), "--every goes with FILE.py:FUNCTION"),
-        (("hold", "so101", "so101", "--keyframe", "x"), "--keyframe goes with FILE.py:FUNCTION"),
-        (("own.py:hold", "arm.xml", "arm.xml", "--every", "0"), "at least 1; got 0"),
-    ],
-)
-def test_mistakes_say_what_to_type(
-    words: tuple[str, ...],
-    says: str,
-    files: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    here: Cli,
-) -> None:
-    monkeypatch.chdir(files)
-    one_line(here("compare", *words), says)
-
-
 def test_the_command_shows_both_loops(files: Path, cli: Cli) -> None:
     words = ("own.py:feedback", "--every", "2", "arm.xml", "heavy.xml", "--seconds", "0.4")
     result = json.loads(cli("compare", *words, "--json").stdout)
@@ -553,4 +494,3 @@ def test_parts_that_cannot_be_given_are_one_clear_line(
     whole.save_binary(tmp_path / "b.mjb")
     binary = ("whole.xml", "b.mjb", "--trust-binary")
     one_line(here("compare", "hold", *binary, "--floor", "left"), "b.mjb is binary")
-    one_line(here("compare", "hold", "--floor", "left"), "two sides")

@@ -36,7 +36,6 @@ from .conftest import (
     around,
     in_its_own_python,
     need_engine,
-    one_line,
     refused,
     written,
 )
@@ -522,18 +521,6 @@ def test_the_page_reads_well_piped(cli: Cli, arguments: tuple[str, ...]) -> None
     assert all(line == line.rstrip() for line in lines)
     assert all(word not in done.stdout for word in ("\x1b", "✗", UNDECIDED))
     assert all(name in done.stdout for name in ENGINES)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("gravty",), "Did you mean 'gravity'?"),
-        (("--backend", "mujcoo"), "Did you mean 'mujoco'?"),
-        (("gravity", "--calls"), "takes no question"),
-    ],
-)
-def test_bad_input_is_one_line(cli: Cli, arguments: tuple[str, ...], words: str) -> None:
-    one_line(cli("conventions", *arguments), words)
 
 
 @pytest.mark.parametrize("more", [(), ("--calls",)])

@@ -112,14 +112,6 @@ def test_the_command_line_answers_both_questions(cli: Cli) -> None:
     assert [stage["stage"] for stage in told["stages"]][:2] == ["kinematics", "mass matrix"]
 
 
-@pytest.mark.parametrize(
-    "words",
-    [("--one-step", "--converge"), ("--converge", "--why"), ("--one-step", "--uncertainty=1mm")],
-)
-def test_options_that_do_not_go_together_are_refused(words: tuple[str, ...], here: Cli) -> None:
-    one_line(here("compare", "hold", *words), "goes without")
-
-
 def test_recorded_runs_have_no_step_to_take_again(here: Cli, tmp_path: Path) -> None:
     file = write(record(sm.load("so101"), seconds=0.1), tmp_path / "a.npz")
     one_line(here("compare", file, file, "--one-step"), "runs both sides")

@@ -824,22 +824,6 @@ def test_two_worst_joints_are_named() -> None:
     assert "worst joint" not in said
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--from", "9", "hold"), "statemachine lesson --from time, or statemachine lesson hold"),
-        (("--from", "hold", "questions"), "statemachine lesson questions"),
-        (("time", "--seconds", "3"), "--seconds goes with --realtime"),
-        (("hold", "--target=nan,0,0,0,0,0"), "target[0] = nan is not a finite number"),
-        (("replay", "--ctrl=0,inf,0,0,0,0"), "ctrl[1] = inf is not a finite number"),
-    ],
-)
-def test_an_option_that_would_be_ignored_or_is_none_is_refused(
-    cli: Cli, words: tuple[str, ...], said: str
-) -> None:
-    one_line(cli("lesson", *words), said)
-
-
 @pytest.mark.usefixtures("matplotlib")
 def test_pictures_of_a_lesson(tmp_path: Path, here: Cli) -> None:
     words = "lesson", "hold", "--no-questions", "--plot"

@@ -23,7 +23,7 @@ from statemachine.kinematics import Kinematics
 from statemachine.models import models_dir
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, one_line, one_line_error, written, written_all
+from .conftest import Cli, one_line_error, written, written_all
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -545,22 +545,6 @@ def test_the_command(cli: Cli, tmp_path: Path) -> None:
     assert "nothing differs that matters, to 6 digits" in same.stdout
     assert max(map(cell_len, same.stdout.splitlines())) <= 80
     assert cli("compare", "--models", "so101", "so101/scene_box", "--all").returncode == 1
-    (tmp_path / "bad.urdf").write_text("<robot")
-    for arguments, text in (
-        (("--models", "so101", "bad.urdf"), "bad.urdf: it is no XML"),
-        (("--models", "so101", "so102"), "no model named 'so102'"),
-        (("--models", "so101"), "--models wants two models, or one and --backends A B; got 1"),
-        (("--models", "so101", "so101", "so101"), "got 3"),
-        (("--models", "so101", "--backends", "mujoco", "bulet"), "no backend named 'bulet'"),
-        (("--models", "so101@mujoco", "so101", "--backends", "mujoco", "mujoco"), "say the same"),
-        (("--models", "so101", "so101", "--frame", "gripperframe"), "--frame wants A=B"),
-        (("--models", "so101", "so101", "--frame", "x=y"), "no frame in so101/so101.xml named 'x'"),
-        (("--models", "so101", "so101", "--digits", "0"), "--digits wants a number from 1 to 17"),
-        (("hold", "--models", "so101", "so101"), "hold is a run"),
-        (("--models", "so101", "so101", "--seconds", "1"), "--seconds is of a run"),
-        (("hold", "--all"), "--all goes with --models"),
-    ):
-        one_line(cli("compare", *arguments), text)
 
 
 def test_frames_that_were_given(pair: Pair) -> None:

@@ -22,7 +22,7 @@ from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
 from statemachine.report import mutants as report
 
-from .conftest import ROOT, Cli, one_line, one_line_error, opened, shown, written_all
+from .conftest import ROOT, Cli, one_line_error, opened, shown, written_all
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -336,20 +336,6 @@ def test_the_command_says_what_survives(cli: Cli) -> None:
     assert "1 of 2 faults caught" in done.stdout
     assert MUTANTS["xyzw"].hint in done.stdout
     assert cli("check", "--mutants", str(EXERCISE), *only[2:]).returncode == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["nothing.py"], "no file nothing.py"),
-        (["."], "no file ."),
-        ([str(ROOT / "README.md")], "README.md is no Python file"),
-        ([str(EXERCISE), "--only", "xyz"], "Did you mean 'xyzw'?"),
-        ([str(EXERCISE), "--backend", "mujcoo"], "known: mujoco, pybullet"),
-    ],
-)
-def test_a_mistake_is_one_line(cli: Cli, arguments: list[str], message: str) -> None:
-    one_line(cli("check", "--mutants", *arguments), message)
 
 
 def test_without_pytest_it_says_what_to_install(

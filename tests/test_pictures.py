@@ -389,33 +389,6 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("--plot", "a.gif"), "a figure is a file .svg, .png or .pdf"),
-        (("--film", "a.gif"), "a film is a file .webp or .mp4"),
-        (("--film", "a"), "a film is a file .webp or .mp4"),
-        (("--plot", "nowhere/a.svg"), "there is no folder nowhere"),
-        (("--film", "nowhere/a.webp"), "there is no folder nowhere"),
-        (("--plot", "folder.svg"), "is a folder"),
-        (("--film", "a.webp", "--fps", "0"), "--fps is from 1 to 60"),
-        (("--film", "a.webp", "--slow", "-1"), "--slow is from"),
-        (("--film", "a.webp", "--size", "7x9"), "width of a film is even"),
-        (("--film", "a.webp", "--size", "large"), "a size reads like 640x480"),
-        (("--fps", "10"), "--fps goes with --film"),
-        (("--fps", "30"), "--fps goes with --film"),
-        (("--plot", "a.svg", "--size", "320x240"), "--size goes with --film"),
-        (("--why", "--renderer", "auto"), "--renderer goes with --film"),
-        (("--film", "a.webp", "--why"), "go without it"),
-    ],
-)
-def test_what_cannot_be_drawn_is_said_before_anything_runs(
-    cli: Cli, tmp_path: Path, words: tuple[str, ...], says: str
-) -> None:
-    (tmp_path / "folder.svg").mkdir()
-    one_line(cli("compare", "hold", *words), says)
-
-
-@pytest.mark.parametrize(
     ("words", "module", "extra"),
     [
         (("--plot", "a.svg"), "matplotlib", "[plot]"),

@@ -52,7 +52,7 @@ from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
-from .conftest import ROOT, Cli, assert_in, one_line, refused
+from .conftest import ROOT, assert_in, refused
 
 LIMIT = 2_000_000  # bytes
 Made = tuple[Comparison, Trace, Trace, Look]
@@ -1002,23 +1002,6 @@ def test_bones_reach_from_body_to_body(hold: Made) -> None:
 
 
 # The command.
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("hold", "--html", "out.pdf"), "a report is a file .html"),
-        (("hold", "--html", "no/such/out.html"), "there is no folder no/such"),
-        (("hold", "--html", "."), "a report is a file .html"),
-        (("hold", "--no-why"), "--no-why goes with --html"),
-        (("--models", "so101", "so101", "--html", "x.html"), "--models runs nothing"),
-    ],
-)
-def test_mistakes_are_one_line_before_anything_runs(
-    cli: Cli, tmp_path: Path, words: tuple[str, ...], said: str
-) -> None:
-    one_line(cli("compare", *words), said)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_that_cannot_be_written_into(tmp_path: Path, monkeypatch: Any) -> None:

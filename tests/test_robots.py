@@ -40,7 +40,6 @@ from .conftest import (
     Cli,
     assert_in,
     need_engine,
-    one_line,
     processes_with,
     refused,
     shown,
@@ -389,13 +388,6 @@ def test_the_command(cli: Cli, folder: Path) -> None:
     assert {"file", "sha256", "nq", "backends", "witness", "faults", "ended"} <= set(row)
     done = cli("robots", str(folder / "good.xml"), "--quick", code=0)
     assert "gap without contacts" in done.stdout
-    for words, text in (
-        (["--out", "t.txt"], "ends in .csv or .json"),
-        (["--jobs", "0"], "jobs must be"),
-        (["--seconds", "0"], "seconds must be"),
-        (["--seed", "-1"], "seed must not"),
-    ):
-        one_line(cli("robots", str(folder / "good.xml"), *words), text)
 
 
 @pytest.mark.slow

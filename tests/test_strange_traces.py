@@ -234,9 +234,6 @@ def test_options_of_a_run_are_refused_with_traces(box: Trace, tmp_path: Path, cl
         (path, path, "--defaults", "engine"),
         (path, path, "--backends", "mujoco", "mujoco"),
         (path, "--seed", "3"),
-        ("hold", "--digits", "3"),
-        ("waves", "--seed=-1"),
-        ("waves", "--why", "--seed=-1"),
     ):
         one_line(cli("compare", *words), "")
 

@@ -30,7 +30,7 @@ from statemachine.sweep.folder import design_of, read_manifest
 from statemachine.sweep.request import MANIFEST_VERSION
 from statemachine.sweep.rows import DONE, FAILED, RowWriter, read_cells, schema_of
 
-from .conftest import Cli, assert_in, one_line, refused, shown
+from .conftest import assert_in, refused, shown
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
@@ -404,15 +404,8 @@ def test_an_axis_says_what_its_values_are_in() -> None:
     }  # fmt: skip
 
 
-def test_what_does_not_go_together_is_said(tmp_path: Path, here: Cli) -> None:
+def test_what_no_sweep_has_is_refused(tmp_path: Path) -> None:
     folder = agreement(tmp_path / "s")
-    for words, says in (
-        (("hold", "--out", folder, "--fit", "x"), "goes with --report"),
-        (("hold",), "--report DIR"),
-        (("hold", "--out", "there", "--report", folder), "takes no folder"),
-        (("--report", tmp_path), "is no sweep"),
-    ):
-        one_line(here("sweep", *words), says)
     refused(
         (UnknownNameError, "parameter", lambda: of(Path(folder), fit=["z"])),
         (UnknownNameError, "quantity", lambda: of(Path(folder), quantity="touch")),

@@ -40,12 +40,10 @@ from statemachine.runs.scenarios import SCENARIOS
 from .conftest import (
     ROOT,
     Cli,
-    one_line,
     opened,
     refused,
     runs_in_silence,
     written,
-    written_all,
 )
 from .small_models import ROTOR_PENDULUM, model_of
 
@@ -470,41 +468,3 @@ def test_the_command_records_plays_shows_and_exports(cli: Cli, tmp_path: Path) -
     assert cli("trace", "csv", "again.parquet").stdout.split() == [
         "again.csv", "again.contacts.csv",
     ]  # fmt: skip
-
-
-CONTROLLERS = """
-def controller(model, data):
-    return [0.1] * 6
-
-def late(model, data):
-    if data.time > 0.1:
-        return 1 / 0
-"""
-
-
-@pytest.mark.parametrize(
-    ("words", "says", "code"),
-    [
-        (("record",), "record what?", 2),
-        ((), "trace what?", 2),
-        (("record", "hold", "--controller", "c.py"), "record what?", 2),
-        (("record", "hodl"), "Did you mean 'hold'?", 2),
-        (("record", "hold", "-o", "x.csv"), ".npz or .parquet", 2),
-        (("record", "hold", "-o", "nowhere/x.npz"), "no folder nowhere", 2),
-        (("record", "hold", "--keyframe", "held"), "has its own start", 2),
-        (("record", "hold", "--seconds", "-1"), "seconds must be above 0", 2),
-        (("record", "--controller", "c.py:late"), "c.py, line 7, at 0.100 s: ZeroDivision", 2),
-        (("record", "--controller", "c.py:never"), "has no function never", 2),
-        (("record", "--controller", "cc.py"), "no controller file cc.py. Did you mean c.py?", 2),
-        (("record", "--controller", "e.py"), "e.py, line 1: SyntaxError: ", 2),
-        (("show", "c.npz"), "there is no trace c.npz", 2),
-        (("csv", "c.npz", "--contacts"), "unrecognized arguments: --contacts", 2),
-        (("show", "c.py"), ".npz or .parquet", 2),
-    ],
-)
-def test_mistakes_are_one_line(
-    words: tuple[str, ...], says: str, code: int, cli: Cli, tmp_path: Path
-) -> None:
-    written_all(tmp_path, {"c.py": CONTROLLERS, "e.py": "def controller(:"})
-    one_line(cli("trace", *words), says, code)
-    assert not [file for file in tmp_path.iterdir() if file.suffix not in (".py", "")]

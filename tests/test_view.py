@@ -34,7 +34,7 @@ from statemachine.view.session import (
 )
 from statemachine.view.viser_front import readout, warning
 
-from .conftest import ROOT, Cli, assert_in, in_its_own_python, one_line, opened, refused
+from .conftest import ROOT, assert_in, in_its_own_python, one_line, opened, refused
 from .small_models import ODD_DRIVES, model_of
 
 SCENE = "so101/scene_box"
@@ -557,32 +557,6 @@ def test_it_says_nothing_but_its_own_lines(tmp_path: Path) -> None:
         assert max(map(len, text.splitlines())) <= 80
         assert "viser" not in text
         assert f":{port} " in text
-
-
-@pytest.mark.usefixtures("viser")
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--keyframe", "hled"], "Did you mean 'held'"),
-        (["--keyframe", "7"], "7"),
-        (["--port", "70000"], "70000"),
-        (["--host", ""], "must be an address"),
-        (["--host", "192.0.2.1"], "192.0.2.1"),
-        (["--host", "no.such.host.invalid"], "no address"),
-        (["--speed", "0"], "speed"),
-        (["--speed", "nan"], "speed"),
-        (["--site", "nose"], "nose"),
-        (["--ghost", "pybulet"], "pybullet"),
-        (["--model", "so1O1"], "so101"),
-        (["--seconds", "-1"], "seconds"),
-        (["--seconds", "nan"], "seconds"),
-        (["gone.npz"], "gone.npz"),
-        (["gone.npz", "--ghost", "pybullet"], "recording"),
-        (["a.npz", "b.npz", "c.npz"], "one trace or two"),
-    ],
-)
-def test_every_mistake_is_one_line(here: Cli, arguments: list[str], words: str) -> None:
-    one_line(here("view", "--seconds", "0.1", *arguments), words)
 
 
 @pytest.mark.usefixtures("viser")

@@ -623,25 +623,6 @@ def test_files_and_settings_of_an_engine_are_explained_together(
 # The command
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--quantity", "box"), "known: joints"),
-        (("--tolerance", "joint=1deg"), "--tolerance"),
-        (("--backends", "mujoco", "pybulet"), "Did you mean 'pybullet'"),
-        (("--seconds", "0"), "above 0"),
-        (("gravity",), "one experiment"),
-        (("--model", "so101/scen"), "scen"),
-        (("--seconds", "0.1", "--timestep", "-1"), "timestep"),
-        (("--quantity", "joints"), "--why"),
-    ],
-)
-def test_a_mistake_is_one_line(arguments: tuple[str, ...], said: str, here: Cli) -> None:
-    why = () if said == "--why" else ("--why",)
-    engines = () if "--backends" in arguments else ("--backends", "mujoco", "mujoco")
-    one_line(here("compare", "hold", *arguments, *why, *engines), said)
-
-
 def test_without_pybullet_one_line_says_so(cli: Cli, without_pybullet: dict[str, str]) -> None:
     done = cli("compare", "hold", "--why", **without_pybullet)
     one_line(done, "pip install pybullet", code=3)

@@ -1,0 +1,275 @@
+"""Every mistake of a command is one line that says what to type, and nothing is written."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from .conftest import ROOT, Cli, one_line, written_all
+from .small_models import BENT, TWO_LINKS, TWO_SERVOS
+
+CONTROLLERS = """
+def controller(model, data):
+    return [0.1] * 6
+
+def late(model, data):
+    if data.time > 0.1:
+        return 1 / 0
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Files of the user: models, functions, and some that are neither."""
+    keys = BENT.format(qpos=".2 -.3")
+    arm = TWO_LINKS.format(mass="0.2", drives="".join(TWO_SERVOS), keys=keys)
+    made = written_all(
+        tmp_path_factory.mktemp("mistakes"),
+        {
+            "arm.xml": arm,
+            "ball.xml": arm,
+            "bad.urdf": "<robot",
+            "heavy.xml": arm.replace('mass="0.2"', 'mass="0.4"'),
+            "turned.xml": arm.replace("".join(TWO_SERVOS), "".join(reversed(TWO_SERVOS))),
+            "own.py": "def hold(model, data):\n    return [0.4, 0]\n",
+            "c.py": CONTROLLERS,
+            "e.py": "def controller(:",
+            "picture.py": "\x89PNG\0\0",
+            "notes.txt": "hello",
+        },
+    )
+    (made / "empty").mkdir()
+    (made / "folder.svg").mkdir()
+    return made
+
+
+@pytest.fixture
+def needed(command: str, request: pytest.FixtureRequest) -> None:
+    """Only where what the command needs is installed."""
+    for start, fixture in (("view", "viser"), ("fingertip", "pinocchio")):
+        if command.startswith(start):
+            request.getfixturevalue(fixture)
+
+
+@pytest.mark.usefixtures("needed")
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ("lesson gravty", "Did you mean gravity?"),
+        ("lesson hold --bakend pybullet", "Did you mean --backend?"),
+        ("lesson 11", "no '11'"),
+        ("lesson --from gravty", "Did you mean gravity?"),
+        ("check", "expected one of FILE"),
+        ("check --mutants", "expected one argument"),
+        ("compare hold --html", "expected one argument: --html PAGE.html"),
+        ("compare hold --html --no-why", "expected one argument: --html PAGE.html"),
+        ("lessn", "Did you mean lesson?"),
+        ("gravity", "Did you mean statemachine lesson gravity?"),
+        ("lesson fingertip", "Did you mean statemachine fingertip?"),
+        ("lesson gravity --backend mujcoo", "Did you mean 'mujoco'?"),
+        ("lesson gravity --model so101/scen", "Did you mean 'so101/scene'?"),
+        ("lesson gravity --model nowhere.xml", "does not exist"),
+        ("lesson gravity --menagerie nowhere", "does not exist"),
+        ("lesson gravity --joint elbow", "elbow_flex"),
+        ("lesson gravity --seconds -1", "above 0"),
+        ("lesson gravity --seconds nan", "above 0"),
+        ("lesson gravity --seconds inf", "above 0"),
+        ("lesson gravity --seconds long", "invalid float"),
+        ("lesson forward --value nan", "not a finite number"),
+        ("lesson hold --target 1,2", "6 numbers"),
+        ("lesson hold --target a,b", "not a list of numbers"),
+        ("lesson hold --target -1,2", "--target=-1,2"),
+        ("lesson hold --target ''", "6 numbers"),
+        ("lesson hold --seconds 1e9", "at most 10,000,000"),
+        ("lesson speed --steps 9999999999", "below"),
+        ("lesson replay --steps 0", "at least 1"),
+        ("lesson replay --break legs", "extra-step"),
+        ("lesson replay --ctrl 1,nan,0,0,0,0", "not a finite number"),
+        ("lesson speed --steps 1.5", "invalid int"),
+        ("fingertip --poses 0", "at least 1"),
+        ("fingertip --poses 1", "at least 2"),
+        ("fingertip --seed -1", "negative"),
+        ("fingertip --site tip", "gripperframe"),
+        ("--colour", "unrecognized"),
+        ("lesson --from 9 hold", "statemachine lesson --from time, or statemachine lesson hold"),
+        ("lesson --from hold questions", "statemachine lesson questions"),
+        ("lesson time --seconds 3", "--seconds goes with --realtime"),
+        ("lesson hold --target=nan,0,0,0,0,0", "target[0] = nan is not a finite number"),
+        ("lesson replay --ctrl=0,inf,0,0,0,0", "ctrl[1] = inf is not a finite number"),
+        ("conventions gravty", "Did you mean 'gravity'?"),
+        ("conventions --backend mujcoo", "Did you mean 'mujoco'?"),
+        ("conventions gravity --calls", "takes no question"),
+        ("audit --steps 0", ""),
+        ("audit --seed=-1", ""),
+        ("audit --backend mujcoo", ""),
+        ("check --mutants nothing.py", "no file nothing.py"),
+        ("check --mutants .", "no file ."),
+        ("check --mutants ROOT/README.md", "README.md is no Python file"),
+        ("check --mutants ROOT/exercises/test_arm.py --only xyz", "Did you mean 'xyzw'?"),
+        ("check --mutants ROOT/exercises/test_arm.py --backend mujcoo", "known: mujoco, pybullet"),
+        ("check ROOT/exercises/step_loop.py --csv g.csv", "several files, or a folder"),
+        ("check ROOT/exercises/a.py ROOT/exercises/b.py --gradescope r.json", "goes with one FILE"),
+        ("check --mutants ROOT/exercises/test_arm.py --jobs 2", "several files, or a folder"),
+        ("check", "expected one of FILE and --mutants"),
+        ("trace record", "record what?"),
+        ("trace", "trace what?"),
+        ("trace record hold --controller c.py", "record what?"),
+        ("trace record hodl", "Did you mean 'hold'?"),
+        ("trace record hold -o x.csv", ".npz or .parquet"),
+        ("trace record hold -o nowhere/x.npz", "no folder nowhere"),
+        ("trace record hold --keyframe held", "has its own start"),
+        ("trace record hold --seconds -1", "seconds must be above 0"),
+        ("trace record --controller c.py:late", "c.py, line 7, at 0.100 s: ZeroDivision"),
+        ("trace record --controller c.py:never", "has no function never"),
+        ("trace record --controller cc.py", "no controller file cc.py. Did you mean c.py?"),
+        ("trace record --controller e.py", "e.py, line 1: SyntaxError: "),
+        ("trace show c.npz", "there is no trace c.npz"),
+        ("trace csv c.npz --contacts", "unrecognized arguments: --contacts"),
+        ("trace show c.py", ".npz or .parquet"),
+        ("compare", "compare what?"),
+        ("compare hodl", "Did you mean 'hold'?"),
+        ("compare hold gravity", "runs on both engines"),
+        ("compare hold x.npz", "'hold' is no trace"),
+        ("compare x.npz", "x.npz"),
+        ("compare hold --backends mujoco bullet", "no backend named 'bullet'"),
+        ("compare hold --tolerance joint=1mm", "joint is measured in deg, rad"),
+        ("compare hold --timestep -1", "timestep must be above 0"),
+        ("compare hold --timestep 10", "a timestep of 10 s is longer than the run of 2 s"),
+        ("compare hold --seconds 0", "seconds must be above 0"),
+        ("compare hold --model so101/scene_box --defaults both", "both"),
+        ("compare hold --quantity box --why --backends mujoco mujoco", "known: joints"),
+        ("compare hold --tolerance joint=1deg --why --backends mujoco mujoco", "--tolerance"),
+        ("compare hold --backends mujoco pybulet --why", "Did you mean 'pybullet'"),
+        ("compare hold --seconds 0 --why --backends mujoco mujoco", "above 0"),
+        ("compare hold gravity --why --backends mujoco mujoco", "one experiment"),
+        ("compare hold --model so101/scen --why --backends mujoco mujoco", "scen"),
+        ("compare hold --seconds 0.1 --timestep -1 --why --backends mujoco mujoco", "timestep"),
+        ("compare hold --quantity joints --backends mujoco mujoco", "--why"),
+        ("compare hold --html out.pdf", "a report is a file .html"),
+        ("compare hold --html no/such/out.html", "there is no folder no/such"),
+        ("compare hold --html .", "a report is a file .html"),
+        ("compare hold --no-why", "--no-why goes with --html"),
+        ("compare --models so101 so101 --html x.html", "--models runs nothing"),
+        ("compare hold --plot a.gif", "a figure is a file .svg, .png or .pdf"),
+        ("compare hold --film a.gif", "a film is a file .webp or .mp4"),
+        ("compare hold --film a", "a film is a file .webp or .mp4"),
+        ("compare hold --plot nowhere/a.svg", "there is no folder nowhere"),
+        ("compare hold --film nowhere/a.webp", "there is no folder nowhere"),
+        ("compare hold --plot folder.svg", "is a folder"),
+        ("compare hold --film a.webp --fps 0", "--fps is from 1 to 60"),
+        ("compare hold --film a.webp --slow -1", "--slow is from"),
+        ("compare hold --film a.webp --size 7x9", "width of a film is even"),
+        ("compare hold --film a.webp --size large", "a size reads like 640x480"),
+        ("compare hold --fps 10", "--fps goes with --film"),
+        ("compare hold --fps 30", "--fps goes with --film"),
+        ("compare hold --plot a.svg --size 320x240", "--size goes with --film"),
+        ("compare hold --why --renderer auto", "--renderer goes with --film"),
+        ("compare hold --film a.webp --why", "go without it"),
+        (
+            "compare --models arm.xml,turned.xml",
+            "two words: statemachine compare --models arm.xml turned",
+        ),
+        ("compare hold arm.xml,turned.xml", "two sides are two words: type arm.xml turned.xml"),
+        (
+            "compare hold arm.xml@ turned.xml",
+            "arm.xml@ names no engine: type arm.xml@mujoco, or arm.xml",
+        ),
+        (
+            "compare hold arm.xml:mujoco turned.xml",
+            "an engine stands behind an @: type arm.xml@mujoco",
+        ),
+        ("compare hold arm.xml turned.xml@bullet", "no engine named 'bullet'"),
+        ("compare --models arm.xml turned.xml@bullet", "no engine named 'bullet'"),
+        (
+            "compare hold arm.xml timestep 0.001 turned.xml",
+            "an option of a side: type timestep=VALUE",
+        ),
+        ("compare hold arm.xml timestep=abc turned.xml", "timestep=abc is no value"),
+        ("compare hold arm.xml turned.xml --map a", "--map wants A=B"),
+        ("compare hold arm.xml turned.xml --map elbow=nosuch", "in turned.xml named 'nosuch'"),
+        ("compare hodl arm.xml turned.xml", "Did you mean 'hold'?"),
+        ("compare hold . turned.xml", ". is a folder: name a file in it"),
+        ("compare hold arm.xml turned.xml ball.xml", "compare takes two"),
+        ("compare hold arm.xml", "one side only: name the other"),
+        ("compare hold arm.xml turned.xml --why --jobs 0", "jobs must be at least 1; got 0"),
+        ("compare hold arm.xml turned.xml --jobs 2", "--jobs goes with --why"),
+        ("compare hold so101", "name the other, as in: statemachine compare hold so101"),
+        (
+            "compare x.py:f",
+            "runs on two sides, as in: statemachine compare x.py:f so101@mujoco so101@",
+        ),
+        ("compare hold so101 so101 so101", "3 sides"),
+        ("compare arm.xml heavy.xml", "statemachine compare hold arm.xml heavy.xml runs"),
+        ("compare arm.xml heavy.xml", "statemachine compare --models arm.xml heavy.xml lists"),
+        ("compare so101 so101/scene", "two sides need something to do first"),
+        ("compare hold so101 so101 --model so101", "--model goes without sides"),
+        ("compare hold so101 so101 --backends mujoco mujoco", "FILE@ENGINE"),
+        ("compare hold so101 so101 --defaults engine", "FILE@ENGINE:engine"),
+        ("compare hold --model a.xml --model b.xml", "compare hold a.xml b.xml"),
+        ("compare hold --map a=b", "--map is of two sides"),
+        ("compare hold --every 2", "--every goes with FILE.py:FUNCTION"),
+        ("compare hold so101 so101 --keyframe x", "--keyframe goes with FILE.py:FUNCTION"),
+        ("compare own.py:hold arm.xml arm.xml --every 0", "at least 1; got 0"),
+        ("view --seconds 0.1 --keyframe hled", "Did you mean 'held'"),
+        ("view --seconds 0.1 --keyframe 7", "7"),
+        ("view --seconds 0.1 --port 70000", "70000"),
+        ("view --seconds 0.1 --host ''", "must be an address"),
+        ("view --seconds 0.1 --host 192.0.2.1", "192.0.2.1"),
+        ("view --seconds 0.1 --host no.such.host.invalid", "no address"),
+        ("view --seconds 0.1 --speed 0", "speed"),
+        ("view --seconds 0.1 --speed nan", "speed"),
+        ("view --seconds 0.1 --site nose", "nose"),
+        ("view --seconds 0.1 --ghost pybulet", "pybullet"),
+        ("view --seconds 0.1 --model so1O1", "so101"),
+        ("view --seconds 0.1 --seconds -1", "seconds"),
+        ("view --seconds 0.1 --seconds nan", "seconds"),
+        ("view --seconds 0.1 gone.npz", "gone.npz"),
+        ("view --seconds 0.1 gone.npz --ghost pybullet", "recording"),
+        ("view --seconds 0.1 a.npz b.npz c.npz", "one trace or two"),
+        ("compare --models so101 bad.urdf", "bad.urdf: it is no XML"),
+        ("compare --models so101 so102", "no model named 'so102'"),
+        ("compare --models so101", "--models wants two models, or one and --backends A B; got 1"),
+        ("compare --models so101 so101 so101", "got 3"),
+        ("compare --models so101 --backends mujoco bulet", "no backend named 'bulet'"),
+        ("compare --models so101@mujoco so101 --backends mujoco mujoco", "say the same"),
+        ("compare --models so101 so101 --frame gripperframe", "--frame wants A=B"),
+        ("compare --models so101 so101 --frame x=y", "no frame in so101/so101.xml named 'x'"),
+        ("compare --models so101 so101 --digits 0", "--digits wants a number from 1 to 17"),
+        ("compare hold --models so101 so101", "hold is a run"),
+        ("compare --models so101 so101 --seconds 1", "--seconds is of a run"),
+        ("compare hold --all", "--all goes with --models"),
+        ("compare hold --one-step --converge", "goes without"),
+        ("compare hold --converge --why", "goes without"),
+        ("compare hold --one-step --uncertainty=1mm", "goes without"),
+        ("compare hold --floor left", "two sides"),
+        ("compare hold --digits 3", ""),
+        ("compare waves --seed=-1", ""),
+        ("compare waves --why --seed=-1", ""),
+        ("sweep hold --out t --fit x", "goes with --report"),
+        ("sweep hold", "--report DIR"),
+        ("sweep hold --out t --report d", "takes no folder"),
+        ("sweep --report .", "is no sweep"),
+        ("sweep hold --out ''", "has no name"),
+        ("robots arm.xml --out t.txt", "ends in .csv or .json"),
+        ("robots arm.xml --jobs 0", "jobs must be"),
+        ("robots arm.xml --seconds 0", "seconds must be"),
+        ("robots arm.xml --seed -1", "seed must not"),
+        ("check nowhere.py", "there is no file nowhere.py"),
+        ("check empty", "no Python files in"),
+        ("check picture.py", "no Python file"),
+        ("check notes.txt", "does not end in .py"),
+        ("check ROOT/exercises/test_arm.py", "did you mean statemachine check --mutants"),
+        ("check ROOT/teaching/solutions/step_loop.py --backend mujcoo", "Did you mean 'mujoco'?"),
+        ("check ROOT/teaching/solutions/step_loop.py --time-limit 0", "above 0 s"),
+        ("check ROOT/teaching/solutions/step_loop.py --time-limit nan", "above 0 s"),
+    ],
+)
+def test_a_mistake_is_one_line(
+    command: str, says: str, folder: Path, here: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    there = sorted(folder.rglob("*"))
+    one_line(here(*(word.replace("ROOT", str(ROOT)) for word in shlex.split(command))), says)
+    assert sorted(folder.rglob("*")) == there
