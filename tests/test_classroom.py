@@ -127,10 +127,13 @@ def test_of_several_files_the_exercises_own_name_counts(tmp_path: Path) -> None:
     assert submission_in(tmp_path) == tmp_path / "step_loop.py"
 
 
-def test_a_folder_with_nothing_but_tests(tmp_path: Path) -> None:
+def test_a_folder_with_nothing_but_tests_and_no_jobs(tmp_path: Path, folder: Path) -> None:
     (tmp_path / "test_arm.py").write_text("def test_nothing(): ...\n")
-    with pytest.raises(BadInputError, match=r"Did you mean .* --mutants .*test_arm.py\?"):
-        submission_in(tmp_path)
+    mutants = r"Did you mean .* --mutants .*test_arm.py\?"
+    refused(
+        (BadInputError, mutants, lambda: submission_in(tmp_path)),
+        (BadInputError, "at least 1", lambda: judge_all(submissions([folder]), "mujoco", jobs=0)),
+    )
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
@@ -404,11 +407,6 @@ def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -
     (row,) = csv.DictReader(io.StringIO(csv_text(rows_of(entries))))
     assert row["file"] == f"'{evil.name}"
     assert row["remarks"] == "it is refused"
-
-
-def test_jobs_must_be_some(folder: Path) -> None:
-    with pytest.raises(BadInputError, match="at least 1"):
-        judge_all(submissions([folder]), "mujoco", jobs=0)
 
 
 def test_all_of_a_students_folder_belongs_to_the_file(tmp_path: Path) -> None:

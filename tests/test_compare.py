@@ -252,12 +252,6 @@ def test_what_makes_it_less_than_a_comparison_of_engines_is_said(hold: Trace, bo
     assert_in(notes, "different model files", "missing on one side: box", "experiments are two")
 
 
-def test_traces_of_two_robots_share_nothing(hold: Trace) -> None:
-    names = tuple(f"other_{name}" for name in hold.header.joints)
-    with pytest.raises(TraceError, match="no joint in common"):
-        compare(hold, Trace(dataclasses.replace(hold.header, joints=names), hold.columns))
-
-
 def test_joints_without_names_are_each_compared(tmp_path: Path) -> None:
     trace = record(
         model_of(tmp_path, NAMELESS_JOINTS),
@@ -310,9 +304,17 @@ def test_tolerances_are_read_in_their_units(hold: Trace) -> None:
     ],
 )
 def test_what_is_no_tolerance(word: str) -> None:
+    refused((BadInputError, "", lambda: parse_tolerances([word])))
+
+
+def test_what_cannot_be_compared_is_refused(hold: Trace, no_pybullet: None) -> None:
+    names = tuple(f"other_{name}" for name in hold.header.joints)
+    other = Trace(dataclasses.replace(hold.header, joints=names), hold.columns)
+    request = Request(("hold",), seconds=1.0)  # which was not recorded
     refused(
-        (BadInputError, "", lambda: parse_tolerances([word])),
+        (TraceError, "no joint in common", lambda: compare(hold, other)),
         (UnknownNameError, "kind of quantity", lambda: parse_tolerances(["elbow=1"])),
+        (MissingEngineError, "pybullet is not installed", lambda: run_sides(request)),
     )
 
 
@@ -417,11 +419,6 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
     if defaults == "model":
         assert found.agrees == (name in ("droop", "fall", "waves"))
     assert report.page(found, one, two, said=run.said).blocks
-
-
-def test_what_was_not_recorded_needs_the_engine(no_pybullet: None) -> None:
-    with pytest.raises(MissingEngineError, match="pybullet is not installed"):
-        run_sides(Request(("hold",), seconds=1.0))
 
 
 # The command.

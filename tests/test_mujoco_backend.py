@@ -181,11 +181,14 @@ def test_states_of_models_that_differ_in_names_only_are_told_apart(tmp_path: Pat
     assert states[0]["ctrl"].shape == (0,)
 
 
-def test_hidden_parts_of_a_state_must_be_numbers() -> None:
+def test_hidden_parts_of_a_state_must_be_numbers_and_nobody_is_no_model() -> None:
+    nobody = None
     with opened(sm.load("so101")) as (model, data):
         data.raw.xfrc_applied[1, 0] = np.nan
-        with pytest.raises(BadInputError, match="state"):
-            sm.get_state(model, data)
+        refused(
+            (BadInputError, "state", lambda: sm.get_state(model, data)),
+            (TypeError, "", lambda: sm.step(nobody, data)),  # pyright: ignore[reportArgumentType]
+        )
 
 
 def test_an_actuator_on_a_tendon_drives_no_joint(tmp_path: Path) -> None:
@@ -225,11 +228,6 @@ def test_what_raw_shows_stays_writable() -> None:
         mujoco.mj_inverse(model.raw, data.raw)
         assert not data.qacc.flags.writeable
         assert data.qacc.tolist() == [0.0] * 6
-
-
-def test_nobody_is_not_taken_for_a_model() -> None:
-    with opened(sm.load("so101")) as (_, data), pytest.raises(TypeError):
-        sm.step(None, data)  # pyright: ignore[reportArgumentType]
 
 
 def test_an_option_overrules_a_flag_of_the_file(tmp_path: Path) -> None:

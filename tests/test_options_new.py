@@ -68,20 +68,16 @@ def test_gains_are_of_servos_alone(tmp_path: Path, backend: str) -> None:
         ("mass", [1.0, 2.0], r"mass\[0\] \(world\) = 1 must be 0"),
         ("mass", [0.0, 0.0], r"mass\[1\] \(cart\) = 0 must be above 0"),
         ("mass", 1.0, "wants 2 numbers"),
+        ("kv", 1, "the model has none"),
         *(("latency", value, "latency") for value in (-0.1, 11.0, [0.1], np.nan, "long")),
     ],
 )
 def test_the_value_that_is_wrong_is_named(
     tmp_path: Path, backend: str, option: str, value: Any, says: str
 ) -> None:
-    model = cart(tmp_path, MOTOR + SERVO, backend)
+    model = cart(tmp_path, MOTOR + SERVO if "none" not in says else MOTOR, backend)
     with pytest.raises(BadInputError, match=says):
         model.replace(**{option: value})
-
-
-def test_without_a_servo_there_is_no_gain(tmp_path: Path, backend: str) -> None:
-    with pytest.raises(BadInputError, match="the model has none"):
-        cart(tmp_path, MOTOR, backend).replace(kv=1)
 
 
 def test_options_add_up_and_their_order_does_not_count(box: sm.Model) -> None:
@@ -192,12 +188,6 @@ def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, back
             worlds.reset(many, keyframe=0)
             rows = worlds.record(many, 30, ("qpos",))["qpos"][0]
         assert np.abs(rows - of).max() < 1e-9
-
-
-@pytest.mark.usefixtures("bullet")
-def test_an_interpolated_delay_is_refused_on_pybullet(tmp_path: Path) -> None:
-    with pytest.raises(UnsupportedError, match="interpolated latency"):
-        model_of(tmp_path, DELAYED.format(kept=9, interp="linear"), backend="pybullet")
 
 
 def test_latency_follows_the_timestep(arm: sm.Model) -> None:

@@ -318,6 +318,12 @@ REFUSED = {
     + '<contact><pair geom1="a" geom2="b"/></contact>',
     "gravity compensation": _world(f'<body gravcomp="1"><joint/>{_G}</body>'),
     "fluid": f'<option density="1.2"/>{_JOINT}',
+    "interpolated latency": f'{_JOINT}<actuator><motor joint="j" delay=".007" nsample="9" '
+    'interp="linear"/></actuator>',
+    "contact masks": _world(
+        '<geom name="floor" type="plane" size="2 2 .1"/><body name="two"><freejoint/>'
+        '<geom size=".1"/><geom size=".2" contype="2" conaffinity="2"/></body>'
+    ),
 }
 # The part of a file that an error has to name, where it has a name.
 NAMED = {

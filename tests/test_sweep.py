@@ -493,19 +493,20 @@ def test_a_file_of_another_sweep_is_refused(dataset: Path, tmp_path: Path) -> No
         read_cells(dataset)
 
 
-def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    sweep = prepared(small("hold"))
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(MissingEngineError, match=r"statemachine-sim\[cluster\]"):
-        run_sweep(sweep, tmp_path, scheduler="tcp://127.0.0.1:1")
-    monkeypatch.setitem(sys.modules, "joblib", None)
-    with pytest.raises(MissingEngineError, match=r"statemachine-sim\[sweep\]"):
-        run_sweep(sweep, tmp_path)
-
-
-def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
+def test_a_folder_of_something_else_and_an_extra_that_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "thesis.tex").write_text("")
+    sweep, new = prepared(small("hold")), tmp_path / "new"
+    for module in ("distributed", "joblib"):
+        monkeypatch.setitem(sys.modules, module, None)
     refused(
+        (
+            MissingEngineError,
+            r"statemachine-sim\[cluster\]",
+            lambda: run_sweep(sweep, new, scheduler="tcp://127.0.0.1:1"),
+        ),
+        (MissingEngineError, r"statemachine-sim\[sweep\]", lambda: run_sweep(sweep, new)),
         (
             BadInputError,
             r"holds thesis.tex and no sweep\.json",

@@ -43,9 +43,8 @@ from .conftest import (
     opened,
     refused,
     runs_in_silence,
-    written,
 )
-from .small_models import ROTOR_PENDULUM, model_of
+from .small_models import ROTOR_PENDULUM, mjcf, model_of
 
 INPUTS = ("time", "qpos", "qvel", "ctrl")
 
@@ -269,15 +268,6 @@ def test_the_seed_makes_the_waves() -> None:
     assert ((one.ctrl >= low) & (one.ctrl <= high)).all()
 
 
-def test_a_scenario_without_actuators_is_refused(tmp_path: Path) -> None:
-    file = written(
-        tmp_path / "bare.xml",
-        "<mujoco><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>",
-    )
-    with pytest.raises(BadInputError, match="no actuators"):
-        record_scenario(SCENARIOS["hold"], sm.load(file))
-
-
 # Playing on another engine.
 
 
@@ -292,11 +282,6 @@ def test_played_with_another_timestep_commands_hold() -> None:
     assert len(finer) == 2 * len(trace) - 1
     assert np.array_equal(finer.ctrl[::2], trace.ctrl)
     assert np.array_equal(finer.ctrl[1::2], trace.ctrl[:-1])
-
-
-def test_played_on_another_robot_it_is_refused() -> None:
-    with pytest.raises(TraceError, match="other joints"):
-        play(traced("waves"), sm.load("so101/scene_box"))
 
 
 # Files.
@@ -407,8 +392,11 @@ def test_csv_has_a_name_for_every_number(tmp_path: Path, box: Trace) -> None:
     assert float(touching[9]["force.normal"]) == box["contact_force"][9, 0]
 
 
-def test_arrays_are_read_only(box: Trace) -> None:
+def test_what_a_trace_cannot_do_is_refused(box: Trace, tmp_path: Path) -> None:
+    bare = model_of(tmp_path, mjcf("<body><joint/><geom size='.1'/></body>"))
     refused(
+        (BadInputError, "no actuators", lambda: record_scenario(SCENARIOS["hold"], bare)),
+        (TraceError, "other joints", lambda: play(traced("waves"), sm.load("so101/scene_box"))),
         (ValueError, "read-only", lambda: box.qpos.fill(1.0)),
         (UnknownNameError, "qpos", lambda: box["qposs"]),
     )

@@ -14,10 +14,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.backends import _bullet_scope as scope
 from statemachine.backends import _bullet_urdf as urdf
-from statemachine.backends._bullet_plan import Plan
-from statemachine.errors import UnsupportedError
 from statemachine.models import models_dir
 from statemachine.rotations import matrix_from_quat
 
@@ -138,16 +135,3 @@ def test_solids_of_a_capsule(zoo: Any, zoo_urdf: Path) -> None:
     assert len(list(bullet.iter("capsule"))) == 1
     assert not list(plain.iter("capsule"))
     assert len(list(plain.iter("sphere"))) == len(list(bullet.iter("sphere"))) + 2
-
-
-@pytest.mark.parametrize(
-    ("body", "word"),
-    [
-        ("<body><joint type='ball'/><geom size='1'/></body>", "ball"),
-        ("<body mocap='true'><geom size='1'/></body>", "mocap"),
-    ],
-)
-def test_what_urdf_cannot_say_is_refused(tmp_path: Path, body: str, word: str) -> None:
-    file = written(tmp_path / "x.xml", f"<mujoco><worldbody>{body}</worldbody></mujoco>")
-    with pytest.raises(UnsupportedError, match=word):
-        scope.check(Plan(sm.load(file).raw), "pybullet")

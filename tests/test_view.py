@@ -200,7 +200,13 @@ def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
 
 
 def test_a_session_refuses_what_does_not_fit(mujoco_scene: sm.Model, odd: sm.Model) -> None:
+    one, other, bare = (
+        record(model, seconds=0.05, derive=derive)
+        for model, derive in ((mujoco_scene, True), (odd, True), (mujoco_scene, False))
+    )
     refused(
+        (TraceError, "another model", lambda: TraceSession([one, other])),
+        (TraceError, "cannot be drawn", lambda: TraceSession([bare])),
         (BadInputError, "another model", lambda: LiveSession([mujoco_scene, odd])),
         (
             BadInputError,
@@ -413,18 +419,6 @@ def test_a_recording_is_played_and_sought(mujoco_scene: sm.Model) -> None:
     assert (recording.frame().steps, recording.running) == (0, True)
     with pytest.raises(BadInputError):
         recording.set_ctrl(0, 1.0)
-
-
-def test_recordings_that_do_not_fit_are_refused(odd: sm.Model) -> None:
-    one = record(sm.load("so101/scene"), seconds=0.05)
-    refused(
-        (TraceError, "another model", lambda: TraceSession([one, record(odd, seconds=0.05)])),
-        (
-            TraceError,
-            "cannot be drawn",
-            lambda: TraceSession([record(sm.load("so101/scene"), seconds=0.05, derive=False)]),
-        ),
-    )
 
 
 def test_moments_that_are_not_the_same_are_not_compared(mujoco_scene: sm.Model) -> None:
