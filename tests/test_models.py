@@ -35,8 +35,8 @@ def test_paths_are_made_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_menagerie_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    texts = dict.fromkeys(("so101.xml", "scene.xml"), "<mujoco/>")
-    home = written_all(tmp_path / "robotstudio_so101", texts)
+    home = tmp_path / "robotstudio_so101"
+    written_all(home, {"so101.xml": "<mujoco/>", "scene.xml": "<mujoco/>"})
     for root in (tmp_path, home):
         assert resolve("so101/scene", root) == home / "scene.xml"
         assert resolve("so101", root) == home / "so101.xml"

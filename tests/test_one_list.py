@@ -17,8 +17,8 @@ from .explained import ALONE, ARM, Case, changed
 
 
 def _listed(folder: Path, right: str, left: str = ARM) -> list[Difference]:
-    texts = {"left.xml": left, "right.xml": right}
-    rows = compare(*(written_all(folder, texts) / name for name in texts)).found.differences
+    written_all(folder, {"left.xml": left, "right.xml": right})
+    rows = compare(folder / "left.xml", folder / "right.xml").found.differences
     return [row for row in rows if row.matters]
 
 
