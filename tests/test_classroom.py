@@ -128,10 +128,10 @@ def test_of_several_files_the_exercises_own_name_counts(tmp_path: Path) -> None:
 
 
 def test_a_folder_with_nothing_but_tests_and_no_jobs(tmp_path: Path, folder: Path) -> None:
-    (tmp_path / "test_arm.py").write_text("def test_nothing(): ...\n")
+    only = written_all(tmp_path / "only", {"test_arm.py": "def test_nothing(): ...\n"})
     mutants = r"Did you mean .* --mutants .*test_arm.py\?"
     refused(
-        (BadInputError, mutants, lambda: submission_in(tmp_path)),
+        (BadInputError, mutants, lambda: submission_in(only)),
         (BadInputError, "at least 1", lambda: judge_all(submissions([folder]), "mujoco", jobs=0)),
     )
 
