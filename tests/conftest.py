@@ -393,17 +393,25 @@ def one_line(done: subprocess.CompletedProcess[str], says: str, code: int = 2) -
 
 
 @pytest.fixture
-def here(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Cli:
-    """Run the command line in this process."""
+def here(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Cli:
+    """Run the command line as `cli` does, in this process: for what a start would add nothing to.
 
-    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    Warnings go to pytest.
+    """
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object, code: int | None = None) -> subprocess.CompletedProcess[str]:
         words = [str(word) for word in arguments]
         monkeypatch.setattr(sys, "argv", ["statemachine", *words])
         try:
-            code = main()
+            ended = main()
         except SystemExit as end:  # of argparse
-            code = int(end.code or 0)
-        return subprocess.CompletedProcess(words, code, *capsys.readouterr())
+            ended = int(end.code or 0)
+        done = subprocess.CompletedProcess(words, ended, *capsys.readouterr())
+        assert code in (None, ended), done.stderr
+        return done
 
     return run
 

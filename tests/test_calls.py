@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import functools
 import gc
 import io
+import itertools
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -410,6 +412,40 @@ def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
         ("getJointStates", (1, [2]), {}, 0),
     ):
         assert watched.client_of(function, given, named) == client, function
+    pb: Any = installed.require("pybullet")
+    nowhere = pb.connect(pb.DIRECT)
+    pb.disconnect(nowhere)
+    for name, place in watched._BEFORE_CLIENT.items():
+        arguments: list[Any] = [0] * place
+        if name == "loadURDF":
+            arguments[:3] = ["no.urdf", (0, 0, 0), (0, 0, 0, 1)]
+        if name == "isConnected":
+            assert not pb.isConnected(nowhere)
+        else:  # the engine takes the number for a world's
+            with pytest.raises(pb.error, match="Not connected"):
+                getattr(pb, name)(*arguments, nowhere)
+        with pytest.raises(TypeError, match="at most"):  # and has no argument after it
+            getattr(pb, name)(*arguments, nowhere, nowhere)
+
+
+@pytest.mark.usefixtures("bullet")
+def test_every_call_of_the_backend_says_its_client() -> None:
+    from statemachine.engines.pybullet import calls as watched
+
+    folder = Path(backends.__file__).parent
+    files = [*folder.glob("_bullet_*.py"), folder / "pybullet_backend.py"]
+    found = []
+    for node in itertools.chain.from_iterable(
+        ast.walk(ast.parse(path.read_text(encoding="utf-8"))) for path in files
+    ):
+        match node:
+            case ast.Call(ast.Attribute(ast.Name("pb"), name), given, named):
+                if name != "connect" and "physicsClientId" not in {each.arg for each in named}:
+                    starred = any(isinstance(each, ast.Starred) for each in given)
+                    found.append((name, None if starred else len(given) - 1))
+    assert len(found) > 20
+    for name, place in found:
+        assert place in (None, watched._BEFORE_CLIENT[name]), name
 
 
 @around(MujocoData, "_recompute")

@@ -447,14 +447,14 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
     assert not verdict.passed
 
 
-def test_the_solution_passes_on_every_backend(cli: Cli, backend: str) -> None:
-    done = cli("check", str(SOLUTION), "--backend", backend, code=0)
+def test_the_solution_passes_on_every_backend(here: Cli, backend: str) -> None:
+    done = here("check", str(SOLUTION), "--backend", backend, code=0)
     assert done.stderr == ""
     assert "4 of 4 functions do what they should" in done.stdout
 
 
-def test_the_students_file_is_still_to_be_written(cli: Cli) -> None:
-    found = json.loads(cli("check", str(STUDENT), "--json", code=1).stdout)
+def test_the_students_file_is_still_to_be_written(here: Cli) -> None:
+    found = json.loads(here("check", str(STUDENT), "--json", code=1).stdout)
     assert (found["right"], found["passed"]) == (0, False)
     assert [each["function"] for each in found["functions"]] == list(JUDGES)
     assert {each["written"] for each in found["functions"]} == {False}

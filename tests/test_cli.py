@@ -1,4 +1,4 @@
-"""The command line, end to end, each time in a process of its own."""
+"""The command line, end to end; in a process of its own where its start or end is asked for."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def _json(cli: Cli, *arguments: str) -> Any:
 
 
 @pytest.mark.parametrize("lesson", LESSONS)
-def test_every_lesson_runs_and_reads_well_piped(cli: Cli, lesson: str, backend: str) -> None:
-    done = cli("lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()), code=0)
+def test_every_lesson_runs_and_reads_well_piped(here: Cli, lesson: str, backend: str) -> None:
+    done = here("lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()), code=0)
     assert done.stderr == ""
     lines = done.stdout.splitlines()
     assert len(lines) > 8
@@ -50,11 +50,11 @@ def test_every_lesson_runs_and_reads_well_piped(cli: Cli, lesson: str, backend: 
     assert "nan" not in done.stdout.lower().split()
 
 
-def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
-    page = cli("lesson", "gravity").stdout
+def test_gravity_prints_the_table_of_the_course(here: Cli) -> None:
+    page = here("lesson", "gravity").stdout
     for row in ("0.000° 0.00°", "0.033° 23.88°", "0.033° 23.89°", "0.033° 23.90°", "0.033° 23.92°"):
         assert re.search(row.replace(" ", r"\s+").replace(".", r"\."), page), row
-    found = _json(cli, "lesson", "gravity")["mujoco"]
+    found = _json(here, "lesson", "gravity")["mujoco"]
     off = found["servos_off"]
     assert off["ctrl_untouched"] is True
     # The floor holds the fallen arm, not damping or dry friction.
@@ -67,8 +67,8 @@ def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
     assert found["servos_on"]["forces"]["contact"] == 0.0
 
 
-def test_replay(cli: Cli) -> None:
-    found = _json(cli, "lesson", "replay")["mujoco"]
+def test_replay(here: Cli) -> None:
+    found = _json(here, "lesson", "replay")["mujoco"]
     assert found["identical"] is True
     assert max(found["difference"]) == 0.0
     assert len(found["contacts"]) == 600
@@ -88,16 +88,16 @@ def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
         cli("lesson", lesson, "--menagerie", str(menagerie), *QUICK.get(lesson, ()), code=0)
 
 
-def test_fingertip_of_other_models_and_frames(cli: Cli, pinocchio: None) -> None:
-    assert cli("fingertip", "--site", "baseframe").returncode == 0
+def test_fingertip_of_other_models_and_frames(here: Cli, pinocchio: None) -> None:
+    assert here("fingertip", "--site", "baseframe").returncode == 0
     scene = ("fingertip", "--model", "so101/scene_box")
-    assert_in(cli(*scene, code=0).stdout, "included files read in: 2", "own reading")
-    assert cli(*scene, "--witness", "so101").returncode == 0
+    assert_in(here(*scene, code=0).stdout, "included files read in: 2", "own reading")
+    assert here(*scene, "--witness", "so101").returncode == 0
 
 
-def test_fingertip_of_the_public_arm(cli: Cli, menagerie: Path, pinocchio: None) -> None:
+def test_fingertip_of_the_public_arm(here: Cli, menagerie: Path, pinocchio: None) -> None:
     arm = menagerie / "robotstudio_so101" / "so101.xml"
-    assert cli("fingertip", "--model", str(arm)).returncode == 0
+    assert here("fingertip", "--model", str(arm)).returncode == 0
 
 
 MOVED, LONGER = ("-0.098127", "-0.078227"), ("-0.11257 -0.028 0", "-0.11258 -0.028 0")
@@ -116,7 +116,7 @@ RENAMED = ('body name="gripper"', 'body name="hand"')
     ],
 )
 def test_fingertip_against_another_arm(
-    cli: Cli, tmp_path: Path, pinocchio: None, edits: tuple[tuple[str, str], ...], said: Any
+    here: Cli, tmp_path: Path, pinocchio: None, edits: tuple[tuple[str, str], ...], said: Any
 ) -> None:
     text = (models_dir() / "so101" / "so101.xml").read_text()
     text = re.sub(r"<mesh name.*\n|<geom class=\"look\".*\n", "", text)
@@ -124,16 +124,16 @@ def test_fingertip_against_another_arm(
         assert old in text
         text = text.replace(old, new)
     file = written(tmp_path / "other.xml", text)
-    page = cli("fingertip", "--witness", str(file))
+    page = here("fingertip", "--witness", str(file))
     assert page.returncode == bool(said)
     assert all(part in page.stdout for part in said)
-    found = json.loads(cli("fingertip", "--witness", str(file), "--json").stdout)["mujoco"]
+    found = json.loads(here("fingertip", "--witness", str(file), "--json").stdout)["mujoco"]
     assert found["agrees"] == (not said)
     assert found["position_worst"] is None or "refused" not in said
 
 
-def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
-    done = cli()
+def test_alone_it_lists_the_lessons_in_order(here: Cli) -> None:
+    done = here()
     assert done.returncode == 0
     places = [done.stdout.index(f"\n  {name} ") for name in LESSONS]
     assert places == sorted(places)
@@ -205,22 +205,22 @@ def test_gravity_at_the_moment_of_the_first_touch(cli: Cli) -> None:
         cli("lesson", "gravity", "--seconds", seconds, code=0)
 
 
-def test_gravity_of_a_slide_and_of_an_equality(cli: Cli, tmp_path: Path) -> None:
+def test_gravity_of_a_slide_and_of_an_equality(here: Cli, tmp_path: Path) -> None:
     joint = "<joint name='j' type='slide' axis='0 0 1'/>"
     body = f"<body name='p'>{joint}<geom size='0.1' mass='1'/></body>"
     rest = "<equality><joint joint1='j'/></equality>"
     rest += "<actuator><position joint='j' kp='1'/></actuator>"
     file = _model(tmp_path, body, rest)
-    page = cli("lesson", "gravity", "--model", file, "--joint", "j", code=0)
+    page = here("lesson", "gravity", "--model", file, "--joint", "j", code=0)
     assert re.search(r"held by +equality +equality", page.stdout)
     assert_in(page.stdout, "[N]", "mm")
 
 
-def test_a_body_of_the_scene_is_not_taken_for_the_robot(cli: Cli) -> None:
-    found = _json(cli, "lesson", "gravity", "--model", "so101/scene_box")["mujoco"]["servos_off"]
+def test_a_body_of_the_scene_is_not_taken_for_the_robot(here: Cli) -> None:
+    found = _json(here, "lesson", "gravity", "--model", "so101/scene_box")["mujoco"]["servos_off"]
     assert not [touch for touch in found["touches"] if touch.startswith("box")]
     assert min(found["touches"].values()) > 0.5
-    held = _json(cli, "lesson", "hold", "--model", "so101/scene_box")["mujoco"]
+    held = _json(here, "lesson", "hold", "--model", "so101/scene_box")["mujoco"]
     assert held["first_contact"] > 0.2
 
 
@@ -269,9 +269,9 @@ def test_output_that_cannot_be_written(command: str) -> None:
     ],
 )
 def test_what_a_page_says_of_a_special_case(
-    cli: Cli, arguments: tuple[str, ...], said: tuple[str, ...]
+    here: Cli, arguments: tuple[str, ...], said: tuple[str, ...]
 ) -> None:
-    page = cli(*arguments, code=0)
+    page = here(*arguments, code=0)
     assert all(part in page.stdout for part in said)
     assert "never by arithmetic" not in page.stdout or "so101" not in arguments
 
@@ -286,10 +286,10 @@ def test_what_a_page_says_of_a_special_case(
 )
 @pytest.mark.usefixtures("bullet")
 def test_each_refusal_of_a_model_is_one_line(
-    cli: Cli, tmp_path: Path, body: str | None, loads: list[str], says: str
+    here: Cli, tmp_path: Path, body: str | None, loads: list[str], says: str
 ) -> None:
     file = str(models_dir() / "so101" / "so101.urdf") if body is None else _model(tmp_path, body)
-    done = cli("lesson", "state", "--model", file, "--backend", "all", "--json")
+    done = here("lesson", "state", "--model", file, "--backend", "all", "--json")
     assert done.returncode == (0 if loads else 2)
     assert list(json.loads(done.stdout or "{}")) == loads
     assert len(done.stderr.splitlines()) == bool(says)
@@ -308,8 +308,8 @@ def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path
 
 
 @pytest.mark.parametrize("command", ["compare", "sweep"])
-def test_help_shows_few_options_and_help_all_every_one(cli: Cli, command: str) -> None:
-    few, every = cli(command, "--help").stdout, cli(command, "--help-all").stdout
+def test_help_shows_few_options_and_help_all_every_one(here: Cli, command: str) -> None:
+    few, every = here(command, "--help").stdout, here(command, "--help-all").stdout
     assert few.count("\n  --") <= 11 < every.count("\n  --")
     known = argparse.ArgumentParser()
     importlib.import_module(f"statemachine.commands.{command}").add(known)

@@ -429,9 +429,9 @@ def test_the_help_knows_the_experiments() -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-def test_the_command(cli: Cli) -> None:
-    assert max(map(len, cli("compare", "hold", code=1).stdout.splitlines())) <= 80
-    found = json.loads(cli("compare", "droop", "--json", code=0).stdout)["comparison"]
+def test_the_command(here: Cli) -> None:
+    assert max(map(len, here("compare", "hold", code=1).stdout.splitlines())) <= 80
+    found = json.loads(here("compare", "droop", "--json", code=0).stdout)["comparison"]
     assert found["agrees"] is True
     assert {each["verdict"] for each in found["agreements"]} == {"agrees"}
 
@@ -441,27 +441,27 @@ def test_the_command(cli: Cli) -> None:
 
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("form", ["html", "plot"])
-def test_a_robot_that_stands_still_agrees_with_itself(form: str, cli: Cli, tmp_path: Path) -> None:
+def test_a_robot_that_stands_still_agrees_with_itself(form: str, here: Cli, tmp_path: Path) -> None:
     (tmp_path / "still.xml").write_text(STILL)
     out = tmp_path / ("a.html" if form == "html" else "a.svg")
-    done = cli("compare", "fall", "--model", tmp_path / "still.xml", f"--{form}", out)
+    done = here("compare", "fall", "--model", tmp_path / "still.xml", f"--{form}", out)
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
     # As it is spelt in the file, or as a page escapes it.
     assert "a$b$c" in out.read_text()
 
 
 def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
-    hold: Trace, cli: Cli, tmp_path: Path
+    hold: Trace, here: Cli, tmp_path: Path
 ) -> None:
     xpos = np.array(hold["xpos"])
     xpos[len(xpos) // 2 :] = np.nan
     write(hold, tmp_path / "whole.npz")
     write(changed(hold, xpos=xpos), tmp_path / "nan.npz")
     for pair in (("nan.npz", "whole.npz"), ("whole.npz", "nan.npz")):
-        done = cli("compare", *(tmp_path / name for name in pair), "--html", tmp_path / "a.html")
+        done = here("compare", *(tmp_path / name for name in pair), "--html", tmp_path / "a.html")
         assert "Traceback" not in done.stderr
         assert (tmp_path / "a.html").stat().st_size > 100_000
-    done = cli("trace", "film", tmp_path / "nan.npz", "-o", tmp_path / "a.webp")
+    done = here("trace", "film", tmp_path / "nan.npz", "-o", tmp_path / "a.webp")
     one_line(done, "no poses of the bodies that are numbers", done.returncode)
 
 

@@ -257,16 +257,16 @@ def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-def test_a_tool_frame_that_the_right_calls_otherwise(files: Path, cli: Cli) -> None:
+def test_a_tool_frame_that_the_right_calls_otherwise(files: Path, here: Cli) -> None:
     renamed = (files / "renamed.xml").read_text().replace("gripperframe", "tcp")
     (files / "renamed.xml").write_text(renamed)
     words = ("compare", "hold", "arm.xml", "renamed.xml@pybullet", "--seconds", "0.2", "--json")
-    found = json.loads(cli(*words, "--no-chaos").stdout)
+    found = json.loads(here(*words, "--no-chaos").stdout)
     assert found["only"][1] == {"joint": [], "actuator": [], "site": []}  # found by its place
     assert "site 'gripperframe' on the left is taken for 'tcp'" in " ".join(found["unmatched"])
     names = [each["name"] for each in found["comparison"]["agreements"]]
     assert "gripperframe, position" in names
-    mapped = json.loads(cli(*words, "--no-chaos", "--map", "gripperframe=tcp").stdout)
+    mapped = json.loads(here(*words, "--no-chaos", "--map", "gripperframe=tcp").stdout)
     tip = {each["name"]: each["max"] for each in mapped["comparison"]["agreements"]}
     assert tip["gripperframe, position"] < 1e-9
 
@@ -424,9 +424,9 @@ def test_words_are_sorted_into_what_and_sides() -> None:
     assert split_words(["x.py:f", "so101", "so101"])[0] == ("x.py:f",)
 
 
-def test_the_command_shows_both_loops(files: Path, cli: Cli) -> None:
+def test_the_command_shows_both_loops(files: Path, here: Cli) -> None:
     words = ("own.py:feedback", "--every", "2", "arm.xml", "heavy.xml", "--seconds", "0.4")
-    result = json.loads(cli("compare", *words, "--json").stdout)
+    result = json.loads(here("compare", *words, "--json").stdout)
     assert [side["file"] for side in result["sides"]] == ["arm.xml", "heavy.xml"]
     assert result["commands"] == "its own"
     assert result["open_loop"]["agreements"] != result["comparison"]["agreements"]
@@ -464,21 +464,21 @@ def test_a_file_without_motors_and_floor_gets_those_of_the_other(tmp_path: Path)
 
 
 def test_what_a_side_has_nothing_of_is_said_first_and_its_switch_shows_the_rest(
-    tmp_path: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, here: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     written_all(tmp_path, {"whole.xml": _WITH.format(damping=0.3), "bare.xml": _bare(0.5)})
     words = ("compare", "hold", "whole.xml", "bare.xml", "--seconds", "0.5")
     for more in ((), ("--why",)):
-        lines = [line for line in cli(*words, *more).stdout.splitlines() if "gives" in line]
+        lines = [line for line in here(*words, *more).stdout.splitlines() if "gives" in line]
         assert ["--actuators left" in line for line in lines] == [True, False]
         assert ["--floor left" in line for line in lines] == [False, True]
     both = ("--actuators", "left", "--floor", "left", "--json", "--no-chaos")
-    found = json.loads(cli(*words, "--why", *both).stdout)
+    found = json.loads(here(*words, "--why", *both).stdout)
     assert found["missing"] == []
     assert [row["name"] for row in found["shares"]] == ["damping of swing"]
     assert found["explained"] == pytest.approx(1.0)
-    assert json.loads(cli(*words, *both).stdout)["commands"] == "the same"
+    assert json.loads(here(*words, *both).stdout)["commands"] == "the same"
 
 
 def test_parts_that_cannot_be_given_are_one_clear_line(

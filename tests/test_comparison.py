@@ -154,13 +154,13 @@ def test_the_joint_that_differs_most(types: list[int], two: Any, expected: Gap |
     )
 
 
-def test_each_quantity_is_a_test_of_junit(tmp_path: Path, cli: Cli) -> None:
+def test_each_quantity_is_a_test_of_junit(tmp_path: Path, here: Cli) -> None:
     file = tmp_path / "found.xml"
     sides = ("so101", "timestep=0.005", "so101", "timestep=0.0025")
-    told = json.loads(cli("compare", "hold", *sides, "--junit", file, "--json", code=1).stdout)
+    told = json.loads(here("compare", "hold", *sides, "--junit", file, "--json", code=1).stdout)
     agreements = {found["name"]: found["verdict"] for found in told["comparison"]["agreements"]}
     (suite,) = ElementTree.parse(file).getroot()
     failed = {case.get("name"): case.find("failure") is not None for case in suite}
     assert failed == {name: verdict != "agrees" for name, verdict in agreements.items()}
     assert int(suite.get("failures", 0)) == sum(failed.values()) > 0
-    cli("compare", "hold", "--junit", tmp_path / "no" / "such.xml", code=2)
+    here("compare", "hold", "--junit", tmp_path / "no" / "such.xml", code=2)

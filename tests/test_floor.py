@@ -156,10 +156,10 @@ def test_uncertainties_are_read_in_their_units() -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-def test_the_command_line_shows_the_floor(cli: Cli) -> None:
+def test_the_command_line_shows_the_floor(here: Cli) -> None:
     asked = ("compare", "hold", "--seconds", "0.4")
-    assert json.loads(cli(*asked, "--json").stdout)["floor"]["runs"] == 4
-    assert "chaos" not in cli(*asked, "--no-chaos").stdout
+    assert json.loads(here(*asked, "--json").stdout)["floor"]["runs"] == 4
+    assert "chaos" not in here(*asked, "--no-chaos").stdout
 
 
 def test_a_trace_has_a_floor_where_it_is_played_on_two_sides(here: Cli, tmp_path: Path) -> None:

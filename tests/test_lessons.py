@@ -441,8 +441,8 @@ def test_of_which_moment_a_step_leaves_what(backend: str) -> None:
     assert all(changes[name].same for name in ("xpos", "site_xpos", "contacts"))
 
 
-def test_what_keyframe_0_of_the_public_scene_is(cli: Cli, menagerie: Path) -> None:
-    done = cli("lesson", "reset", "--menagerie", str(menagerie), code=0)
+def test_what_keyframe_0_of_the_public_scene_is(here: Cli, menagerie: Path) -> None:
+    done = here("lesson", "reset", "--menagerie", str(menagerie), code=0)
     assert_in(" ".join(done.stdout.split()), "the robot does not touch the box", "is mistaken")
 
 
@@ -526,10 +526,10 @@ def test_the_whole_path_piped(cli: Cli) -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-def test_options_may_stand_before_the_name(cli: Cli) -> None:
+def test_options_may_stand_before_the_name(here: Cli) -> None:
     for words in (("--backend", "pybullet", "write"), ("write", "--backend", "pybullet")):
-        assert "pybullet prints" in cli("lesson", *words).stdout
-    both = cli("lesson", "--backend", "pybullet", "write", "--backend", "mujoco")
+        assert "pybullet prints" in here("lesson", *words).stdout
+    both = here("lesson", "--backend", "pybullet", "write", "--backend", "mujoco")
     assert "mujoco prints" in both.stdout
 
 
@@ -784,8 +784,8 @@ def test_what_is_typed_before_a_question_is_no_answer(monkeypatch: pytest.Monkey
     os.close(ours)
 
 
-def test_answers_are_told_where_nobody_is_asked(cli: Cli) -> None:
-    assert cli("lesson", "questions").stdout.count("Answer: ") == 6
+def test_answers_are_told_where_nobody_is_asked(here: Cli) -> None:
+    assert here("lesson", "questions").stdout.count("Answer: ") == 6
 
 
 _SMALL = {

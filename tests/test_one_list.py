@@ -62,14 +62,14 @@ def test_what_cannot_be_brought_over_is_said_with_its_reason(tmp_path):
     assert refused == {"extra joint of more"}
 
 
-def test_the_words_are_those_of_two_sides(cli: Cli, tmp_path):
+def test_the_words_are_those_of_two_sides(here: Cli, tmp_path):
     right = ARM.replace('"elbow"', '"e"').replace('name="shoulder"', 'name="s"')
     right = right.replace('joint="shoulder"', 'joint="s"')
     _listed(tmp_path, changed(right, Case('range="-2 2"', 'range="-2 0.4"', "")))
     files = str(tmp_path / "left.xml"), str(tmp_path / "right.xml")
     for option in ("--map", "--rename"):  # the name that it had
         words = ("compare", "--models", *files, option, "elbow=e", option, "shoulder=s", "--json")
-        found = json.loads(cli(*words).stdout)["found"]["differences"]
+        found = json.loads(here(*words).stdout)["found"]["differences"]
         assert [row["causes"] for row in found] == [["range of shoulder"]]
 
 

@@ -213,20 +213,20 @@ def test_what_a_reader_says_at_length_is_cut(box: Trace, tmp_path: Path) -> None
 
 
 def test_a_name_from_a_file_does_nothing_to_a_terminal(
-    box: Trace, tmp_path: Path, cli: Cli
+    box: Trace, tmp_path: Path, here: Cli
 ) -> None:
     evil = "\x1b]0;owned\x07\u202e"
     path = write(changed(box, {"experiment": evil}), tmp_path / "evil.npz")
-    played = cli("trace", "play", path, "-o", tmp_path / "played.npz")
+    played = here("trace", "play", path, "-o", tmp_path / "played.npz")
     names = write(changed(box, {"actuators": (evil, *box.header.actuators[1:])}), path)
-    refused = cli("trace", "play", names, "-o", tmp_path / "played.npz")
+    refused = here("trace", "play", names, "-o", tmp_path / "played.npz")
     assert (played.returncode, refused.returncode) == (0, 2)
     for text in (played.stdout, refused.stderr):
         assert text
         assert not {"\x1b", "\x07", "\u202e"} & set(text)
 
 
-def test_options_of_a_run_are_refused_with_traces(box: Trace, tmp_path: Path, cli: Cli) -> None:
+def test_options_of_a_run_are_refused_with_traces(box: Trace, tmp_path: Path, here: Cli) -> None:
     path = str(write(box, tmp_path / "box.npz"))
     for words in (
         (path, path, "--seconds", "1"),
@@ -235,11 +235,11 @@ def test_options_of_a_run_are_refused_with_traces(box: Trace, tmp_path: Path, cl
         (path, path, "--backends", "mujoco", "mujoco"),
         (path, "--seed", "3"),
     ):
-        one_line(cli("compare", *words), "")
+        one_line(here("compare", *words), "")
 
 
 def test_the_model_of_a_trace_is_looked_for_by_its_digest(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: Cli
 ) -> None:
     text = (
         '<mujoco><worldbody><body name="b"><joint name="j" axis="0 1 0"/>'
@@ -264,27 +264,27 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     assert witness(trace, trace) is None
     (robots / "one.xml").unlink()
     write(trace, elsewhere / "swing.npz")
-    ran = cli("trace", "play", "elsewhere/swing.npz", "-o", "played.npz", code=0)
+    ran = here("trace", "play", "elsewhere/swing.npz", "-o", "played.npz", code=0)
     assert "is not the file that the trace was recorded with" in ran.stderr
     again = read(tmp_path / "played.npz").header
     assert again.provenance.model_sha256 != trace.header.provenance.model_sha256
 
 
 def test_the_command_of_a_played_trace_says_what_was_asked(
-    box: Trace, tmp_path: Path, cli: Cli
+    box: Trace, tmp_path: Path, here: Cli
 ) -> None:
     path, out = write(box, tmp_path / "box.npz"), tmp_path / "played.npz"
-    cli("trace", "play", path, "--defaults", "engine", "--model", "so101/scene_box", "-o", out)
+    here("trace", "play", path, "--defaults", "engine", "--model", "so101/scene_box", "-o", out)
     assert read(out).header.command == (
         "statemachine trace play box.npz --backend mujoco --defaults engine --model scene_box"
     )
 
 
 @pytest.mark.usefixtures("bullet")
-def test_why_of_what_cannot_move_is_one_line(tmp_path: Path, cli: Cli) -> None:
+def test_why_of_what_cannot_move_is_one_line(tmp_path: Path, here: Cli) -> None:
     (tmp_path / "empty.xml").write_text("<mujoco/>")
     words = ("--why", "--model", tmp_path / "empty.xml", "--seconds", "0.1")
-    one_line(cli("compare", "waves", *words), "nothing in it can move")
+    one_line(here("compare", "waves", *words), "nothing in it can move")
 
 
 def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Model) -> None:

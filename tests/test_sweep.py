@@ -496,21 +496,17 @@ def test_a_file_of_another_sweep_is_refused(dataset: Path, tmp_path: Path) -> No
 def test_a_folder_of_something_else_and_an_extra_that_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "thesis.tex").write_text("")
-    sweep, new = prepared(small("hold")), tmp_path / "new"
+    thesis = written(tmp_path / "thesis.tex", "")
+    run = partial(run_sweep, prepared(small("hold")))
+    cluster = partial(run, tmp_path / "new", scheduler="tcp://127.0.0.1:1")
     monkeypatch.setitem(sys.modules, "distributed", None)
-    far = partial(run_sweep, sweep, new, scheduler="tcp://127.0.0.1:1")
-    refused((MissingEngineError, r"statemachine-sim\[cluster\]", far))
-    monkeypatch.setitem(sys.modules, "joblib", None)
     refused(
-        (MissingEngineError, r"statemachine-sim\[sweep\]", lambda: run_sweep(sweep, new)),
-        (
-            BadInputError,
-            r"holds thesis.tex and no sweep\.json",
-            lambda: run_sweep(prepared(small("hold")), tmp_path),
-        ),
-        (FileExistsError, "", lambda: run_sweep(prepared(small("hold")), tmp_path / "thesis.tex")),
+        (BadInputError, r"holds thesis.tex and no sweep\.json", partial(run, tmp_path)),
+        (FileExistsError, "", partial(run, thesis)),
+        (MissingEngineError, r"statemachine-sim\[cluster\]", cluster),
     )
+    monkeypatch.setitem(sys.modules, "joblib", None)
+    refused((MissingEngineError, r"statemachine-sim\[sweep\]", partial(run, tmp_path / "new")))
 
 
 def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> None:

@@ -445,14 +445,14 @@ def test_a_recorded_trace_is_what_the_engine_does_here(
 # The command.
 
 
-def test_the_command_records_plays_shows_and_exports(cli: Cli, tmp_path: Path) -> None:
-    done = cli("trace", "record", "hold", "--seconds", "0.2")
+def test_the_command_records_plays_shows_and_exports(here: Cli, tmp_path: Path) -> None:
+    done = here("trace", "record", "hold", "--seconds", "0.2")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("hold.mujoco.npz: 41 rows of hold on mujoco ")
-    header = json.loads(cli("trace", "show", "hold.mujoco.npz", "--json").stdout)
+    header = json.loads(here("trace", "show", "hold.mujoco.npz", "--json").stdout)
     assert header["command"] == "statemachine trace record hold --seconds 0.2"
-    assert cli("trace", "play", "hold.mujoco.npz", "-o", "again.parquet").returncode == 0
+    assert here("trace", "play", "hold.mujoco.npz", "-o", "again.parquet").returncode == 0
     assert same(read(tmp_path / "again.parquet"), read(tmp_path / "hold.mujoco.npz"))
-    assert cli("trace", "csv", "again.parquet").stdout.split() == [
+    assert here("trace", "csv", "again.parquet").stdout.split() == [
         "again.csv", "again.contacts.csv",
     ]  # fmt: skip
