@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.errors import DivergedError, ReadOnlyError, UnsupportedError
+from statemachine.errors import DivergedError, EngineError, ReadOnlyError, UnsupportedError
 
-from .conftest import registered
+from .conftest import refused, registered
 from .hidden_world import ExampleWorld
 
 
@@ -67,6 +68,19 @@ def test_what_was_not_read_before_a_stop_is_computed_after_it(
         # By another world, which starts from the moment before the last step.
         assert np.array_equal(data.xpos, twin.xpos)
         assert np.allclose(data.qfrc_constraint, twin.qfrc_constraint, atol=1e-9)
+
+
+def test_an_engine_that_gives_up_is_an_error_until_a_reset(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ExampleWorld, "errors", (OverflowError,))
+    with held(model) as data:
+        with monkeypatch.context() as patch:
+            patch.setattr(ExampleWorld, "step", Mock(side_effect=OverflowError("no memory")))
+            refused((EngineError, "MuJoCo gave up: no memory", lambda: sm.step(model, data)))
+        refused((DivergedError, "gave up", lambda: sm.step(model, data)))
+        sm.reset(model, data)
+        sm.step(model, data)
 
 
 @pytest.mark.parametrize("all_at_the_end", [False, True])
