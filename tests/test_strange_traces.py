@@ -239,7 +239,7 @@ def test_options_of_a_run_are_refused_with_traces(box: Trace, tmp_path: Path, he
 
 
 def test_the_model_of_a_trace_is_looked_for_by_its_digest(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: Cli
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
     text = (
         '<mujoco><worldbody><body name="b"><joint name="j" axis="0 1 0"/>'
@@ -264,7 +264,7 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     assert witness(trace, trace) is None
     (robots / "one.xml").unlink()
     write(trace, elsewhere / "swing.npz")
-    ran = here("trace", "play", "elsewhere/swing.npz", "-o", "played.npz", code=0)
+    ran = cli("trace", "play", "elsewhere/swing.npz", "-o", "played.npz", code=0)
     assert "is not the file that the trace was recorded with" in ran.stderr
     again = read(tmp_path / "played.npz").header
     assert again.provenance.model_sha256 != trace.header.provenance.model_sha256
