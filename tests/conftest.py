@@ -409,7 +409,9 @@ def here(
             ended = main()
         except SystemExit as end:  # of argparse
             ended = int(end.code or 0)
-        done = subprocess.CompletedProcess(words, ended, *capsys.readouterr())
+        done: subprocess.CompletedProcess[str] = subprocess.CompletedProcess(
+            words, ended, *capsys.readouterr()
+        )
         assert code in (None, ended), done.stderr
         return done
 
