@@ -620,6 +620,12 @@ def test_files_and_settings_of_an_engine_are_explained_together(
     assert result.explained + result.located == pytest.approx(1.0, abs=1e-4)
 
 
+def test_no_gap_is_nothing_to_explain(arm: Model) -> None:
+    result = explain(arm, arm.replace(), HOLD)
+    assert (result.gap, result.shares, result.found_in) == (0.0, (), ())
+    assert report.page(result).holds
+
+
 # The command
 
 
