@@ -89,7 +89,7 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("lesson replay --ctrl 1,nan,0,0,0,0", "not a finite number"),
         ("lesson speed --steps 1.5", "invalid int"),
         ("fingertip --poses 0", "at least 1"),
-        ("fingertip --poses 1", "at least 2"),
+        ("fingertip --poses 1", "poses must be from 2"),
         ("fingertip --seed -1", "negative"),
         ("fingertip --site tip", "gripperframe"),
         ("--colour", "unrecognized"),
