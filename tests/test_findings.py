@@ -129,3 +129,9 @@ def test_an_infinite_ctrl_is_clamped_on_its_way_and_in_many_worlds(
         bad = np.where(np.isinf(state.vector), np.nan, state.vector)
         with pytest.raises(BadInputError, match=r"state\['\w+'\].*not a finite number"):
             sm.set_state(model, data, replace(state, blob=bad.tobytes()))
+
+
+def test_a_divergence_is_raised_with_the_engines_defaults_too() -> None:
+    with opened(sm.load("so101", defaults="engine")) as (model, data):
+        data.qpos[0] = np.nan
+        refused((DivergedError, "", lambda: sm.step(model, data)))
