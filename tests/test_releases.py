@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,20 @@ import pytest
 
 import statemachine as sm
 from statemachine import conformance, releases
-from statemachine.backends.release_backend import Server
+from statemachine.backends.release_backend import ServedEngine, Server, served
 from statemachine.cli import main
-from statemachine.errors import BadInputError, EngineError, MissingEngineError, ModelError
+from statemachine.errors import (
+    BadInputError,
+    EngineError,
+    MissingEngineError,
+    ModelError,
+    UnsupportedError,
+)
+from statemachine.installed import engine_version
+from statemachine.interface import Behaviour
 from statemachine.worlds import make_worlds, step
 
-from .conftest import RELEASES
+from .conftest import RELEASES, registered
 from .small_models import LINKS_AND_BALL, model_of
 
 OLD, STRANGE, SAME = RELEASES
@@ -35,6 +44,11 @@ def nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user without any release."""
     monkeypatch.setenv("STATEMACHINE_ENGINES", str(tmp_path))
     return tmp_path
+
+
+def process_of(model: Any) -> int:
+    """The number of the process in which the engine of a Model runs."""
+    return Server.of(model._reading.engine).pid
 
 
 installs = pytest.mark.usefixtures("old_releases")
@@ -190,7 +204,7 @@ class TestReleases:
         whole, _ = run_of(model, 20)
         rows, data = run_of(model, 10)
         other = run_of(model, 10)[1]
-        os.kill(Server.of(OLD)._process.pid, signal.SIGKILL)
+        os.kill(process_of(model), signal.SIGKILL)
         time.sleep(0.2)
         with pytest.raises(EngineError, match="its process is gone: ended by SIGKILL"):
             sm.step(model, data)
@@ -204,9 +218,8 @@ class TestReleases:
     def test_it_ends_with_its_parent(self) -> None:
         code = (
             "import statemachine as sm, time\n"
-            "from statemachine.backends.release_backend import Server\n"
-            f"sm.load('so101', backend={OLD!r})\n"
-            f"print(Server.of({OLD!r})._process.pid, flush=True)\n"
+            "from tests.test_releases import process_of\n"
+            f"print(process_of(sm.load('so101', backend={OLD!r})), flush=True)\n"
             "time.sleep(60)"
         )
         with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as parent:
@@ -230,7 +243,7 @@ class TestReleases:
         self, request: pytest.FixtureRequest
     ) -> None:
         model = sm.load("so101", backend=OLD)
-        pid = Server.of(OLD)._process.pid
+        pid = process_of(model)
         sizes = []
         gc.disable()  # no world waits for the collector of cycles
         request.addfinalizer(gc.enable)
@@ -249,3 +262,30 @@ class TestReleases:
             worlds.ctrl[:] = HOLD
             step(worlds, 20)
             assert np.array_equal(worlds.qpos[2], run_of(model, 20)[0][-1])
+
+    def test_any_engine_by_one_file(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        with registered("made up", "tests.test_releases:load_made_up") as name:
+            outcomes = conformance.run(name)
+            model = sm.load("so101", backend=name)
+        assert model.engine_version == f"made up on {engine_version('mujoco')}"
+        assert not [outcome for outcome in outcomes if outcome.result == "failed"]
+        assert {outcome.result for outcome in outcomes} == {"passed", "skipped"}
+        assert np.array_equal(run_of(model)[0], run_of(sm.load("so101"))[0])
+        with pytest.raises(UnsupportedError):
+            model.replace(contacts=False)  # a flag
+
+
+def load_made_up(path: Path, defaults: Any = "model") -> Any:
+    """A backend of another package, whose engine is in a Python of its own."""
+    child = str(Path(__file__).with_name("made_up_child.py"))
+    engine = ServedEngine("made up", str(releases.python_of(SAME)), child, "the made-up engine")
+    native = sm.load("so101").capabilities
+    behaviours = {
+        **native.behaviours,
+        **dict.fromkeys(("contacts", "forces by part"), Behaviour("unsupported", "it tells none")),
+    }
+    flags = {"actuation", "contacts", "limits"}
+    said = replace(
+        native, options=tuple(sorted(set(native.options) - flags)), behaviours=behaviours
+    )
+    return served(engine, said)(path, defaults)

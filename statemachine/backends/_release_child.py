@@ -1,20 +1,15 @@
-"""The process of one release of MuJoCo, run by the interpreter of that release's environment.
+"""A release of MuJoCo, as `_child_server` asks it, in the Python of that release's environment.
 
-It needs NumPy and MuJoCo only, on Python 3.9 or later, and imports nothing of this package. A
-message and its answer are two lengths, a header in JSON, and bytes; it ends with its input.
+It needs NumPy and MuJoCo only, on Python 3.9 or later, and imports nothing of this package.
 """
 
 from __future__ import annotations
 
 import copy
-import json
-import os
-import struct
 
 import mujoco
 import numpy as np
 
-SIZES = struct.Struct("<QQ")
 HUGE = 1e10
 POSES = ("xpos", "xquat", "site_xpos", "site_xmat")
 FORCES = ("qacc", "qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
@@ -33,7 +28,7 @@ PARTS = {
 }
 
 
-class ReleasedWorld:
+class Simulation:
     """One MjData, and how its State is put and read."""
 
     def __init__(self, model) -> None:
@@ -52,6 +47,10 @@ class ReleasedWorld:
         data = self.data
         return np.concatenate([data.qpos, data.qvel, data.qacc_warmstart, data.act])
 
+    def command(self, ctrl) -> None:
+        """Take a command."""
+        self.data.ctrl[:] = ctrl
+
     def advance(self, steps: int, fastest: float) -> int:
         """Take engine steps up to one after which a coordinate is beyond its bound; how many."""
         model, data = self.model, self.data
@@ -61,6 +60,10 @@ class ReleasedWorld:
             if not (qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < fastest * fastest):
                 return k
         return steps
+
+    def forward(self) -> None:
+        """Derive of the present."""
+        mujoco.mj_forward(self.model, self.data)
 
     def derived(self):
         """Every derived array, by name, then those of the contacts."""
@@ -84,83 +87,44 @@ class ReleasedWorld:
         return arrays
 
 
-class Answerer:
-    """The models and worlds of this process, by number, and what can be asked of them."""
+def load(file, text, names):
+    """Compile a file; its flags, and the numeric fields that this release has of those names."""
+    if hasattr(mujoco, "set_mju_user_warning"):  # else it writes a file where it runs
+        mujoco.set_mju_user_warning(lambda text: None)
+    kind = mujoco.MjModel
+    model = kind.from_xml_string(text) if text else kind.from_xml_path(file)
+    if hasattr(mujoco.mjtDisableBit, "mjDSBL_AUTORESET"):
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    fields = {}
+    for name in names:
+        holder, field = held(model, name)
+        value = getattr(holder, field, None)
+        if isinstance(value, (np.ndarray, int, float)):
+            fields[name] = np.asarray(value, float)
+    memory = [("warmstart", model.nv)] + [("act", model.na)] * bool(model.na)
+    flags = {f"opt.{kind}flags": flags_of(model, kind) for kind in KINDS}
+    return model, {"version": mujoco.__version__, "memory": memory, "flags": flags}, fields
 
-    def __init__(self) -> None:
-        self.things, self.number = {}, 0
 
-    def keep(self, thing):
-        """Its number."""
-        self.number += 1
-        self.things[self.number] = thing
-        return self.number
-
-    def load(self, job, _):
-        """Compile a file; numeric fields of the compiled model that were asked for."""
-        if job["text"]:
-            model = mujoco.MjModel.from_xml_string(job["text"])
+def edit(model, edits, flags):
+    """A copy of a model with other values in some fields, and these flags."""
+    model = copy.copy(model)
+    for name, value in edits.items():
+        holder, field = held(model, name)
+        now = getattr(holder, field)
+        if isinstance(now, np.ndarray):
+            now[...] = value.reshape(now.shape)
         else:
-            model = mujoco.MjModel.from_xml_path(job["file"])
-        if hasattr(mujoco.mjtDisableBit, "mjDSBL_AUTORESET"):
-            model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-        fields = {}
-        for name in job["fields"]:
-            holder, field = held(model, name)
-            value = getattr(holder, field, None)
-            if isinstance(value, (np.ndarray, int, float)):
-                fields[name] = np.asarray(value, float)
-        bits = {f"opt.{n}flags": flags_of(model, n) for n in KINDS}
-        return {"model": self.keep(model), **bits}, fields
-
-    def edit(self, job, content):
-        """A copy of a model with other values in some fields."""
-        model, start = copy.copy(self.things[job["model"]]), 0
-        for name, size in job["edits"]:
-            holder, field = held(model, name)
-            now, value = getattr(holder, field), content[start : start + size]
-            start += size
-            if isinstance(now, np.ndarray):
-                now[...] = value.reshape(now.shape)
-            else:
-                setattr(holder, field, type(now)(value[0]))
-        for name, flags in job["flags"].items():
-            holder, field = held(model, name)
-            kinds = KINDS[field[: -len("flags")]].__members__
-            whole = {old for old, new in SPLIT.items() if old in kinds and set(new) <= set(flags)}
-            unknown = [f for f in flags if f not in kinds and not any(f in SPLIT[o] for o in whole)]
-            if unknown:
-                raise ValueError("it has no flag " + ", ".join(unknown))
-            setattr(holder, field, sum(int(kinds[f]) for f in kinds if f in whole.union(flags)))
-        return {"model": self.keep(model)}, {}
-
-    def make(self, job, _):
-        """A world of a model."""
-        return {"world": self.keep(ReleasedWorld(self.things[job["model"]]))}, {}
-
-    def run(self, job, content):
-        """Place a state if one is given, take a command and steps; one more is kept in reserve."""
-        world = self.things[job["world"]]
-        nu = world.model.nu
-        if len(content) > nu:
-            world.place(content[nu:])
-        world.data.ctrl[:] = content[:nu]
-        taken = world.advance(job["steps"], job["fastest"])
-        states = {"before": world.state()}
-        if taken == job["steps"]:
-            mujoco.mj_step(world.model, world.data)
-            states["after"] = world.state()
-        return {"taken": taken}, states
-
-    def look(self, job, content):
-        """What is derived: of a state and a command if they are given, else of the last step."""
-        world = self.things[job["world"]]
-        if len(content):
-            nu = world.model.nu
-            world.place(content[nu:])
-            world.data.ctrl[:] = content[:nu]
-            mujoco.mj_forward(world.model, world.data)
-        return {}, world.derived()
+            setattr(holder, field, type(now)(value[0]))
+    for name, wanted in flags.items():
+        holder, field = held(model, name)
+        kinds = KINDS[field[: -len("flags")]].__members__
+        whole = {old for old, new in SPLIT.items() if old in kinds and set(new) <= set(wanted)}
+        unknown = [f for f in wanted if f not in kinds and not any(f in SPLIT[o] for o in whole)]
+        if unknown:
+            raise ValueError("it has no flag " + ", ".join(unknown))
+        setattr(holder, field, sum(int(kinds[f]) for f in kinds if f in whole.union(wanted)))
+    return model
 
 
 def flags_of(model, kind):
@@ -174,35 +138,3 @@ def held(model, name):
     """Whose attribute a field is, and its name there: "opt.timestep", "body_mass"."""
     holder, _, field = name.rpartition(".")
     return (getattr(model, holder) if holder else model), field
-
-
-def main() -> None:
-    """Answer until there is nobody to ask."""
-    source, out = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what an engine prints is no answer
-    if hasattr(mujoco, "set_mju_user_warning"):  # else it writes a file where it runs
-        mujoco.set_mju_user_warning(lambda text: None)
-    server = Answerer()
-    while True:
-        lengths = source.read(SIZES.size)
-        if len(lengths) < SIZES.size:
-            return
-        size, rest = SIZES.unpack(lengths)
-        job = json.loads(source.read(size))
-        content = np.frombuffer(source.read(rest))
-        for number in job["free"]:  # models and worlds that nobody needs any more
-            server.things.pop(number, None)
-        try:
-            answer, arrays = getattr(server, job["verb"])(job, content)
-        except Exception as error:
-            reason = " ".join(str(error).split()) or type(error).__name__
-            answer, arrays = {"error": reason, "kind": type(error).__name__}, {}
-        answer = {**answer, "arrays": [(name, a.shape) for name, a in arrays.items()]}
-        blob = b"".join(np.ascontiguousarray(a, float).tobytes() for a in arrays.values())
-        head = json.dumps(answer).encode()
-        out.write(SIZES.pack(len(head), len(blob)) + head + blob)
-        out.flush()
-
-
-if __name__ == "__main__":
-    main()

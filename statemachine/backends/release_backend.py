@@ -1,19 +1,17 @@
-"""Another release of MuJoCo behind the contract: in a process and an environment of its own.
+"""An engine in a Python of its own behind the contract: another release of MuJoCo, or any other.
 
-The child compiles the file itself. Here the same file is compiled by the release that is
-installed, and takes over every number that the child reads in it: so a Model shows what the
-child's release makes of the file, and edits reach the child by the names of fields.
+Its process compiles the file itself. Here the same file is compiled by the release that is
+installed, and takes over every number that the process reads in it: so a Model shows what the
+engine there makes of the file, and edits reach it by the names of fields.
 """
 
 from __future__ import annotations
 
 import copy
 import hashlib
-import json
 import os
-import threading
 import weakref
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, cast
@@ -22,13 +20,14 @@ import mujoco
 import numpy as np
 
 from ..errors import EngineError, ModelError, UnsupportedError
-from ..interface import DERIVED, Array, Contacts
-from ..processes.pipes import PipedChild
-from ..releases import python_of, version_of
+from ..interface import DERIVED, Array, Capabilities, Contacts
+from ..interface.checks import HUGE
+from ..releases import is_release, python_of, version_of
 from . import _release_child as child
 from ._edits import held, put
 from ._hidden_data import HiddenModel
 from ._hidden_world import HiddenWorld, Memory, Moment, Read
+from ._served import LostError, ServedEngine, Server
 from .binary import is_binary
 from .compiled import check_numbers, facts, fastest, spec_with_packages
 from .mujoco_backend import MujocoModel
@@ -46,7 +45,7 @@ _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mj
 
 def load(
     path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model", *, release: str
-) -> ReleaseModel:
+) -> ServedModel:
     """Compile a file in both releases.
 
     Args:
@@ -58,154 +57,133 @@ def load(
         MissingEngineError: That release has no environment here.
         ModelError: One of the two cannot read the file, or they read different parts in it.
     """
-    engine = f"MuJoCo {version_of(release)}"
-    if is_binary(os.fspath(path)):
-        raise ModelError(f"{path} was compiled by one release of MuJoCo; {engine} wants its XML")
-    server = Server.of(release)
-    installed = load_installed(path, defaults)
-    return ReleaseModel(server.compiled(Path(path), installed), release)
+    title, python = f"MuJoCo {version_of(release)}", str(python_of(release))
+    return served(ServedEngine(release, python, child.__file__, title))(path, defaults)
+
+
+def served(
+    engine: ServedEngine, capabilities: Capabilities | None = None
+) -> Callable[..., ServedModel]:
+    """The loader of an engine that runs in a Python of its own.
+
+    Args:
+        engine: Its Python, and the file that knows it there.
+        capabilities: What the backend says of itself; None for what is said of MuJoCo. It gets
+            what `_child_server` says of a file.
+    """
+
+    def load_there(
+        path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model"
+    ) -> ServedModel:
+        if is_binary(os.fspath(path)):
+            raise ModelError(
+                f"{path} was compiled by one release of MuJoCo; {engine.title} wants its XML"
+            )
+        installed = load_installed(path, defaults)
+        return ServedModel(_compiled(engine, Path(path), installed), capabilities)
+
+    return load_there
 
 
 class FileReading(NamedTuple):
-    """What a release makes of a file.
+    """What an engine makes of a file.
 
     Attributes:
+        engine: That read it.
+        version: Of the engine.
         model: In the installed release's terms.
         shared: Names of the fields that both have.
-        digest: Of what the release read, by which a file that changed since then is seen.
+        memory: Name and length of each array that the engine remembers from step to step.
+        untold: Names of what is derived that it does not tell.
+        digest: Of what was read, by which a file that changed since then is seen.
     """
 
+    engine: ServedEngine
+    version: str
     model: MujocoModel
     shared: frozenset[str]
+    memory: tuple[tuple[str, int], ...]
+    untold: frozenset[str]
     digest: str
 
 
-class LostError(Exception):
-    """The process of a release has ended."""
+def _compiled(engine: ServedEngine, path: Path, installed: MujocoModel) -> FileReading:
+    """What an engine makes of a file that the installed release has compiled.
 
-
-class Server:
-    """The process of a release, which holds the models and worlds that this process has there."""
-
-    _all: dict[tuple[int, str], Server] = {}  # noqa: RUF012
-    _lock = threading.RLock()
-
-    def __init__(self, release: str) -> None:
-        command = [str(python_of(release)), "-I", "-u", child.__file__]
-        self.release, self._turn, self.lives = release, threading.RLock(), True
-        self.forgotten: list[int] = []  # models and worlds that it is to forget at the next call
-        self._process = PipedChild(command, {**os.environ, "MUJOCO_GL": "disable"})
-
-    @classmethod
-    def of(cls, release: str) -> Server:
-        """The one of a release; started where there is none, or none that lives."""
-        with cls._lock:
-            key = os.getpid(), release
-            if key not in cls._all or not cls._all[key].lives:
-                cls._all[key] = cls(release)
-            return cls._all[key]
-
-    def ask(
-        self, verb: str, *content: Array, **job: Any
-    ) -> tuple[dict[str, Any], dict[str, Array]]:
-        """Let it do something; its answer, and arrays by name.
-
-        Raises:
-            LostError: It has ended.
-            ValueError: It raised an error, with its text.
-        """
-        blob = b"".join(array.tobytes() for array in content)
-        try:
-            with self._turn:
-                free, self.forgotten = self.forgotten, []
-                head = json.dumps({"verb": verb, "free": free, **job}).encode()
-                self._process.to.write(child.SIZES.pack(len(head), len(blob)) + head + blob)
-                self._process.to.flush()
-                size, rest = child.SIZES.unpack(self._process.out.read(child.SIZES.size))
-                answer = json.loads(self._process.out.read(size))
-                values = np.frombuffer(self._process.out.read(rest))
-        except (OSError, ValueError, child.struct.error) as error:
-            self.lives, ended = False, self._process.how_it_ended()
-            raise LostError(f"its process is gone: {ended or error}") from error
-        except BaseException:  # Ctrl-C: what it still says would be taken for another answer
-            self.lives = False
-            self._process.kill()
-            raise
-        if "error" in answer:
-            raise ValueError(answer["error"])
-        arrays, start = dict[str, Array](), 0
-        for name, shape in answer["arrays"]:
-            stop = start + int(np.prod(shape))
-            arrays[name], start = values[start:stop].reshape(shape).copy(), stop
-        return answer, arrays
-
-    def compiled(self, path: Path, installed: MujocoModel) -> FileReading:
-        """What it makes of a file that the installed release has compiled.
-
-        Raises:
-            ModelError: It cannot read the file, or finds other parts in it.
-        """
-        engine, raw = f"MuJoCo {version_of(self.release)}", copy.copy(installed.raw)
-        try:
-            answer, fields, digest = self._loaded(path, raw)
-        except ValueError as error:
-            raise ModelError(f"{engine} cannot read {path}: {error}") from error
-        except LostError as error:
-            raise EngineError(
-                f"{engine} cannot be run: {error}; to make it anew: statemachine engines remove "
-                f"{self.release}, then add"
-            ) from error
-        self.forgotten.append(answer["model"])
-        for name in _SAME:
-            if name in fields and int(fields[name]) != getattr(raw, name):
-                raise ModelError(
-                    f"{engine} reads {path} as another robot: {name} is {int(fields[name])} there "
-                    f"and {getattr(raw, name)} in MuJoCo {mujoco.__version__}"
-                )
-        shared = set(_FLAGS)
-        for name in _fields(raw):
-            now = np.asarray(_field(raw, name))
-            if name in fields and fields[name].shape == now.shape:
-                shared.add(name)
-                if not name.endswith("type") and not np.array_equal(fields[name], now):
-                    put(raw, name, fields[name] if now.ndim else fields[name].item())
-        for name, kinds in _FLAGS.items():
-            names = [own for flag in answer[name] for own in child.SPLIT.get(flag, (flag,))]
-            known = [int(kinds.__members__[own]) for own in names if own in kinds.__members__]
-            setattr(*held(raw, name), sum(known))
-        check_numbers(raw, f"{path} in {engine}")
-        return FileReading(MujocoModel(raw, path, installed.substeps), frozenset(shared), digest)
-
-    def _loaded(
-        self, path: Path, raw: mujoco.MjModel
-    ) -> tuple[dict[str, Any], dict[str, Array], str]:
-        """The number of a model and its flags, its fields, and a digest of them."""
-        spec = spec_with_packages(path)
-        text, names = spec.to_xml() if spec else "", [*_SAME, *_fields(raw)]
-        answer, fields = self.ask("load", file=str(path.absolute()), text=text, fields=names)
-        flags = repr([answer[name] for name in _FLAGS]).encode()
-        read = b"".join([flags, *(array.tobytes() for array in fields.values())])
-        return answer, fields, hashlib.sha256(read).hexdigest()
-
-    def opened(self, reading: FileReading, edits: Mapping[str, Any]) -> tuple[int, int]:
-        """A world of a file with some fields edited: the numbers of its model and of itself."""
-        path = reading.model.path
-        answer, _, digest = self._loaded(path, reading.model.raw)
-        number = answer["model"]
-        if digest != reading.digest:
-            raise ValueError(f"{path} is another file than when it was loaded")
-        if edits:
-            arrays = {name: value for name, value in edits.items() if name not in _FLAGS}
-            answer, _ = self.ask(
-                "edit",
-                *(np.asarray(value, float).ravel() for value in arrays.values()),
-                model=number,
-                edits=[(name, np.size(value)) for name, value in arrays.items()],
-                flags={name: value for name, value in edits.items() if name in _FLAGS},
+    Raises:
+        ModelError: It cannot read the file, or finds other parts in it.
+    """
+    server, raw, title = Server.of(engine), copy.copy(installed.raw), engine.title
+    try:
+        answer, fields, digest = _loaded(server, path, raw)
+    except ValueError as error:
+        raise ModelError(f"{title} cannot read {path}: {error}") from error
+    except LostError as error:
+        anew = f"; to make it anew: statemachine engines remove {engine.name}, then add"
+        advice = anew if is_release(engine.name) else ""
+        raise EngineError(f"{title} cannot be run: {error}{advice}") from error
+    server.forgotten.append(answer["model"])
+    for name in _SAME:
+        if name in fields and int(fields[name]) != getattr(raw, name):
+            raise ModelError(
+                f"{title} reads {path} as another robot: {name} is {int(fields[name])} there "
+                f"and {getattr(raw, name)} in MuJoCo {mujoco.__version__}"
             )
-            self.forgotten.append(number)
-            number = answer["model"]
-        return number, self.ask("make", model=number)[0]["world"]
+    flags = answer.get("flags", {})
+    shared = set(flags)
+    for name in _fields(raw):
+        now = np.asarray(_field(raw, name))
+        if name in fields and fields[name].shape == now.shape:
+            shared.add(name)
+            if not name.endswith("type") and not np.array_equal(fields[name], now):
+                put(raw, name, fields[name] if now.ndim else fields[name].item())
+    for name, set_there in flags.items():
+        kinds = _FLAGS[name].__members__
+        names = [own for flag in set_there for own in child.SPLIT.get(flag, (flag,))]
+        setattr(*held(raw, name), sum(int(kinds[own]) for own in names if own in kinds))
+    check_numbers(raw, f"{path} in {title}")
+    return FileReading(
+        engine,
+        answer["version"],
+        MujocoModel(raw, path, installed.substeps),
+        frozenset(shared),
+        tuple((name, int(length)) for name, length in answer["memory"]),
+        frozenset(answer.get("untold", ())),
+        digest,
+    )
+
+
+def _loaded(
+    server: Server, path: Path, raw: mujoco.MjModel
+) -> tuple[dict[str, Any], dict[str, Array], str]:
+    """The number of a model and what is said of it, its fields, and a digest of both."""
+    spec = spec_with_packages(path)
+    text, names = spec.to_xml() if spec else "", [*_SAME, *_fields(raw)]
+    answer, fields = server.ask("load", file=str(path.absolute()), text=text, fields=names)
+    said = repr([answer.get("flags"), answer["memory"], answer["version"]]).encode()
+    read = b"".join([said, *(array.tobytes() for array in fields.values())])
+    return answer, fields, hashlib.sha256(read).hexdigest()
+
+
+def _opened(server: Server, reading: FileReading, edits: Mapping[str, Any]) -> tuple[int, int]:
+    """A world of a file with some fields edited: the numbers of its model and of itself."""
+    path = reading.model.path
+    answer, _, digest = _loaded(server, path, reading.model.raw)
+    number = answer["model"]
+    if digest != reading.digest:
+        raise ValueError(f"{path} is another file than when it was loaded")
+    if edits:
+        arrays = {name: value for name, value in edits.items() if name not in _FLAGS}
+        answer, _ = server.ask(
+            "edit",
+            *(np.asarray(value, float).ravel() for value in arrays.values()),
+            model=number,
+            edits=[(name, np.size(value)) for name, value in arrays.items()],
+            flags={name: value for name, value in edits.items() if name in _FLAGS},
+        )
+        server.forgotten.append(number)
+        number = answer["model"]
+    return number, server.ask("make", model=number)[0]["world"]
 
 
 def _fields(raw: mujoco.MjModel) -> Iterator[str]:
@@ -222,59 +200,55 @@ def _field(raw: mujoco.MjModel, name: str) -> Any:
     return getattr(*held(raw, name))
 
 
-def _edits(release: str, reading: FileReading, raw: mujoco.MjModel) -> dict[str, Any]:
+def _edits(reading: FileReading, raw: mujoco.MjModel) -> dict[str, Any]:
     """Fields of a compiled model that are another than those of the file; flags by their names.
 
     Raises:
-        UnsupportedError: The release has no such field.
+        UnsupportedError: The engine has no such field.
     """
-    edits, base = dict[str, Any](), reading.model.raw
-    for name in _fields(raw):
-        if not np.array_equal(_field(raw, name), _field(base, name)):
-            if name not in reading.shared:
-                reason = "that release has no such field"
-                raise UnsupportedError(
-                    f"{release} cannot be given another {name}: {reason}",
-                    backend=release,
-                    feature=name,
-                    reason=reason,
-                )
-            edits[name] = np.array(_field(raw, name))
-    for name in _FLAGS:
-        if _field(raw, name) != _field(base, name):
-            edits[name] = child.flags_of(raw, name.removeprefix("opt.").removesuffix("flags"))
+    edits, base, backend = dict[str, Any](), reading.model.raw, reading.engine.name
+    for name in (*_fields(raw), *_FLAGS):
+        if np.array_equal(_field(raw, name), _field(base, name)):
+            continue
+        if name not in reading.shared:
+            reason = "it has no such field"
+            text = f"{backend} cannot be given another {name}: {reason}"
+            raise UnsupportedError(text, backend=backend, feature=name, reason=reason)
+        kind = name.removeprefix("opt.").removesuffix("flags")
+        edits[name] = child.flags_of(raw, kind) if name in _FLAGS else np.array(_field(raw, name))
     return edits
 
 
-class ReleaseModel(HiddenModel):
-    """What a release makes of a file, with what was edited in it.
+class ServedModel(HiddenModel):
+    """What an engine in a Python of its own makes of a file, with what was edited in it."""
 
-    Attributes:
-        release: As "mujoco==3.3.7".
-    """
-
-    release: str
     _reading: FileReading
     _inner: MujocoModel
+    _own: Capabilities | None
 
     def __init__(
-        self, reading: FileReading, release: str, inner: MujocoModel | None = None
+        self,
+        reading: FileReading,
+        capabilities: Capabilities | None = None,
+        inner: MujocoModel | None = None,
     ) -> None:
         inner = inner or reading.model
         engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner
-        edits = _edits(release, reading, engine.raw)
-        names = ("path", "capabilities", "timestep", "substeps")
+        edits = _edits(reading, engine.raw)
         super().__init__(
-            partial(ReleaseWorld, release, reading, edits, float(inner.raw.opt.timestep)),
-            backend=release,
-            engine_version=version_of(release),
+            partial(ServedWorld, reading, edits, float(inner.raw.opt.timestep)),
+            backend=reading.engine.name,
+            engine_version=reading.version,
             raw=inner.raw,
-            release=release,
+            path=inner.path,
+            capabilities=capabilities or inner.capabilities,
+            timestep=inner.timestep,
+            substeps=inner.substeps,
             max_qvel=fastest(inner.raw),
             _reading=reading,
             _inner=inner,
+            _own=capabilities,
             **facts(inner.raw),
-            **{name: getattr(inner, name) for name in names},
         )
 
     @property
@@ -282,44 +256,44 @@ class ReleaseModel(HiddenModel):
         """In the terms of the installed release."""
         return self.raw
 
-    def with_compiled(self, compiled: mujoco.MjModel) -> ReleaseModel:
+    def with_compiled(self, compiled: mujoco.MjModel) -> ServedModel:
         inner = self._inner.with_compiled(compiled)
-        return ReleaseModel(self._reading, self.release, inner)._started_as(self, {})
+        return ServedModel(self._reading, self._own, inner)._started_as(self, {})
 
-    def _replace(self, options: dict[str, Any]) -> ReleaseModel:
-        return ReleaseModel(self._reading, self.release, self._inner._replace(options))
+    def _replace(self, options: dict[str, Any]) -> ServedModel:
+        return ServedModel(self._reading, self._own, self._inner._replace(options))
 
 
-class ReleaseWorld(HiddenWorld):
-    """A world in the process of a release; the engine's own object is there."""
+class ServedWorld(HiddenWorld):
+    """A world in the process of an engine; the engine's own object is there."""
 
     errors, raw = (LostError,), None
 
-    def __init__(
-        self, release: str, reading: FileReading, edits: Mapping[str, Any], timestep: float
-    ) -> None:
+    def __init__(self, reading: FileReading, edits: Mapping[str, Any], timestep: float) -> None:
         """Open it; `timestep` is that of an engine step [s]."""
         raw = reading.model.raw
-        self.engine, self.timestep = f"MuJoCo {version_of(release)}", timestep
-        self._opening, self.qpos0 = (release, reading, edits, timestep), np.array(raw.qpos0)
-        nv, na, nu = raw.nv, raw.na, raw.nu
-        self._sizes = np.cumsum([raw.nq, nv, nv])
-        self.memory_layout = (("warmstart", nv), ("act", na))[: 1 + bool(na)]
-        self._ctrl, self._fastest = np.zeros(nu), child.HUGE
-        self._state, self._reserve = np.zeros(self._sizes[-1] + na), None
+        self.engine, self.timestep = reading.engine.title, timestep
+        self._reading, self._edits, self.qpos0 = reading, edits, np.array(raw.qpos0)
+        self.memory_layout, self.untold = reading.memory, reading.untold
+        lengths = [raw.nq, raw.nv, *(length for _, length in reading.memory)]
+        self._cuts = np.cumsum(lengths)[:-1]
+        self._ctrl, self._fastest = np.zeros(raw.nu), HUGE
+        self._state, self._reserve = np.zeros(sum(lengths)), None
         self._derived: dict[str, Array] | None = None
         self._begin()
 
     def _begin(self) -> None:
-        """Be in the process of the release, which begins anew where it has ended."""
-        release, reading, edits, _ = self._opening
-        self._server, self._placed = Server.of(release), True
+        """Be in the process of the engine, which begins anew where it has ended."""
+        self._server, self._placed = Server.of(self._reading.engine), True
         try:
-            self._model, self._world = self._server.opened(reading, edits)
+            self._model, self._world = _opened(self._server, self._reading, self._edits)
         except (LostError, ValueError) as error:
             raise EngineError(f"{self.engine} cannot make a world: {error}") from error
         # No call: it may be collected in the midst of another.
         self._end = weakref.finalize(self, _forget, self._server, self._model, self._world)
+
+    def _ask(self, verb: str, *content: Array, **job: Any) -> tuple[Any, dict[str, Array]]:
+        return self._server.ask(verb, *content, world=self._world, nu=len(self._ctrl), **job)
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
@@ -334,9 +308,7 @@ class ReleaseWorld(HiddenWorld):
         if not self._server.lives:
             self._begin()
         placed = [self._state] if self._placed else []
-        answer, states = self._server.ask(
-            "run", self._ctrl, *placed, world=self._world, steps=steps, fastest=self._fastest
-        )
+        answer, states = self._ask("run", self._ctrl, *placed, steps=steps, fastest=self._fastest)
         self._placed, self._derived, self._state = False, None, states["before"]
         self._reserve = states.get("after")
         return answer["taken"]
@@ -351,28 +323,29 @@ class ReleaseWorld(HiddenWorld):
         self._state, self._reserve = cast("Array", self._reserve), None
 
     def read(self) -> tuple[Array, Array]:
-        qpos, qvel, *_ = np.split(self._state, self._sizes)
+        qpos, qvel, *_ = np.split(self._state, self._cuts)
         return qpos.copy(), qvel.copy()
 
     @property
     def memory(self) -> Memory:
-        _, _, warmstart, act = np.split(self._state, self._sizes)
-        return (warmstart.copy(), act.copy())[: len(self.memory_layout)]
+        return tuple(part.copy() for part in np.split(self._state, self._cuts)[2:])
 
     def look(self, moment: Moment) -> None:
         if not self._server.lives:
             self._begin()
         state = np.concatenate([moment.qpos, moment.qvel, *moment.memory])
-        _, self._derived = self._server.ask("look", moment.ctrl, state, world=self._world)
+        _, self._derived = self._ask("look", moment.ctrl, state)
         self._placed = True
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
         if self._derived is None:
-            _, self._derived = self._server.ask("look", world=self._world)
+            _, self._derived = self._ask("look")
         arrays = dict(self._derived)
-        values: dict[str, Any] = {name: arrays.pop(name) for name in DERIVED}
-        geom = arrays.pop("geom").astype(np.int64)
-        return {**values, "contacts": Contacts(geom=geom, **arrays)}
+        values: dict[str, Any] = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
+        if "contacts" not in self.untold:
+            geom = arrays.pop("geom").astype(np.int64)
+            values["contacts"] = Contacts(geom=geom, **arrays)
+        return values
 
     def close(self) -> None:
         self._end()
