@@ -8,12 +8,12 @@ only, and imports nothing of this package. Its argument is a file that knows the
   "version" of the engine; "memory", name and length of each array that the engine remembers
   from step to step beside qpos and qvel; "untold", names of derived arrays that it does not tell,
   which may be left out;
-- `Simulation(model)`: a world, with `place(vector)`, which takes qpos, qvel and the memory in a row, so
-  that nothing of before is left; `state()`, the same vector; `command(ctrl)`; `advance(steps,
-  fastest)`, which takes engine steps up to one after which a position is beyond `HUGE` or a
-  velocity beyond `fastest`, and returns how many; `forward()`; `derived()`, what is derived of
-  the moment that the last step started from, or of the present after `forward`, by name, and
-  of the contacts geom, dist, pos, frame, force and torque;
+- `Simulation(model)`: a world. `place(vector)` takes qpos, qvel and the memory in a row, so that
+  nothing of before is left; `state()` gives the same vector; `command(ctrl)` takes a command.
+  `advance(steps, fastest)` takes engine steps, up to one after which a position is beyond 1e10 or
+  a velocity beyond `fastest`, and returns how many. `forward()` derives of the present. `derived()`
+  gives what is derived, of the moment that the last step started from or of the present after
+  `forward`, by name, and of the contacts geom, dist, pos, frame, force and torque;
 - `edit(model, edits, flags)`, if it can change a model: another one, with other values in fields.
 
 A message and its answer are two lengths, a header in JSON, and bytes; it ends with its input.

@@ -68,8 +68,7 @@ def served(
 
     Args:
         engine: Its Python, and the file that knows it there.
-        capabilities: What the backend says of itself; None for what is said of MuJoCo. It gets
-            what `_child_server` says of a file.
+        capabilities: What the backend says of itself; None for what is said of MuJoCo.
     """
 
     def load_there(
