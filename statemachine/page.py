@@ -6,14 +6,16 @@ terminal and into other media.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Numbers = Sequence[float] | NDArray[Any]
+
+R = TypeVar("R")  # a record that is a row of a table
 
 
 @dataclass(frozen=True)
@@ -260,14 +262,45 @@ class Table:
         rows = [[_one_line(cell) for cell in row] for row in self.rows]
         object.__setattr__(self, "rows", rows)
 
+    @classmethod
+    def of(
+        cls,
+        records: Iterable[R],
+        columns: Mapping[str, Callable[[R], str]],
+        title: str = "",
+        words: Iterable[str] = (),
+        wide: Iterable[str] = (),
+        emphasis: Callable[[R], bool] = lambda _: False,
+    ) -> Table:
+        """A table with a row for each record.
+
+        Args:
+            records: Whatever the rows are of.
+            columns: Under each header what stands in a record's cell.
+            title: What the table shows.
+            words: Headers of columns of words; the first column has words in any case.
+            wide: Headers of the wide columns.
+            emphasis: Whether a record's row is set off.
+        """
+        shown = list(records)
+        rows = [[cell(record) for cell in columns.values()] for record in shown]
+        return cls(
+            list(columns),
+            rows,
+            title,
+            frozenset(k for k, header in enumerate(columns) if not k or header in words),
+            frozenset(k for k, record in enumerate(shown) if emphasis(record)),
+            frozenset(k for k, header in enumerate(columns) if header in wide),
+        )
+
     def narrow(self) -> Table:
         """The table without its wide columns."""
-        kept = [k for k in range(len(self.headers)) if k not in self.wide]
+        columns = [k for k in range(len(self.headers)) if k not in self.wide]
         return replace(
             self,
-            headers=[self.headers[k] for k in kept],
-            rows=[[row[k] for k in kept] for row in self.rows],
-            words=frozenset(kept.index(k) for k in self.words if k in kept),
+            headers=[self.headers[k] for k in columns],
+            rows=[[row[k] for k in columns] for row in self.rows],
+            words=frozenset(columns.index(k) for k in self.words if k in columns),
             wide=frozenset(),
         )
 

@@ -528,9 +528,9 @@ def test_the_whole_path_piped(cli: Cli) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_options_may_stand_before_the_name(here: Cli) -> None:
     for words in (("--backend", "pybullet", "write"), ("write", "--backend", "pybullet")):
-        assert "pybullet prints" in here("lesson", *words).stdout
+        assert "Printed by pybullet:" in here("lesson", *words).stdout
     both = here("lesson", "--backend", "pybullet", "write", "--backend", "mujoco")
-    assert "mujoco prints" in both.stdout
+    assert "Printed by mujoco:" in both.stdout
 
 
 # --- at a terminal

@@ -38,7 +38,6 @@ from statemachine.page import (
     Text,
     Verdict,
 )
-from statemachine.report.commanded import commanded
 from statemachine.report.compare import page as compared
 from statemachine.report.events import events_of
 from statemachine.report.finding import headline
@@ -47,6 +46,7 @@ from statemachine.report.html.geometry import bones_of, mesh_as_data, mesh_of
 from statemachine.report.html.scene import moments_of, rows_at
 from statemachine.report.markdown import markdown
 from statemachine.report.over_time import CHARTS_SHOWN, charts_of
+from statemachine.report.sides import commanded
 from statemachine.report.why import answer, causes
 from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS

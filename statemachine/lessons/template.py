@@ -8,6 +8,7 @@ A template is Markdown with named slots. Its paragraphs become the blocks of a p
     ? {right}: How far is it?         a question: below it "a) …", "b) …" and "> " with the reason
     ✓ {same}: Both are the same.      a verdict, and whether it holds
     <small>Left: the gap.</small>     a note to what stands above it
+    - One of several.                 an item of a list
     <!-- if moved -->                 what follows stands only where the slot `moved` is true, up to
     <!-- else -->, <!-- end -->       these; "if not moved" is the contrary
 
@@ -29,10 +30,10 @@ from ..installed import ENGINES
 from ..interface import Array
 from ..measures import largest
 from ..measures.text import apart, milliseconds, short_time
-from ..page import Block, Heading, Page, Question, Table, Text, Verdict
+from ..page import Block, Heading, Items, Page, Question, Table, Text, Verdict
 
 _CONDITION = re.compile(r"<!-- (?:if (?P<no>not )?(?P<name>\w+)|(?P<other>else)|end) -->")
-_PARTS = re.compile(r"^(?:[a-h]\)|>) ", re.MULTILINE)  # of a question: its choices, its reason
+_PARTS = re.compile(r"^(?:[a-h]\)|>|-) ", re.MULTILINE)  # choices, a reason, items of a list
 _MARKED = re.compile(r"([?✓]) (\w+): (.*)", re.DOTALL)
 
 
@@ -119,6 +120,8 @@ def blocks_of(
         return block if isinstance(block, Sequence) else [block]
     if text.startswith("## "):
         return [Heading(text.removeprefix("## "))]
+    if text.startswith("- "):
+        return [Items([item.strip() for item in _PARTS.split(text)[1:]])]
     marked = _MARKED.fullmatch(text)
     if marked is None:
         note = text.removeprefix("<small>").removesuffix("</small>").strip()

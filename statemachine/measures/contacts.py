@@ -7,7 +7,7 @@ from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 from ..interface import Array, Ints, Model
-from .text import few, rounded
+from .text import few, grouped, rounded
 
 _T = TypeVar("_T")
 _LISTED = 8  # pairs in a sentence
@@ -87,13 +87,11 @@ _OF: WeakKeyDictionary[Model, ContactNames] = WeakKeyDictionary()
 
 def together(contacts: Iterable[str]) -> str:
     """Contacts in a list, the geoms of one pair of bodies behind it: "a on b (c, d), e on f"."""
-    geoms: dict[str, list[str]] = {}
-    for contact in contacts:
-        pair, _, told = contact.partition(" (")
-        geoms.setdefault(pair, []).append(told.removesuffix(")"))
+    parts = (contact.partition(" (") for contact in contacts)
+    geoms = grouped((pair, shapes.removesuffix(")")) for pair, _, shapes in parts)
     pairs = [
-        f"{pair} ({', '.join(filter(None, told))})" if any(told) else pair
-        for pair, told in geoms.items()
+        f"{pair} ({', '.join(filter(None, shapes))})" if any(shapes) else pair
+        for pair, shapes in geoms.items()
     ]
     return few(pairs, _LISTED)
 

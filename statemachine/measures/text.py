@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterable, Sequence
+from typing import TypeVar
 
+K = TypeVar("K")
+V = TypeVar("V")
 NONE = "–"  # where there is no number
 TINY = 1e-6  # what is less, in the unit that is read, is only called so
 _READ = {"rad": (180.0 / math.pi, "°"), "m": (1e3, "mm"), "s": (1e3, "ms")}
@@ -57,26 +60,23 @@ def rough(value: float, unit: str = "") -> str:
 
 def figure(value: float) -> str:
     """A number with three significant digits; tiny ones with their power of ten."""
-    if value == 0:
-        return "0"
     if not math.isfinite(value):
         return "no number" if math.isnan(value) else str(value)
     size = abs(value)
-    if size < 1e-3 or size >= 1e5:
+    if size and not 1e-3 <= size < 1e5:
         return f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
-    digits = max(0, 2 - math.floor(math.log10(size)))
-    return f"{value:.{min(digits, 4)}f}"
+    digits = 2 - math.floor(math.log10(size)) if size else 0
+    return f"{value:z.{min(max(digits, 0), 4)}f}"
 
 
 def significant(value: float, digits: int = 4) -> str:
     """A number to some significant digits; zero has no sign."""
-    return f"{value + 0.0:.{digits}g}"
+    return f"{value:z.{digits}g}"
 
 
 def fixed(value: float, decimals: int) -> str:
     """A number to some decimals; what rounds to zero has no sign."""
-    text = f"{value:.{decimals}f}"
-    return text.removeprefix("-") if float(text) == 0 else text
+    return f"{value:z.{decimals}f}"
 
 
 def signed(value: float | None, decimals: int = 4) -> str:
@@ -140,15 +140,13 @@ def percent(part: float | None) -> str:
     if part is None:
         return NONE
     value = 100 * part
-    if value == 0:
-        return "0 %"
-    if abs(value) < 1e-6:
+    if 0 < abs(value) < 1e-6:
         return "< 1e-6 %"
-    if abs(value) < 0.05:
+    if 0 < abs(value) < 0.05:
         return f"{value:.0e} %".replace("e-0", "e-")
     if 99.95 <= value < 100:
         return "> 99.9 %"
-    return f"{value:.1f} %" if abs(value) < 1000 else f"{value:.0f} %"
+    return f"{value:.1f} %" if 0 < abs(value) < 1000 else f"{value:z.0f} %"
 
 
 def count(number: int, thing: str, zero: str = "0") -> str:
@@ -159,6 +157,14 @@ def count(number: int, thing: str, zero: str = "0") -> str:
 def listed(words: Sequence[str]) -> str:
     """Words in a row: "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
+    """What goes with each key, keys in the order in which they first come."""
+    groups: dict[K, list[V]] = {}
+    for key, value in pairs:
+        groups.setdefault(key, []).append(value)
+    return groups
 
 
 def few(words: Sequence[str], most: int = 3, between: str = ", ") -> str:

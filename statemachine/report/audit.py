@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..engines.futures import FutureGap, worst
-from ..measures.text import NONE, milliseconds, rough
-from ..page import Block, Items, Page, Table, Text
+from ..measures.text import NONE, grouped, milliseconds, rough
+from ..page import Block, Page, Table
 from ..probes.audit import Audit, Audited
 from ..probes.audit.trials import (
     AGAIN,
@@ -23,20 +23,10 @@ from ..probes.audit.trials import (
     AuditFinding,
 )
 from . import template
-from .template import if_true
+from .template import if_true, versions_of
 
 _OF_THE_STATE = (RESTORE, WITHOUT, FORGETS, NO_CONTACTS)
 _AT_REST = 1e-2  # of the fastest joint or body [rad/s or m/s]
-
-# What follows beside the state; each holds only if it has something to name.
-FACTS = {
-    "idle": "Nothing differs without {what}.",
-    "read back": "Before any step, not every byte reads back as it was saved: {what}.",
-    "in contact": "What cannot be written acts through contacts, at {what}.",
-    "agree": "All restores of one state have one future, though not that of the run: {what}.",
-    "history": "What did bring every future back is a new one, and the whole past once more: here "
-    "the state is the history.",
-}
 
 
 def page(results: Mapping[str, Audit]) -> Page:
@@ -46,176 +36,182 @@ def page(results: Mapping[str, Audit]) -> Page:
         results: By backend.
     """
     first = next(iter(results.values()))
-    tables: list[Block] = []
-    for backend, result in results.items():
-        tables.append(_places(result.audited[0]))
-        if result.audited[0].layer != "engine":
-            tables.append(Text(f"{backend} itself, by its own functions, was not asked."))
-        for driver in result.audited:
-            tables += _of_driver(driver)
-        if result.without:
-            tables.append(Text(f"Not tried: {'; '.join(result.without)}."))
-    versions = [(r.provenance.backend, r.provenance.versions) for r in results.values()]
+    made_with = [result.provenance for result in results.values()]
+    versions = {made.backend: made.versions[made.backend] for made in made_with}
     drivers = [driver for result in results.values() for driver in result.audited]
     return template.page(
         "audit",
         model=first.provenance.model_file,
-        engines=", ".join(f"{backend} {each[backend]}" for backend, each in versions),
+        engines=versions_of(versions),
         timestep=milliseconds(first.provenance.timestep),
         seed=first.provenance.seed,
         steps=first.steps,
-        tables=tables,
+        tables=[block for name, result in results.items() for block in _tables(name, result)],
         conclusions=[block for driver in drivers for block in _conclusion(driver)],
+    )
+
+
+def _tables(backend: str, result: Audit) -> list[Block]:
+    """What was found of one backend."""
+    first = result.audited[0]
+    places = Table.of(
+        first.points,
+        {
+            "save point": lambda seen: seen.point,
+            "how to get there": lambda seen: seen.how,
+            "after": lambda seen: f"{seen.time:.3g} s",
+            "speed": lambda seen: "at rest" if seen.speed < _AT_REST else rough(seen.speed),
+            "contacts": lambda seen: str(seen.contacts),
+            "limits": lambda seen: NONE if seen.limits is None else str(seen.limits),
+        },
+        f"{first.name}: where runs are saved (speeds in rad/s or m/s)",
+        words={"how to get there"},
+    )
+    return template.blocks(
+        "audit_backend",
+        backend=backend,
+        places=places,
+        not_asked=if_true(first.layer != "engine"),
+        drivers=[block for driver in result.audited for block in _of_driver(driver)],
+        without="; ".join(result.without) or None,
     )
 
 
 def _of_driver(driver: Audited) -> list[Block]:
     """What was found of the state of one driver, and of what should change nothing."""
-    rows = _candidates(driver)
+    candidates = grouped(
+        (f"all but {each.case}" if each.experiment == WITHOUT else each.case, each)
+        for each in driver.findings
+        if each.experiment in (RESTORE, WITHOUT)
+    )
     return template.blocks(
         "audit_driver",
         name=driver.name,
-        by_point=[_by_point(driver, rows)],
+        by_point=_by_point(driver, candidates),
         legend=driver.legend,
-        by_target=[_by_target(driver, rows)],
+        by_target=_by_target(driver, candidates),
         forgotten=_forgotten(driver),
         touching=_touching(driver),
         **_promises(driver),
     )
 
 
-def _places(one: Audited) -> Table:
+def _by_point(driver: Audited, candidates: Mapping[str, Sequence[AuditFinding]]) -> Table:
+    points = [seen.point for seen in driver.points]
     rows = [
         (
-            seen.point,
-            seen.how,
-            f"{seen.time:.3g} s",
-            "at rest" if seen.speed < _AT_REST else rough(seen.speed),
-            str(seen.contacts),
-            NONE if seen.limits is None else str(seen.limits),
+            name,
+            *(
+                _worst(f for f in findings if f.point == at and f.into != EACH_OTHER)
+                for at in points
+            ),
         )
-        for seen in one.points
+        for name, findings in candidates.items()
     ]
-    return Table(
-        ("save point", "how to get there", "after", "speed", "contacts", "limits"),
-        rows,
-        title=f"{one.name}: where runs are saved (speeds in rad/s or m/s)",
-        words=frozenset({0, 1}),
-    )
+    return Table(("what is restored", *points), rows, f"{driver.name}: restored, against going on")
 
 
-def _candidates(one: Audited) -> dict[str, list[AuditFinding]]:
-    """What was tried as a state, by what a table calls it."""
-    found: dict[str, list[AuditFinding]] = {}
-    for each in one.findings:
-        if each.experiment in (RESTORE, WITHOUT):
-            without = each.experiment == WITHOUT
-            found.setdefault(f"all but {each.case}" if without else each.case, []).append(each)
-    return found
-
-
-def _by_point(one: Audited, rows: Mapping[str, Sequence[AuditFinding]]) -> Table:
-    points = [seen.point for seen in one.points]
-    against = {name: [each for each in of if each.into != EACH_OTHER] for name, of in rows.items()}
-    return Table(
-        ("what is restored", *points),
-        [
-            (name, *(_worst(each for each in of if each.point == point) for point in points))
-            for name, of in against.items()
-        ],
-        title=f"{one.name}: restored, against going on",
-    )
-
-
-def _by_target(one: Audited, rows: Mapping[str, Sequence[AuditFinding]]) -> Table:
-    kinds = {"run itself": "the run itself", "fresh": "a fresh one", "used": "a used one"}
-    shown = []
-    for name, of in rows.items():
+def _by_target(driver: Audited, candidates: Mapping[str, Sequence[AuditFinding]]) -> Table:
+    targets = {
+        "run itself": "the run itself",
+        "fresh": "a fresh one",
+        "used": "a used one",
+        EACH_OTHER: EACH_OTHER,
+    }
+    rows = []
+    for name, findings in candidates.items():
+        # A way that cannot leave its own run is restored there twice.
         cells = [
-            # A way that cannot leave its own run is restored there twice.
-            _worst(each for each in of if each.into.startswith(into))
-            for into in (*kinds.values(), EACH_OTHER)
+            _worst(f for f in findings if f.into.startswith(into)) for into in targets.values()
         ]
-        firsts = {each.gap.first for each in of if each.into != EACH_OTHER} - {None}
-        steps = sorted(step for step in firsts if step is not None)
-        shown.append((name, *cells, " to ".join(map(str, steps[:1] + steps[1:][-1:])) or NONE))
-    return Table(
-        ("what is restored", *kinds, EACH_OTHER, "from step"),
-        shown,
-        title=f"{one.name}: the same, by what it is restored in",
-    )
+        firsts = {f.gap.first for f in findings if f.into != EACH_OTHER and f.gap.first is not None}
+        first_and_last = dict.fromkeys((min(firsts), max(firsts))) if firsts else (NONE,)
+        rows.append((name, *cells, " to ".join(map(str, first_and_last))))
+    title = f"{driver.name}: the same, by what it is restored in"
+    return Table(("what is restored", *targets, "from step"), rows, title)
 
 
-def _forgotten(one: Audited) -> list[Block]:
+def _forgotten(driver: Audited) -> Table | None:
     """What is changed after a save and not brought back."""
-    of = [each for each in one.findings if each.experiment == FORGETS]
-    if not of:
-        return []
-    cells = {(each.into, each.case): each.gap.exact for each in of}
-    cases = list(dict.fromkeys(each.case for each in of))
-    ways = [way for way in dict.fromkeys(each.into for each in of) if way != NOT_RESTORED]
+    findings = [each for each in driver.findings if each.experiment == FORGETS]
+    if not findings:
+        return None
+    exact = {(each.into, each.case): each.gap.exact for each in findings}
+    cases = list(dict.fromkeys(each.case for each in findings))
 
     def word(way: str, case: str) -> str:
-        if cells[NOT_RESTORED, case]:
+        if exact[NOT_RESTORED, case]:
             return "does not show"
-        return "brought back" if cells[way, case] else "stays"
+        return "brought back" if exact[way, case] else "stays"
 
+    ways = dict.fromkeys(each.into for each in findings if each.into != NOT_RESTORED)
     rows = [(way, *(word(way, case) for case in cases)) for way in ways]
-    title = f"{one.name}: changed after the save, at {of[0].point}, and then restored"
-    return [Table(("restored by", *cases), rows, title, words=frozenset(range(len(cases) + 1)))]
+    title = f"{driver.name}: changed after the save, at {findings[0].point}, and then restored"
+    return Table(("restored by", *cases), rows, title, words=frozenset(range(len(cases) + 1)))
 
 
-def _touching(one: Audited) -> list[Block]:
+def _touching(driver: Audited) -> Table | None:
     """What contacts have to do with what is not restored."""
-    gaps = one.conclusion.touching
-    if not gaps:
-        return []
-    case = next(each.case for each in one.findings if each.experiment == NO_CONTACTS)
+    gaps = driver.conclusion.touching
+    case = next((each.case for each in driver.findings if each.experiment == NO_CONTACTS), "")
     rows = [
         ("as it stands", *(cell(standing) for standing, _ in gaps.values())),
         ("contacts switched off", *(cell(off) for _, off in gaps.values())),
     ]
-    title = f"{one.name}: in a fresh one, with and without contacts"
-    return [Table((f"restored: {case}", *gaps), rows, title)]
+    title = f"{driver.name}: in a fresh one, with and without contacts"
+    return Table((f"restored: {case}", *gaps), rows, title) if gaps else None
 
 
-def _promises(one: Audited) -> dict[str, Any]:
+def _promises(driver: Audited) -> dict[str, Any]:
     """What should change nothing: slots of `audit_driver.md`."""
-    tried: dict[tuple[str, str, bool], list[AuditFinding]] = {}
-    for each in one.findings:
-        if each.experiment not in _OF_THE_STATE or each.promised:
-            tried.setdefault((each.case, each.into, each.promised), []).append(each)
-    rows, differ, broken = [], [], []
-    for (case, into, promised), of in tried.items():
-        off = [each for each in of if not each.gap.exact]
-        broken.append(not all(each.holds for each in of))
-        same = f"{len(of) - len(off)} of {len(of)}"
-        rows.append((case, into, same, _PROMISED[promised, broken[-1]]))
-        if off:
-            gap = worst([each.gap for each in off])
-            sizes = rough(gap.length, "m"), rough(gap.angle, "rad"), str(gap.first)
-            differ.append((case, ", ".join(each.point for each in off), *sizes))
-    promised = sum(promised for *_, promised in tried)
-    heads = ("what is done", "compared with", "same bytes at", "promised")
-    emphasis = frozenset(k for k, is_broken in enumerate(broken) if is_broken)
-    title = f"{one.name}: what should change nothing"
-    changes = ("what is done", "differs at", "by", "and", "from step")
-    changing = f"{one.name}: what changes the bytes that follow, at the worst"
+    tried = grouped(
+        ((each.case, each.into, each.promised), each)
+        for each in driver.findings
+        if each.experiment not in _OF_THE_STATE or each.promised
+    )
+    kept = {key: all(each.holds for each in findings) for key, findings in tried.items()}
+    differing = {key: [f for f in of if not f.gap.exact] for key, of in tried.items()}
+    promised = [holds for (*_, is_promised), holds in kept.items() if is_promised]
+    rows = Table.of(
+        tried,
+        {
+            "what is done": lambda key: key[0],
+            "compared with": lambda key: key[1],
+            "same bytes at": lambda key: (
+                f"{len(tried[key]) - len(differing[key])} of {len(tried[key])}"
+            ),
+            "promised": lambda key: _PROMISED[key[2], kept[key]],
+        },
+        f"{driver.name}: what should change nothing",
+        words={"compared with", "same bytes at", "promised"},
+        emphasis=lambda key: not kept[key],
+    )
+    gaps = {key: worst([each.gap for each in of]) for key, of in differing.items() if of}
+    changes = Table.of(
+        gaps,
+        {
+            "what is done": lambda key: key[0],
+            "differs at": lambda key: ", ".join(each.point for each in differing[key]),
+            "by": lambda key: rough(gaps[key].length, "m"),
+            "and": lambda key: rough(gaps[key].angle, "rad"),
+            "from step": lambda key: str(gaps[key].first),
+        },
+        f"{driver.name}: what changes the bytes that follow, at the worst",
+        words={"differs at"},
+    )
     return {
-        "promises": [Table(heads, rows, title, words=frozenset(range(4)), emphasis=emphasis)]
-        if rows
-        else [],
-        "differing": [Table(changes, differ, changing, words=frozenset({0, 1}))] if differ else [],
-        "drops": len({each.point for each in one.findings if each.point.startswith(FALL)}) or None,
+        "promises": rows,
+        "differing": changes,
+        "drops": len({f.point for f in driver.findings if f.point.startswith(FALL)}) or None,
         "boxes": BOXES,
         "steps": STEPS,
-        "holds": not any(broken) if tried else None,
-        "intact": promised - sum(broken),
-        "promised": promised,
+        "holds": all(kept.values()) if tried else None,
+        "intact": sum(promised),
+        "promised": len(promised),
     }
 
 
-_PROMISED = {(True, False): "yes", (True, True): "yes, broken", (False, False): "no"}
+_PROMISED = {(True, True): "yes", (True, False): "yes, broken", (False, True): "no"}
 
 
 def _worst(findings: Iterable[AuditFinding]) -> str:
@@ -223,39 +219,41 @@ def _worst(findings: Iterable[AuditFinding]) -> str:
     return cell(worst(gaps)) if gaps else NONE
 
 
-def _conclusion(one: Audited) -> list[Block]:
+def _conclusion(driver: Audited) -> list[Block]:
     """What follows; all of it from the findings."""
-    of = one.conclusion
-    again = [each.gap.exact for each in one.findings if each.experiment == AGAIN]
-    facts = {
-        "idle": of.idle,
-        "read back": [f"{name} (at {', '.join(at)})" for name, at in of.not_read_back.items()],
-        "in contact": of.in_contact,
-        "agree": [name for name in of.agree if name not in of.suffice],
-        "history": [AGAIN] if again and all(again) and not of.suffice else [],
-    }
-    lines = [FACTS[name].format(what=", ".join(what)) for name, what in facts.items() if what]
-    rows = [
-        (each.field, _where(each.itself, one), cell(each.gap), str(each.gap.first))
-        for each in of.missing
-    ]
-    heads = ("left out", "the run itself differs at", "differs by", "from step")
-    title = f"{one.name}: what has to be restored, and by how much the run differs without it"
+    of = driver.conclusion
+    again = [each.gap.exact for each in driver.findings if each.experiment == AGAIN]
+    needed = Table.of(
+        of.missing,
+        {
+            "left out": lambda missing: missing.field,
+            "the run itself differs at": lambda missing: _where(missing.itself, driver),
+            "differs by": lambda missing: cell(missing.gap),
+            "from step": lambda missing: str(missing.gap.first),
+        },
+        f"{driver.name}: what has to be restored, and by how much the run differs without it",
+        words={"the run itself differs at"},
+    )
+    read_back = [f"{name} (at {', '.join(points)})" for name, points in of.not_read_back.items()]
     return template.blocks(
         "audit_conclusion",
-        name=one.name,
+        name=driver.name,
         suffices=" or ".join(of.suffice) or None,
         none_suffices=if_true(not of.suffice),
-        needed=[Table(heads, rows, title, words=frozenset({0, 1}))] if rows else [],
+        needed=needed,
         alone=if_true(of.smallest is True),
         not_alone=if_true(of.smallest is False),
-        facts=[Items(lines)] if lines else [],
+        idle=", ".join(of.idle) or None,
+        read_back=", ".join(read_back) or None,
+        in_contact=", ".join(of.in_contact) or None,
+        agree=", ".join(name for name in of.agree if name not in of.suffice) or None,
+        history=if_true(again and all(again) and not of.suffice),
     )
 
 
-def _where(points: Sequence[str], one: Audited) -> str:
+def _where(points: Sequence[str], driver: Audited) -> str:
     """Save points where the run itself needs a field; without one, only a used run does."""
-    if len(points) == len(one.points):
+    if len(points) == len(driver.points):
         return "all"
     return ", ".join(points) or "none; only a used one does"
 
@@ -266,6 +264,4 @@ def cell(off: FutureGap) -> str:
         return "same"
     if not off.size:  # of a velocity, or a 0 that became -0
         return "bytes"
-    if off.angle >= off.length:
-        return rough(off.angle, "rad")
-    return rough(off.length, "m")
+    return rough(off.angle, "rad") if off.angle >= off.length else rough(off.length, "m")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..compare import (
@@ -18,32 +18,38 @@ from ..compare import (
 )
 from ..compare.why import Explanation
 from ..measures import QUANTITIES
-from ..measures.text import NONE, milliseconds, quantity, sentence
+from ..measures.text import NONE, grouped, milliseconds, quantity, sentence
 from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
 from ..runs import Trace
 from ..witness import SAME_READING
 from . import template, why
-from .commanded import commanded
-from .contacts import contact_words
 from .events import Event, events_of, events_table
 from .finding import (
+    floor_words,
     headline,
     in_words,
     leading,
     long_labels,
+    moment,
     name_of,
     short_labels,
     subject,
     window,
 )
-from .floor import floor_words
-from .loops import also_open, loops, told, unmatched
 from .over_time import BothRuns, QuantityChart, charts_of
-from .provenance import emulated, provenance
+from .sides import (
+    also_open,
+    commanded,
+    contact_words,
+    emulated,
+    loops,
+    provenance,
+    told,
+    unmatched,
+)
 from .template import if_true
 
 _ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
-_HEADERS = ("quantity", "verdict", "largest", "at, s", "RMS", "settled", "from, s", "tolerance")
 _EMULATED = ("emulated", "What is emulated")
 
 
@@ -111,7 +117,7 @@ def page(
         *told(run),
         *commanded(one, two, labels),
         *in_words(comparison),
-        *(() if comparison.ended else contact_words(comparison, touching)),
+        *([] if comparison.ended or not touching else [contact_words(comparison, touching)]),
         *([Items(notes)] if notes else []),
         both,
         *loops(comparison, played),
@@ -158,12 +164,11 @@ def _sorted(charts: Sequence[QuantityChart], total: int) -> list[Block]:
     order = {"differs": 0, "settles": 1, "agrees": 2}
     ranked = sorted(charts, key=lambda c: (order[c.agreement.verdict], -c.agreement.tolerances()))
     beyond: list[Block] = [chart for chart in ranked if chart.agreement.verdict != "agrees"]
-    within: list[Block] = [chart for chart in ranked if chart.agreement.verdict == "agrees"]
+    within: list[Block] = [*ranked[len(beyond) :]]
     if beyond and within:
         within = [Section("", f"Those that agree: {len(within)}", within, folded=True)]
-    left_out = total - len(charts)
-    text = f"Quantities without a chart, nearer to agreement or not finite: {left_out}."
-    return [*beyond, *within, *([Text(text)] if left_out else [])]
+    text = f"Quantities without a chart, nearer to agreement or not finite: {total - len(charts)}."
+    return [*beyond, *within, *([Text(text)] if total > len(charts) else [])]
 
 
 def _figures(
@@ -179,23 +184,51 @@ def _figures(
         checked.append(Section("", "", text, detail=True))
         sides = {name: getattr(witness, name) for name in ("site", "rows", "by")}
         sides |= {"left_off": f"{1e3 * witness.one:.0e}", "right_off": f"{1e3 * witness.two:.0e}"}
-    figures = Table(
-        _HEADERS if floor is None else (*_HEADERS, "floor", "inside from, s"),
-        [(*_row(found), *_floor_cells(found, floor)) for found in agreements],
+    figures = Table.of(
+        agreements,
+        {
+            "quantity": lambda found: name_of(found.name),
+            "verdict": lambda found: TableCell(found.verdict, verdict=found.verdict),
+            "largest": lambda found: (
+                found.note or quantity(found.max, found.unit)
+                if found.kind == "contact"
+                else _small(found.max, found)
+            ),
+            "at, s": lambda found: moment(found.at),
+            "RMS": lambda found: NONE if found.kind == "contact" else _small(found.rms, found),
+            "settled": lambda f: NONE if f.kind == "contact" else _small(f.settled, f),
+            "from, s": lambda found: NONE if found.kind == "contact" else moment(found.since),
+            "tolerance": lambda found: quantity(found.tolerance, found.unit),
+            **(_floor_columns(floor) if floor else {}),
+        },
         f"{one} against {two}: how far apart",
-        words=frozenset({0, 1}),
-        emphasis=frozenset(k for k, found in enumerate(agreements) if found.verdict == "differs"),
-        wide=frozenset({7, 8, 9}) if floor else frozenset({7}),
+        words={"verdict"},
+        emphasis=lambda found: found.verdict == "differs",
+        wide={"tolerance", "floor", "inside from, s"},
     )
-    heads, title = ("quantities", "tolerance", "because"), "What does not matter, and why"
+    # One row for each tolerance: who shares it, how much, why.
+    shared = grouped(
+        ((quantity(found.tolerance, found.unit), found.reason), QUANTITIES[found.kind].plural)
+        for found in agreements
+    )
+    reasons = Table.of(
+        shared.items(),
+        {
+            "quantities": lambda row: ", ".join(dict.fromkeys(row[1])),
+            "tolerance": lambda row: row[0][0],
+            "because": lambda row: row[0][1],
+        },
+        "What does not matter, and why",
+        words={"because"},
+    )
     return template.blocks(
         "compare_figures",
-        figures=[figures],
+        figures=figures,
         moments=comparison.moments,
         until=comparison.until,
         window=window(comparison),
         floor=floor_words(comparison, floor) if floor else [],
-        reasons=[Table(heads, _reasons(comparison), title, words=frozenset({0, 2}))],
+        reasons=reasons,
         left=one,
         right=two,
         checked=checked,
@@ -203,38 +236,13 @@ def _figures(
     )
 
 
-def _row(found: Agreement) -> tuple[str, ...]:
-    verdict = TableCell(found.verdict, verdict=found.verdict)
-    at, tolerance = _moment(found.at), quantity(found.tolerance, found.unit)
-    name = name_of(found.name)
-    if found.kind == "contact":
-        gap = found.note or quantity(found.max, found.unit)
-        return name, verdict, gap, at, NONE, NONE, NONE, tolerance
-    return (
-        name,
-        verdict,
-        _small(found.max, found),
-        at,
-        _small(found.rms, found),
-        _small(found.settled, found),
-        "never" if found.since is None else _moment(found.since),
-        tolerance,
-    )
-
-
-def _floor_cells(found: Agreement, floor: ChaosFloor | None) -> tuple[str, ...]:
+def _floor_columns(floor: ChaosFloor) -> dict[str, Callable[[Agreement], str]]:
     """How high the chaos floor is, and from when on the gap is inside."""
-    if floor is None:
-        return ()
-    band = floor.of(found.name)
-    if band is None:
-        return NONE, NONE
-    inside = "never" if band.inside_from is None else _moment(band.inside_from)
-    return quantity(band.most, found.unit), inside
-
-
-def _moment(time: float) -> TableCell:
-    return TableCell(f"{time:.3f}", at=time)
+    bands = {band.name: band for band in floor.bands}
+    return {
+        "floor": lambda f: quantity(bands[f.name].most, f.unit) if f.name in bands else NONE,
+        "inside from, s": lambda f: moment(bands[f.name].inside_from) if f.name in bands else NONE,
+    }
 
 
 def _small(value: float, found: Agreement) -> str:
@@ -244,22 +252,10 @@ def _small(value: float, found: Agreement) -> str:
     return quantity(value, found.unit)
 
 
-def _reasons(comparison: Comparison) -> list[tuple[str, str, str]]:
-    """One row for each tolerance: who shares it, how much, why."""
-    shared: dict[tuple[str, str], list[str]] = {}
-    for found in comparison.agreements:
-        key = (quantity(found.tolerance, found.unit), found.reason)
-        shared.setdefault(key, []).append(found.kind)
-    return [
-        (", ".join(dict.fromkeys(QUANTITIES[kind].plural for kind in kinds)), value, reason)
-        for (value, reason), kinds in shared.items()
-    ]
-
-
 def _models(models: Page, has_emulated: bool) -> Section:
     """What each engine makes of the model: the verdict, and what it is of on demand."""
-    verdicts: list[Block] = [each for each in models.blocks if isinstance(each, Verdict)]
-    rest = [each for each in models.blocks if not isinstance(each, Verdict)]
+    verdicts = [block for block in models.blocks if isinstance(block, Verdict)]
+    rest = [block for block in models.blocks if not isinstance(block, Verdict)]
     first = Text("Before anything moves.")
     if has_emulated:
         first = Text(
@@ -272,14 +268,13 @@ def _models(models: Page, has_emulated: bool) -> Section:
 
 
 def _origin(comparison: Comparison) -> str:
-    one, two = comparison.one, comparison.two
-    words = []
-    for side in (one, two):
-        seed = side.provenance.seed
-        text = f"{side.label}, {milliseconds(side.timestep)}"
-        words.append(text + (f", seed {seed}" if seed is not None else ""))
-    files = dict.fromkeys(
-        f"{side.provenance.model_file} ({side.provenance.model_sha256[:8]})" for side in (one, two)
-    )
-    engine = [] if one.engine in one.label else [f"both on {one.engine}"]
+    sides = (comparison.one, comparison.two)
+    made_by = [side.provenance for side in sides]
+    files = dict.fromkeys(f"{made.model_file} ({made.model_sha256[:8]})" for made in made_by)
+    engine = [] if sides[0].engine in sides[0].label else [f"both on {sides[0].engine}"]
+    seeds = ["" if made.seed is None else f", seed {made.seed}" for made in made_by]
+    words = [
+        f"{side.label}, {milliseconds(side.timestep)}{seed}"
+        for side, seed in zip(sides, seeds, strict=True)
+    ]
     return "; ".join([*files, *engine, *words])

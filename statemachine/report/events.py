@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from ..compare import Comparison, Touch
-from ..measures.text import capital, short_time
+from ..measures.text import capital, grouped, short_time
 from ..page import Table, TableCell
 
 
@@ -45,12 +45,12 @@ def events_of(comparison: Comparison, touches: Sequence[Touch]) -> list[Event]:
             if contact.first is not None
         ),
         *(
-            Event(since, "part", f"beyond tolerance from here: {names}", None)
-            for since, names in _together((since, name) for since, _, name in parted)
+            Event(since, "part", f"beyond tolerance from here: {'; '.join(names)}", None)
+            for since, names in grouped((since, name) for since, _, name in parted).items()
         ),
         *(
-            Event(at, "largest", f"largest difference: {names}", None)
-            for at, names in _together((at, name) for _, at, name in parted)
+            Event(at, "largest", f"largest difference: {'; '.join(names)}", None)
+            for at, names in grouped((at, name) for _, at, name in parted).items()
         ),
         *(
             Event((side.rows - 1) * side.timestep, "end", f"ends early: {side.ended}", number)
@@ -61,29 +61,17 @@ def events_of(comparison: Comparison, touches: Sequence[Touch]) -> list[Event]:
     return sorted(found, key=lambda event: event.time)
 
 
-def _together(moments: Iterable[tuple[float, str]]) -> Iterable[tuple[float, str]]:
-    """The names of each moment in a row, in the order in which the moments first come."""
-    names: dict[float, list[str]] = {}
-    for time, name in moments:
-        names.setdefault(time, []).append(name)
-    return [(time, "; ".join(those)) for time, those in names.items()]
-
-
 def events_table(events: Sequence[Event], labels: tuple[str, str]) -> Table:
     """What happens when; the same on both sides at the same time is one row."""
-    merged: dict[tuple[float, str], set[int | None]] = {}
-    for event in events:
-        merged.setdefault((event.time, event.text), set()).add(event.side)
-    rows = []
-    for (time, text), sides in merged.items():
-        if sides in ({None}, {0, 1}):
-            where = "both" if 0 in sides else "between them"
-        else:
-            where = labels[next(iter(s for s in sides if s is not None))]
-        rows.append((TableCell(short_time(time), at=time), capital(text), where))
-    return Table(
-        ("time", "what", "on"),
-        rows,
+    sides = grouped(((event.time, event.text), event.side) for event in events)
+    where = {None: "between them", 0: labels[0], 1: labels[1]}
+    return Table.of(
+        sides,
+        {
+            "time": lambda event: TableCell(short_time(event[0]), at=event[0]),
+            "what": lambda event: capital(event[1]),
+            "on": lambda event: "both" if {0, 1} <= {*sides[event]} else where[sides[event][0]],
+        },
         "First touches, partings, largest differences; press a time to go there",
-        words=frozenset({1, 2}),
+        words={"what", "on"},
     )

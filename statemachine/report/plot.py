@@ -20,8 +20,7 @@ from ..runs import Trace
 from ..runs.whole import replace_bytes
 from . import template
 from .figures import SETTINGS, SIDES, check_suffix, draw_picture, saved
-from .finding import long_labels, parting
-from .floor import changed_by
+from .finding import changed_by, long_labels, parting
 from .over_time import CHARTS_SHOWN, charts_of, spans
 from .template import if_true
 

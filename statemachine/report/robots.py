@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from ..measures.text import NONE, count, few, figure, listed, rough, sentence
+from ..measures.text import NONE, count, few, figure, grouped, listed, rough, sentence
 from ..page import Block, Page, Table, Text, Verdict
 from ..robots.examine import TRIED
 from ..robots.gaps import STEPS
@@ -28,15 +28,6 @@ SUMS = (
     "How many of {total} models load, and of how many the gap without contacts to {default} is "
     "within {tolerance:g} rad or m, no more than rounding makes, or vanishes with the timestep"
 )
-_SUMS_HEADERS = (
-    "engine",
-    "loads",
-    "only without contacts",
-    "bits of the engine",
-    "within",
-    "rounding",
-    "vanishes",
-)
 _MARKS = {None: NONE, True: "✓", False: "✗"}
 
 
@@ -47,23 +38,33 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
         survey: What was found.
         widest: Characters of a model's name.
     """
-    if len(survey.models) == 1 and not survey.parts:
-        return _one(survey, survey.models[0])
-    backends = list(dict.fromkeys(name for row in survey.models for name in row.backends))
+    models = survey.models
+    if len(models) == 1 and not survey.parts:
+        return _one(survey, models[0])
+    backends = list(dict.fromkeys(name for row in models for name in row.backends))
     others = [name for name in backends if name != survey.default]
-    tried = any(each.scenarios for row in survey.models for each in row.backends.values())
+    tried = any(each.scenarios for row in models for each in row.backends.values())
     wrong = [f"{file}: {text}" for file, texts in survey.wrong.items() for text in texts]
+    inside = [f"{row.file}, {row.inside[0]}" for row in models if row.inside]
+    grades = Counter(row.witness.grade or "refused" for row in models if row.witness is not None)
     return template.page(
         "robots",
-        models=count(len(survey.models), "model"),
+        models=count(len(models), "model"),
         made_with=survey.made_with,
-        table=[_table(survey, others, widest, tried)],
+        table=_table(survey, others, widest, tried),
         default=survey.default,
         steps=STEPS,
         tried=", ".join(TRIED) if tried else None,
         backends=listed(backends),
         sums=_sums(survey, others),
-        refused=[block for other in others for block in _refused(survey.models, other)],
+        inside=len(inside) or None,
+        total=len(models),
+        pairs=few(inside, _LISTED, "; "),
+        grades=Table(
+            ("the witness's reading", "models"),
+            [(grade, str(number)) for grade, number in sorted(grades.items())],
+        ),
+        refused=[_refused(models, other) for other in others],
         parts=count(len(survey.parts), "file") if survey.parts else None,
         wrong=[Verdict(text, False) for text in wrong[:_LISTED]],
         more=max(len(wrong) - _LISTED, 0) or None,
@@ -73,30 +74,20 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
 
 def _table(survey: Survey, others: Sequence[str], widest: int, tried: bool) -> Table:
     """A row for each model."""
-    models = survey.models
-    columns = {
-        "model": [_short(row.file, widest) for row in models],
-        "bits": [_bits(survey, row) for row in models],
+    columns: dict[str, Callable[[ExaminedModel], str]] = {
+        # The end of a long name tells more than its beginning.
+        "model": lambda row: row.file if len(row.file) <= widest else f"…{row.file[1 - widest :]}",
+        "bits": lambda row: _bits(survey, row),
     }
     for other in others:
         of = f"{other}, " if len(others) > 1 else ""
-        columns[f"{of}no contacts"] = [_gap(row, other, True) for row in models]
-        columns[f"{of}contacts"] = [_gap(row, other, False) for row in models]
-    columns["witness"] = [_witness(row) for row in models]
+        columns[f"{of}no contacts"] = partial(_gap, other=other, without=True)
+        columns[f"{of}contacts"] = partial(_gap, other=other, without=False)
+    columns["witness"] = _witness
     if tried:
-        columns |= {"runs": list(map(_runs, models)), "cost": list(map(_cost, models))}
+        columns |= {"runs": _runs, "cost": _cost}
     words = {"model", "bits", "witness", "runs"}
-    return Table(
-        list(columns),
-        list(zip(*columns.values(), strict=True)),
-        words=frozenset(k for k, name in enumerate(columns) if name in words),
-        wide=frozenset(k for k, name in enumerate(columns) if name == "cost"),
-    )
-
-
-def _short(name: str, widest: int) -> str:
-    """The end of a long name, which tells more than its beginning."""
-    return name if len(name) <= widest else f"…{name[1 - widest :]}"
+    return Table.of(survey.models, columns, words=words, wide={"cost"})
 
 
 def _bits(survey: Survey, row: ExaminedModel) -> str:
@@ -105,19 +96,17 @@ def _bits(survey: Survey, row: ExaminedModel) -> str:
     first = row.backends.get(survey.default)
     if first is None or (first.refusal and first.refusal_without):
         return "no"
-    told = [v for each in row.backends.values() for v in (each.equals_engine, each.restores)]
-    return "✗" if False in told else "✓" if True in told else NONE
+    exact = [v for each in row.backends.values() for v in (each.equals_engine, each.restores)]
+    return "✗" if False in exact else "✓" if True in exact else NONE
 
 
-def _gap(model: ExaminedModel, other: str, without: bool) -> str:
-    row = model.backends.get(other)
-    if row is None:
-        return NONE
-    gap = row.without_contacts if without else row.with_contacts
+def _gap(row: ExaminedModel, other: str, without: bool) -> str:
+    backend = row.backends.get(other, BackendRow())
+    gap = backend.without_contacts if without else backend.with_contacts
     if gap is None:
-        return "refused" if (row.refusal_without if without else row.refusal) else NONE
+        return "refused" if (backend.refusal_without if without else backend.refusal) else NONE
     outcomes = {
-        "still": not model.nv,
+        "still": not row.nv,
         "explodes": gap.explodes,
         "stops": gap.ended,
         "rounding": gap.is_rounding,
@@ -144,59 +133,56 @@ def _cost(row: ExaminedModel) -> str:
     return " ".join(costs) or NONE
 
 
-def _sums(survey: Survey, others: Sequence[str]) -> list[Block]:
-    """How many models each engine loads and what becomes of them, and what the witness reads."""
-    models, total = survey.models, len(survey.models)
-    rows = []
-    for name in (survey.default, *others):
-        found = [row.backends[name] for row in models if name in row.backends]
-        gaps = [row.without_contacts for row in found if row.without_contacts]
-        counts = [
-            sum(row.loads for row in found),
-            sum(not row.loads and not row.refusal_without for row in found),
-            sum(row.equals_engine is True for row in found),
-            sum(not gap.ended and gap.largest <= TOLERANCE for gap in gaps),
-            sum(not gap.ended and gap.is_rounding for gap in gaps),
-            sum(not gap.ended and gap.first_order for gap in gaps),
-        ]
-        known = range(3) if name == survey.default else (0, 1, 3, 4, 5)
-        rows.append((name, *(str(n) if k in known else NONE for k, n in enumerate(counts))))
-    title = SUMS.format(total=total, default=survey.default, tolerance=TOLERANCE)
-    inside = [f"{row.file}, {row.inside[0]}" for row in models if row.inside]
-    grades = Counter(row.witness.grade or "refused" for row in models if row.witness is not None)
-    read = [(grade, str(number)) for grade, number in sorted(grades.items())]
-    return template.blocks(
-        "robots_sums",
-        sums=[Table(_SUMS_HEADERS, rows, title)],
-        inside=len(inside) or None,
-        total=total,
-        pairs=few(inside, _LISTED, "; "),
-        grades=[Table(("the witness's reading", "models"), read)] if read else [],
+def _sums(survey: Survey, others: Sequence[str]) -> Table:
+    """How many models each engine loads, and what becomes of them."""
+    rows = grouped(pair for row in survey.models for pair in row.backends.items())
+
+    def counted(of: Callable[[BackendRow], object], name: str) -> str:
+        return str(sum(bool(of(row)) for row in rows.get(name, ())))
+
+    def gaps(of: Callable[[RunGap], bool], name: str) -> str:
+        """Of runs that did not end early, against the default engine; which has none."""
+        if name == survey.default:
+            return NONE
+        runs = [row.without_contacts for row in rows.get(name, ()) if row.without_contacts]
+        return str(sum(of(gap) for gap in runs if not gap.ended))
+
+    return Table.of(
+        (survey.default, *others),
+        {
+            "engine": str,
+            "loads": partial(counted, lambda row: row.loads),
+            "only without contacts": partial(
+                counted, lambda row: not row.loads and not row.refusal_without
+            ),
+            "bits of the engine": lambda name: (
+                counted(lambda row: row.equals_engine, name) if name == survey.default else NONE
+            ),
+            "within": partial(gaps, lambda gap: gap.largest <= TOLERANCE),
+            "rounding": partial(gaps, lambda gap: gap.is_rounding),
+            "vanishes": partial(gaps, lambda gap: gap.first_order),
+        },
+        SUMS.format(total=len(survey.models), default=survey.default, tolerance=TOLERANCE),
     )
 
 
-def _refused(rows: Sequence[ExaminedModel], other: str) -> list[Block]:
+def _refused(models: Sequence[ExaminedModel], other: str) -> Table:
     """What is refused, how often, and for how many models it alone stands in the way."""
-    all_of, alone, solved = Counter[str](), Counter[str](), Counter[str]()
-    for row in rows:
-        found = row.backends.get(other)
-        if found is None or not found.refusal:
-            continue
-        all_of.update(found.features)
-        alone.update(found.features if len(found.features) == 1 else ())
-        solved.update(found.features if not found.refusal_without else ())
-    if not all_of:
-        return []
-    return [
-        Table(
-            ("feature", "models", "the only one in", "not with contacts off in"),
-            [
-                (name, str(number), str(alone[name]), str(solved[name]))
-                for name, number in all_of.most_common(_LISTED)
-            ],
-            title=f"What {other} refuses",
-        )
-    ]
+    rows = [row.backends[other] for row in models if other in row.backends]
+    refused = [row for row in rows if row.refusal]
+    features = Counter(name for row in refused for name in row.features)
+    alone = Counter(row.features for row in refused)
+    solved = Counter(n for row in refused for n in row.features if not row.refusal_without)
+    return Table.of(
+        [name for name, _ in features.most_common(_LISTED)],
+        {
+            "feature": str,
+            "models": lambda name: str(features[name]),
+            "the only one in": lambda name: str(alone[(name,)]),
+            "not with contacts off in": lambda name: str(solved[name]),
+        },
+        f"What {other} refuses",
+    )
 
 
 def _one(survey: Survey, row: ExaminedModel) -> Page:
@@ -204,11 +190,13 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
     wrong, witness = row.wrong(survey.default), row.witness or WitnessRow()
     reason = sentence(witness.refusal) if witness.refusal else None
     facts: dict[str, Callable[[BackendRow], str]] = {
-        "loads": _loads,
+        "loads": lambda each: (
+            "✓" if each.loads else "no" if each.refusal_without else "with contacts off"
+        ),
         "the bits of the engine without us": lambda each: _MARKS[each.equals_engine],
         "two futures of a State are one": lambda each: _MARKS[each.restores],
-        "gap without contacts": lambda each: _whole(each.without_contacts),
-        "gap with contacts": lambda each: _whole(each.with_contacts),
+        "gap without contacts": lambda each: _gap_in_full(each.without_contacts),
+        "gap with contacts": lambda each: _gap_in_full(each.with_contacts),
         **{f"scenario {name}": partial(_scenario, name) for name in TRIED},
         "cost of a step, on this machine": lambda each: (
             NONE if each.cost is None else f"{each.cost:.3g} ×"
@@ -222,7 +210,7 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
         file=row.file,
         made_with=row.made_with,
         **{name: getattr(row, name) for name in ("nq", "nv", "nu", "nbody", "ngeom", "took")},
-        table=[table] if row.backends else [],
+        table=table,
         backends=[block for name in row.backends for block in _refusals(name, row.backends[name])],
         refusal=None if witness.gap is not None else reason,
         grade=witness.grade,
@@ -239,10 +227,8 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
 def _refusals(name: str, row: BackendRow) -> list[Block]:
     """What an engine refuses of a model, and of what it warns."""
     warnings = [f"{name} warns: {text}" for text in row.warnings or row.warnings_without]
-    reasons: dict[str, list[str]] = {}
-    for scenario, word in row.scenarios.items():
-        reasons.setdefault(word, []).append(scenario)
-    stops = [f"{', '.join(of)} on {name}: {why}" for why, of in reasons.items() if why != RUNS]
+    reasons = grouped((word, scenario) for scenario, word in row.scenarios.items() if word != RUNS)
+    stops = [f"{', '.join(names)} on {name}: {why}" for why, names in reasons.items()]
     without = row.refusal_without if row.refusal_without != row.refusal else ""
     return template.blocks(
         "robots_backend",
@@ -259,24 +245,21 @@ def _scenario(name: str, row: BackendRow) -> str:
     return NONE if word is None else "✓" if word == RUNS else "no"
 
 
-def _loads(row: BackendRow) -> str:
-    if row.loads:
-        return "✓"
-    return "no" if row.refusal_without else "with contacts off"
-
-
-def _whole(gap: RunGap | None) -> str:
+def _gap_in_full(gap: RunGap | None) -> str:
     if gap is None:
         return NONE
-    sizes = {"hinge": "rad", "slide": "m", "position": "m", "turn": "rad"}
-    parts = [
-        f"{'free body' if name == 'position' else name} {rough(getattr(gap, name))} {unit}"
-        for name, unit in sizes.items()
-        if getattr(gap, name) is not None
+    sizes = {"hinge": gap.hinge, "slide": gap.slide, "free body": gap.position, "turn": gap.turn}
+    units = ("rad", "m", "m", "rad")
+    known = [
+        f"{name} {rough(size)} {unit}"
+        for (name, size), unit in zip(sizes.items(), units, strict=True)
+        if size is not None
     ]
-    text = ", ".join(parts) or NONE
+    parts = [", ".join(known) or NONE]
     if gap.shrinks is not None:
-        text += f"; {gap.shrinks:.3g} times that at half the timestep"
+        parts.append(f"{gap.shrinks:.3g} times that at half the timestep")
     if gap.floor is not None:
-        text += f"; rounding alone makes {rough(gap.floor)}"
-    return f"{text}; {gap.ended} (after {count(gap.steps, 'step')})" if gap.ended else text
+        parts.append(f"rounding alone makes {rough(gap.floor)}")
+    if gap.ended:
+        parts.append(f"{gap.ended} (after {count(gap.steps, 'step')})")
+    return "; ".join(parts)

@@ -13,11 +13,12 @@ A slot whose value is "" stands for a condition; see `if_true`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import is_dataclass
 from string import Formatter
 from typing import Any
 
 from ..lessons.template import blocks_of, filled, text_of
-from ..page import Block, Headline, Page
+from ..page import Block, Headline, Items, Page, Table
 
 
 def page(name: str, headline: Headline | None = None, /, **slots: Any) -> Page:
@@ -26,8 +27,8 @@ def page(name: str, headline: Headline | None = None, /, **slots: Any) -> Page:
     Args:
         name: Of the template.
         headline: Of the page.
-        **slots: Texts and numbers; None for no value. One whose value is a list of blocks stands
-            in a paragraph of its own.
+        **slots: Texts and numbers; None for no value. One whose value is a block, or a list of
+            blocks, stands in a paragraph of its own.
     """
     title, origin, *rest = texts(name, **slots)
     return Page(title.removeprefix("# "), origin.strip("*"), _blocks(rest, slots), headline)
@@ -43,7 +44,8 @@ def texts(name: str, /, **slots: Any) -> list[str]:
 
     One of blocks is its slot, in braces.
     """
-    alone = {key: f"{{{key}}}" for key, value in slots.items() if isinstance(value, list)}
+    is_block = {key: isinstance(value, list) or is_dataclass(value) for key, value in slots.items()}
+    alone = {key: f"{{{key}}}" for key in slots if is_block[key]}
     lines = [
         line
         for line in text_of(__package__ or "", name).splitlines()
@@ -53,7 +55,14 @@ def texts(name: str, /, **slots: Any) -> list[str]:
 
 
 def _blocks(paragraphs: Sequence[str], slots: Mapping[str, Any]) -> list[Block]:
-    return [block for text in paragraphs for block in blocks_of(text, slots)]
+    """The blocks of paragraphs; of a table, or a list, without content there is nothing to show."""
+    return [
+        block
+        for text in paragraphs
+        for block in blocks_of(text, slots)
+        if not (isinstance(block, Table) and not block.rows)
+        and not (isinstance(block, Items) and not block.texts)
+    ]
 
 
 def if_true(holds: object) -> str | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
+from ..measures.text import grouped
 from ..page import (
     LETTERS,
     Block,
@@ -25,7 +27,8 @@ from ..page import (
 )
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.console import RenderableType
+    from rich.text import Text as RichText
 
     from .quiz import Reader
 
@@ -73,48 +76,46 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
             rest of the page waits for each answer. Without, questions are left out.
     """
     tell = reader.read if reader else sys.stdout.write
-    _write(tell, [], heading=page)
-    said: tuple[Question, int] | None = None
+    _write(tell, [page])
+    blocks = [block for block in page.blocks if not isinstance(block, RobotPicture)]
+    views = [block.view for block in page.blocks if isinstance(block, RobotPicture)]
+    predicted: list[Block] = []  # what became of a prediction, until the run has said its part
     answered: list[bool] = []
-    for k, block in enumerate(page.blocks):
+    for block, following in zip(blocks, [*blocks[1:], None], strict=True):
         if isinstance(block, Question):
             choice = reader.ask(block) if reader else None
-            said = None if choice is None else (block, choice)
-            answered += [choice == block.right] if said else []
-            if choice is None and block.always:
+            if choice is not None:
+                answered.append(choice == block.right)
+                predicted = [judged(block, choice)]
+            elif block.always:
                 right = "none of the above" if block.right is None else block.choices[block.right]
                 asked = [] if reader else [Text(block.text)]
                 _write(tell, [*asked, Text(f"Answer: {right}. {block.because}")])
             continue
-        if isinstance(block, RobotPicture):
-            continue
         _write(tell, [block])
-        if reader and said:  # first what the run says, then who was right
-            _write(tell, [judged(*said)])
-            said = None
-            if k + 1 < len(page.blocks) and not isinstance(page.blocks[k + 1], Question):
+        if reader and predicted:
+            _write(tell, predicted)
+            predicted = []
+            if following and not isinstance(following, Question):
                 reader.go_on()
+    last: list[Block] = []
     if len(answered) > 1:
-        _write(tell, [Text(f"You had {sum(answered)} of {len(answered)} right.")])
-    views = [block.view for block in page.blocks if isinstance(block, RobotPicture)]
+        last.append(Text(f"You had {sum(answered)} of {len(answered)} right."))
     if reader and views:
-        _write(tell, [Text(f"To look at it: {views[0]}")])
+        last.append(Text(f"To look at it: {views[0]}"))
     if page.headline:  # last, where it stays in sight
-        _write(tell, [Verdict(page.headline.text, page.headline.holds)])
+        last.append(Verdict(page.headline.text, page.headline.holds))
     if footer:
-        _write(tell, [], footer=footer)
-    else:
-        tell("\n")
-    sys.stdout.flush()
+        last.append(Text(footer))
+    _write(tell, last)
+    tell("\n")
 
 
-def spelled(error: UnicodeError) -> tuple[str, int]:
-    """Error handler of a stream: what its encoding lacks, in ASCII.
+def spelled(error: Any) -> tuple[str, int]:
+    """Error handler of a stream that is written to: what its encoding lacks, in ASCII.
 
     A page has it replaced before its tables are laid out; this is for every other line.
     """
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
     lacking = error.object[error.start : error.end].translate(ASCII)
     return lacking.encode("ascii", "replace").decode(), error.end
 
@@ -127,21 +128,19 @@ def judged(question: Question, choice: int) -> Text:
     return Text(f"You predicted {LETTERS[choice]}; it is {right}. {question.because}")
 
 
-def _write(
-    tell: Callable[[str], object],
-    blocks: Sequence[Block],
-    heading: Page | None = None,
-    footer: str = "",
-) -> None:
-    from rich.console import Console
+def _write(tell: Callable[[str], object], blocks: Sequence[Page | Block]) -> None:
+    from rich.console import Console, detect_legacy_windows
 
-    console = Console(highlight=False, emoji=False)
-    if console.legacy_windows:  # it would show the codes of colours as text
-        console = Console(highlight=False, emoji=False, color_system=None)
+    legacy = detect_legacy_windows()  # it would show the codes of colours as text
+    colours = None if legacy else "auto"
+    console = Console(highlight=False, emoji=False, markup=False, color_system=colours)
+    plain = legacy or console.options.ascii_only
     piped = not console.is_terminal
     console.width = _WIDTH_PIPED if piped else min(console.width, _WIDTH_MOST)
     with console.capture() as captured:
-        _print(console, blocks, heading, footer)
+        for block in _unfolded(blocks):
+            for line in _drawn(block, plain, console.width):
+                console.print(line, soft_wrap=isinstance(block, Code | Printed))
     text = captured.get()
     if piped and text:  # cells are padded with blanks that only a terminal needs
         text = "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
@@ -149,99 +148,73 @@ def _write(
     sys.stdout.flush()
 
 
-def _print(console: Console, blocks: Sequence[Block], heading: Page | None, footer: str) -> None:
-    plain = console.legacy_windows or console.options.ascii_only
-    escape = _escape(plain)
-    if heading:
-        console.print()
-        console.print(f"[bold]{escape(heading.title)}[/]")
-        console.print(f"[dim]{escape(heading.origin)}[/]")
+def _shown(text: str, plain: bool) -> str:
+    """A text without what a terminal would take for a command, or has no letters for."""
+    text = _CONTROL.sub("?", text)
+    return text.translate(ASCII) if plain else text
+
+
+def _unfolded(blocks: Sequence[Page | Block]) -> Iterator[Page | Block]:
+    """The blocks; of a section what is no detail, its heading if no table's title says the same."""
     for block in blocks:
-        _print_block(console, block, plain, escape)
-    if footer:
-        console.print()
-        console.print(f"[dim]{escape(footer)}[/]\n")
+        if not isinstance(block, Section):
+            yield block
+        elif not block.detail:
+            inside = [b for b in block.blocks if not (isinstance(b, Section) and b.detail)]
+            if len(inside) > 1 and not isinstance(inside[0], Table):
+                yield Heading(block.heading)
+            yield from _unfolded(inside)
 
 
-def _escape(plain: bool) -> Callable[[str], str]:
-    """What keeps a text from being taken for a style, or for a command to the terminal."""
-    from rich.markup import escape as escaped
+def _drawn(block: Page | Block, plain: bool, width: int) -> list[RenderableType]:
+    """What a block looks like, from top to bottom; nothing of a picture. Of a page the heading."""
+    from rich.text import Text as RichText
 
-    def escape(text: str) -> str:
-        text = _CONTROL.sub("?", text)
-        return escaped(text.translate(ASCII) if plain else text)
-
-    return escape
-
-
-def _print_block(console: Console, block: Block, plain: bool, escape: Callable[[str], str]) -> None:
     match block:
+        case Page(title, origin):
+            heading = RichText(_shown(title, plain), "bold")
+            return ["", heading, RichText(_shown(origin, plain), "dim")]
         case Heading(text):
-            console.print()
-            console.print(f"[bold]{_coded(escape(text))}[/]")
+            return ["", _coded(_shown(text, plain), "bold")]
         case Text(text, (_, linked)):
-            console.print()
-            console.print(_coded(escape(f"{text} {linked}." if linked else text)))
+            return ["", _coded(_shown(f"{text} {linked}." if linked else text, plain))]
         case Items(texts, ordered):
-            console.print()
-            for number, text in enumerate(texts, start=1):
-                console.print(_hanging(f"{number}." if ordered else "-", escape(text)))
+            marks = (f"{k}." if ordered else "-" for k in itertools.count(1))
+            items = (_shown(text, plain) for text in texts)
+            return ["", *map(_hanging, marks, items)]
         case Code(lines):
-            console.print()
-            for line in lines:
-                console.print(f"    [cyan]{escape(line)}[/]", soft_wrap=True)
+            return ["", *(RichText(f"    {_shown(line, plain)}", "cyan") for line in lines)]
         case Printed(by_engine):
-            _print_outputs(console, by_engine, escape)
+            printed: list[RenderableType] = []
+            for names, text in together(by_engine):
+                printed += ["", RichText(f"Printed by {', '.join(names)}:", "dim")]
+                lines = text.splitlines() or ["(nothing)"]
+                printed += [f"    {_shown(line, plain)}" for line in lines]
+            return printed
         case Table():
-            console.print()
-            if block.title:
-                console.print(f"[italic]{escape(block.title)}[/]")
-            console.print(_grid(block.narrow(), plain, escape, console.width))
-        case Section():
-            _print_section(console, block, escape)
+            title = [RichText(_shown(block.title, plain), "italic")] if block.title else []
+            return ["", *title, _grid(block.narrow(), plain, width)]
         case Verdict(text, holds):
-            console.print()
-            good, bad = ("yes", "NO ") if plain else ("✓", "✗")
-            mark = f"[green]{good}[/]" if holds else f"[red]{bad}[/]"
-            console.print(_hanging(mark, _coded(escape(text))))
+            mark = RichText(_shown("✓" if holds else "✗", plain), "green" if holds else "red")
+            return ["", _hanging(mark, _shown(text, plain))]
+    return []
 
 
-def _coded(text: str) -> str:
-    """An escaped text in which what stands between backticks is shown as code."""
-    return _CODE.sub(r"[cyan]\1[/]", text)
+def _coded(text: str, style: str = "") -> RichText:
+    """A text in which what stands between backticks is shown as code."""
+    from rich.text import Text as RichText
 
-
-def _print_section(console: Console, block: Section, escape: Callable[[str], str]) -> None:
-    """A section that is no detail; its heading where a table's title is none already."""
-    shown = [b for b in block.blocks if not (isinstance(b, Section) and b.detail)]
-    if block.detail or not shown:
-        return
-    if len(shown) > 1 and not isinstance(shown[0], Table):
-        console.print()
-        console.print(f"[bold]{escape(block.heading)}[/]")
-    _print(console, shown, None, "")
-
-
-def _print_outputs(
-    console: Console, by_engine: Mapping[str, str], escape: Callable[[str], str]
-) -> None:
-    for names, text in together(by_engine):
-        console.print()
-        verb = "prints" if len(names) == 1 else "print"
-        console.print(f"[dim]{escape(', '.join(names))} {verb}[/]")
-        for line in text.splitlines() or ["(nothing)"]:
-            console.print(f"    {escape(line)}", soft_wrap=True)
+    parts = enumerate(_CODE.split(text))  # every second part is code
+    return RichText.assemble(*((part, "cyan" if k % 2 else "") for k, part in parts), style=style)
 
 
 def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:
     """Engines that printed the same, once: their names and the text."""
-    groups: dict[str, list[str]] = {}
-    for name, text in by_engine.items():
-        groups.setdefault(text, []).append(name)
-    return [(names, text) for text, names in groups.items()]
+    engines = grouped((text, name) for name, text in by_engine.items())
+    return [(names, text) for text, names in engines.items()]
 
 
-def _grid(block: Table, plain: bool, escape: Callable[[str], str], width: int) -> object:
+def _grid(block: Table, plain: bool, width: int) -> RenderableType:
     from rich import box
     from rich.table import Table as Grid
 
@@ -253,13 +226,13 @@ def _grid(block: Table, plain: bool, escape: Callable[[str], str], width: int) -
     name = _whole_name(block, width)
     for k, header in enumerate(block.headers):
         grid.add_column(
-            escape(header),
+            _shown(header, plain),
             justify="left" if k in block.words else "right",
             overflow="fold",
             min_width=name if k == 0 else None,
         )
     for k, row in enumerate(block.rows):
-        cells = (escape(_loud(cell)) for cell in row)
+        cells = (_shown(_loud(cell), plain) for cell in row)
         grid.add_row(*cells, style="bold" if k in block.emphasis else None)
     return grid
 
@@ -276,24 +249,25 @@ def _whole_name(block: Table, width: int) -> int | None:
 
     if 0 not in block.words or not block.rows:
         return None
-    columns = list(zip(block.headers, *block.rows, strict=True))
-    longest = max(cell_len(word) for cell in columns[0] for word in cell.split() or [""])
+
+    def widest_part(cells: Sequence[str]) -> int:
+        return max(cell_len(part) for cell in cells for part in cell.split() or [""])
+
+    first, *others = zip(block.headers, *block.rows, strict=True)
     # Words of other columns may wrap; numbers must not.
-    others = sum(
-        max(cell_len(part) for cell in column for part in (cell.split() or [""]))
-        if k in block.words
-        else max(map(cell_len, column))
-        for k, column in enumerate(columns)
-        if k
-    )
-    return longest if longest + others + 3 * len(columns) - 3 <= width else None
+    widths = [
+        widest_part(cells) if k in block.words else max(map(cell_len, cells))
+        for k, cells in enumerate(others, start=1)
+    ]
+    name = widest_part(first)
+    return name if name + sum(widths) + 3 * len(widths) <= width else None
 
 
-def _hanging(mark: str, text: str) -> object:
+def _hanging(mark: str | RichText, text: str) -> RenderableType:
     from rich.table import Table as Grid
 
     grid = Grid.grid(padding=(0, 1))
     grid.add_column(no_wrap=True)
     grid.add_column()
-    grid.add_row(mark, text)
+    grid.add_row(mark, _coded(text))
     return grid

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..compare.labels import lacking
 from ..compare.why import ADDS_UP, CauseShare, Explanation, Located
-from ..measures import Deviation
 from ..measures.text import NONE, capital, percent, quantity, sentence, short_time, significant
 from ..page import Block, Items, Page, Section, Table, TableCell, Text
 from . import template
@@ -48,39 +47,6 @@ TOUCH = (
     "where they touch."
 )
 PARTS = "{explained} of the gap is explained, {located} is localised, {unexplained} is unexplained"
-THREE = (
-    "Explained: this part goes when settings of the right are given the left's values. Localised "
-    "by leaving it out, not explained: this part goes only when something is left out on both "
-    "sides, which says where it comes from, and not why. Unexplained: this part stays."
-)
-LEFT_OUT = {
-    False: "* Localised by leaving it out, not explained: both sides ran again without {cause}, "
-    "which is another motion.",
-    True: "* Without {cause} nothing moves any more, so there can be no gap: a weak hint.",
-}
-INTEGRATOR = (
-    "* Localised by choosing it, not explained: both sides ran again with other integrators "
-    "({left} on the left, {right} on the right), which is another motion."
-)
-METHODS = {
-    "nothing": None,
-    "one at a time": "The parts add up, to within {adds_up} of the gap: each cause takes away as "
-    "much alone as last, and “explains” is the mean of the two.",
-    "all sets": "The causes interact. “explains” is the mean of what a cause takes away over all "
-    "orders in which the right can be given the left's values (Shapley value, over all sets).",
-    "drawn orders": "The causes interact. “explains” is the mean of what a cause takes away over "
-    "{orders} drawn orders in which the right is given the left's values (Shapley value), with its "
-    "standard error.",
-}
-NEXT = {
-    "refused": "What stays may come from what cannot be made the same: {causes}. Give both sides "
-    "the same there, and compare again.",
-    "engines": "What stays is between the engines. Look at one step at a time (--one-step), which "
-    "names the stage, and at the timestep (--converge).",
-    "files": "What stays is in nothing that is compared. Look at the function that commands, and "
-    "at the order of ctrl; if the open loop agrees, the difference is in what is commanded. Look "
-    "at one step at a time (--one-step).",
-}
 
 
 def page(result: Explanation, said: Sequence[str] = ()) -> Page:
@@ -93,8 +59,9 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     only = lacking(result.unmatched, ("the left", "the right"))
     title, *further = [*missing(result.missing), answer(result)]
     lines = [*map(sentence, (*further, *said, *only, *result.notes)), *proofs(result), result.says]
-    rounding, stays = result.is_rounding, not (result.is_rounding or result.is_explained)
-    refused = any(row.note for row in result.shares)
+    stays = not (result.is_rounding or result.is_explained)
+    refused = [row.name for row in result.shares if row.note]
+    engines = {side.backend for side in result.provenance}
     return template.page(
         "why",
         title=title,
@@ -108,10 +75,12 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         first=[Text(line) for line in lines if line],
         causes=causes(result),
         changes=steps(result),
-        next=_next(result) if stays else None,
+        refused=", ".join(refused[:4]) if stays and refused else None,
+        engines=if_true(stays and not refused and len(engines) > 1),
+        files=if_true(stays and not refused and len(engines) == 1),
         parts=three_parts(result)[1:],
-        holds=not refused if rounding else result.is_explained,
-        verdict=answer(result) if rounding else parts(result),
+        holds=not refused if result.is_rounding else result.is_explained,
+        verdict=answer(result) if result.is_rounding else parts(result),
     )
 
 
@@ -128,24 +97,23 @@ def answer(result: Explanation) -> str:
         differ = "alike" if result.shares else "rounding"
         kind = differ if result.gap <= result.negligible else "chaos"
         return ANSWERS[kind].format(gap=gap, floor=floor)
-    first = next((row for row in result.shares if row.share), None)
-    place = max(result.found_in, key=lambda part: part.share, default=None)
+    causes = [row for row in result.shares if row.share]
+    places = sorted(result.found_in, key=lambda place: -place.share)
     parts = {
-        "cause": abs(first.share or 0.0) if first else 0.0,
-        "located": place.share if place else 0.0,
+        "cause": max((abs(row.share or 0.0) for row in causes[:1]), default=0.0),
+        "located": max((place.share for place in places), default=0.0),
         "unexplained": result.unexplained,
     }
     kind = max(parts, key=parts.__getitem__)
-    slots: dict[str, object] = {}
-    if kind == "located" and place:
-        slots = {"cause": capital(place.name)}
-    elif kind == "cause" and first:
-        left, right = _values(first)
-        slots = {"cause": capital(first.name), "left": left, "right": right}
-        kind = "bare" if NONE in (left, right) else kind
+    part, cause, left, right = percent(parts[kind]), "", NONE, NONE
+    if kind == "located":
+        cause = capital(places[0].name)
+    elif kind == "cause":
+        cause, (left, right) = capital(causes[0].name), _values(causes[0])
         # A share below zero hides others; one far above the whole gap does only what they hide.
-        kind = kind if 0 < (first.share or 0.0) < _MASKED else "masked"
-    return ANSWERS[kind].format(part=percent(max(parts.values())), gap=gap, **slots)
+        masked = not 0 < (causes[0].share or 0.0) < _MASKED
+        kind = "masked" if masked else "bare" if NONE in (left, right) else "cause"
+    return ANSWERS[kind].format(cause=cause, left=left, right=right, part=part, gap=gap)
 
 
 def proofs(result: Explanation) -> tuple[str, ...]:
@@ -163,29 +131,55 @@ def causes(result: Explanation) -> list[Block]:
     refused = [f"{capital(row.name)}: {row.note}." for row in result.shares if row.note]
     small, floor = result.gap <= result.negligible, _amount(result, result.floor)
     noisy = not result.is_rounding and result.floor > _SMALL * result.gap
-    legend = METHODS[result.method]
+    gap, method = result.first[result.quantity], result.method
+    others = [
+        f"{name} {quantity(other.worst, other.unit)}"
+        for name, other in result.first.items()
+        if name != result.quantity
+    ]
     return template.blocks(
         "why_causes",
-        **_gap_slots(result.first, result.quantity),
+        what=_SINGULAR.get(result.quantity, result.quantity),
+        at=short_time(gap.at),
+        worst=quantity(gap.worst, gap.unit),
+        rms=quantity(gap.rms, gap.unit),
+        end=quantity(gap.end, gap.unit),
+        elsewhere=", ".join(others) or None,
         between=if_true(result.between),
         negligible=_amount(result, result.negligible) if result.is_rounding and small else None,
         chaos=floor if result.is_rounding and not small else None,
         same=if_true(not result.shares and not result.found_in),
         table=_table(result, able),
-        left_out=[Text(_left_out(part), small=True) for part in result.found_in],
+        located=[block for place in result.found_in for block in _located_note(place)],
         hardly_move=", ".join(result.still) or None,
-        method=legend and legend.format(orders=result.orders, adds_up=f"{100 * ADDS_UP:g} %"),
-        legend=if_true(legend),
-        several=if_true(legend and len(able) > 1),
-        negative=if_true(legend and any((row.share or 0.0) < -_NO_PART for row in able)),
-        no_figure=if_true(legend and any(None in (row.alone, row.last) for row in able)),
+        add_up=f"{100 * ADDS_UP:g} %" if method == "one at a time" else None,
+        all_sets=if_true(method == "all sets"),
+        orders=result.orders if method == "drawn orders" else None,
+        shares=if_true(method != "nothing"),
+        several=if_true(method != "nothing" and len(able) > 1),
+        negative=if_true(any((row.share or 0.0) < -_NO_PART for row in able)),
+        no_figure=if_true(
+            method != "nothing" and any(None in (row.alone, row.last) for row in able)
+        ),
         redundant=", ".join(result.redundant) or None,
         refused_too=if_true(refused),
-        refused=[Items(refused)] if refused else [],
+        refused=Items(refused),
         impossible=len(result.impossible) or None,
         such_as=", ".join(next(iter(result.impossible), ())),
         noise=floor if noisy else None,
         noise_part=percent(result.floor / result.gap) if noisy else None,
+    )
+
+
+def _located_note(place: Located) -> list[Block]:
+    """How a feature that was left out on both sides, or an integrator, was found."""
+    left, right = place.values or (None, None)
+    return template.blocks(
+        "why_located",
+        cause=None if place.values or place.is_still else place.name,
+        idle=place.name if place.is_still and not place.values else None,
+        left=left,
+        right=right,
     )
 
 
@@ -210,41 +204,21 @@ def parts(result: Explanation) -> str:
 
 def three_parts(result: Explanation) -> list[Block]:
     """The three parts of the gap, and what they mean; nothing where there is none to explain."""
-    if result.is_rounding:
-        return []
-    return [Text(f"{parts(result)}."), Text(THREE, small=True)]
-
-
-def _next(result: Explanation) -> str:
-    """What to look at where something stays."""
-    refused = [row.name for row in result.shares if row.note]
-    engines = {side.backend for side in result.provenance}
-    kind = "refused" if refused else "engines" if len(engines) > 1 else "files"
-    return NEXT[kind].format(causes=", ".join(refused[:4]))
-
-
-def _gap_slots(gaps: Mapping[str, Deviation], of: str) -> dict[str, str | None]:
-    """How far two runs are apart in one of some quantities, and in the others."""
-    gap = gaps[of]
-    others = [f"{name} {quantity(g.worst, g.unit)}" for name, g in gaps.items() if name != of]
-    return {
-        "what": _SINGULAR.get(of, of),
-        "at": short_time(gap.at),
-        **{size: quantity(getattr(gap, size), gap.unit) for size in ("worst", "rms", "end")},
-        "elsewhere": ", ".join(others) or None,
-    }
+    return [] if result.is_rounding else template.blocks("why_parts", parts=parts(result))
 
 
 def _table(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
     """The differences, the largest share first; those without an effect folded away."""
-    rows = [_row(result, row) for row in able if result.is_rounding or _counts(row)]
-    rows += [_located_row(part) for part in result.found_in]
-    small = [row for row in able if not result.is_rounding and not _counts(row)]
+    small = [] if result.is_rounding else [row for row in able if not _counts(row)]
+    small = small if len(small) > 1 else []
+    rows = [_row(result, row) for row in able if row not in small]
+    for place in result.found_in:  # what a feature takes away when it is left out on both sides
+        explains = TableCell(f"{percent(place.share)}*", share=place.share)
+        rows.append((capital(place.name), *(place.values or (NONE, NONE)), explains, NONE, NONE))
     if small:
         share = sum(row.share or 0.0 for row in small)
-        name = capital(small[0].name) if len(small) == 1 else f"{len(small)} more, none above 0.1 %"
-        values = _values(small[0]) if len(small) == 1 else (NONE, NONE)
-        rows.append((name, *values, TableCell(percent(share), share=share), NONE, NONE))
+        explains = TableCell(percent(share), share=share)
+        rows.append((f"{len(small)} more, none above 0.1 %", NONE, NONE, explains, NONE, NONE))
     title = "What differs"
     if not result.is_rounding:
         title += f", and its part of the {_amount(result, result.gap)} of the {result.quantity} "
@@ -253,8 +227,8 @@ def _table(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
     most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
     heading = f"{len(rows) - most} more differences, with smaller parts"
     more = Table(_HEADS, rows[most:], heading, words=words)
-    first: list[Block] = [Table(_HEADS, rows[:most], title, words=words)] if rows else []
-    return [*first, *([Section("", heading, [more], folded=True)] if more.rows else [])]
+    folded = [Section("", heading, [more], folded=True)] if more.rows else []
+    return [Table(_HEADS, rows[:most], title, words=words), *folded] if rows else []
 
 
 def _counts(row: CauseShare) -> bool:
@@ -262,94 +236,70 @@ def _counts(row: CauseShare) -> bool:
     return max(abs(part or 0.0) for part in (row.share, row.alone, row.last)) >= _NO_PART
 
 
-def _row(result: Explanation, row: CauseShare) -> tuple[str | TableCell, ...]:
-    what = capital(row.name)
-    if len(row.values) > 1 and len({repr(value[1:]) for value in row.values}) > 1:
+def _row(result: Explanation, row: CauseShare) -> tuple[str, ...]:
+    what, figure = capital(row.name), row.values[0][0] if row.values else ""
+    if len({repr(value[1:]) for value in row.values}) > 1:
         what += f" ({len(row.values)} figures)"
-    elif row.values and "[" in row.values[0][0] and not row.name.startswith(row.values[0][0]):
-        what += f" ({row.values[0][0]})"
-    left, right = _values(row)
-    if result.is_rounding:
-        return what, left, right, NONE, NONE, NONE
-    noise = result.floor / result.gap
-    if abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
-        explains = f"< {percent(noise)}"
-        return what, left, right, TableCell(explains, share=row.share), NONE, NONE
-    explains = percent(row.share)
+    elif "[" in figure and not row.name.startswith(figure):
+        what += f" ({figure})"
+    explains, alone, last = percent(row.share), percent(row.alone), percent(row.last)
     if row.error and math.isfinite(row.error):
         explains += f" ± {percent(row.error)}"
-    alone, last = (NONE if part is None else percent(part) for part in (row.alone, row.last))
-    return what, left, right, TableCell(explains, share=row.share), alone, last
-
-
-def _left_out(part: Located) -> str:
-    if part.values:
-        return INTEGRATOR.format(left=part.values[0], right=part.values[1])
-    return LEFT_OUT[part.is_still].format(cause=part.name)
-
-
-def _located_row(part: Located) -> tuple[str | TableCell, ...]:
-    """What a feature that was left out takes away; of an integrator, what the sides have."""
-    left, right = part.values or (NONE, NONE)
-    explains = TableCell(f"{percent(part.share)}*", share=part.share)
-    return capital(part.name), left, right, explains, NONE, NONE
+    noise = 0.0 if result.is_rounding else result.floor / result.gap
+    if result.is_rounding:
+        explains, alone, last = NONE, NONE, NONE
+    elif abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
+        explains, alone, last = f"< {percent(noise)}", NONE, NONE
+    share = None if result.is_rounding else row.share
+    return what, *_values(row), TableCell(explains, share=share), alone, last
 
 
 def _values(row: CauseShare) -> tuple[str, str]:
-    """The left's and the right's value of the figure that differs most."""
-    if not row.values:
-        return NONE, NONE
-    return _sides(max(row.values, key=_relative), row.unit)
+    """The left's and the right's value of the figure that differs most.
+
+    Of a place, or a direction, how far the right one is off.
+    """
+    figure = max(row.values, key=_relative, default=("", None, None))
+    name, left, right = figure
+    a, b = (np.array(value if isinstance(value, tuple) else (), object) for value in (left, right))
+    if name in _OFF and len(a) and len(b):
+        a, b = a.astype(float), b.astype(float)
+        if row.unit:
+            return "here", f"{quantity(float(np.linalg.norm(a - b)), row.unit)} off"
+        angle = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+        return "this way", f"{quantity(angle, 'rad')} off"
+    texts = [_value(value, row.unit) for value in (left, right)]
+    if len(a) and len(a) == len(b) and max(map(len, texts)) > _WIDE:
+        differ = a != b  # a cut would hide those
+        texts = [_value(tuple(side[differ]), "") for side in (a, b)]
+        texts = texts if differ.all() else [f"{text} …" for text in texts]
+    texts = [text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…" for text in texts]
+    if texts[0] == texts[1] and _relative(figure):  # numbers, which read the same: all digits
+        a, b = (np.array(value, dtype=float).ravel() for value in (left, right))
+        texts = [f"{side[np.argmax(a != b)]:.12g}" for side in (a, b)]
+    return texts[0], texts[1]
 
 
 def _relative(figure: tuple[str, object, object]) -> float:
     """How far two values are apart, as a part of the larger; 0 where that is no number."""
     try:
-        one, two = (np.array(value, dtype=float) for value in figure[1:])
-        size = max(float(np.linalg.norm(one)), float(np.linalg.norm(two)))
-        return float(np.linalg.norm(one - two)) / size if size else 0.0
+        left, right = (np.array(value, dtype=float) for value in figure[1:])
+        size = max(float(np.linalg.norm(left)), float(np.linalg.norm(right)))
+        return float(np.linalg.norm(left - right)) / size if size else 0.0
     except (TypeError, ValueError):
         return 0.0
-
-
-def _sides(figure: tuple[str, object, object], unit: str) -> tuple[str, str]:
-    """Both values; of a place, or a direction, how far the right one is off."""
-    name, one, two = figure
-    if name in _OFF and isinstance(one, tuple) and isinstance(two, tuple):
-        a, b = np.array(one, dtype=float), np.array(two, dtype=float)
-        if unit:
-            return "here", f"{quantity(float(np.linalg.norm(a - b)), unit)} off"
-        angle = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
-        return "this way", f"{quantity(angle, 'rad')} off"
-    if isinstance(one, tuple) and isinstance(two, tuple) and len(one) == len(two):
-        texts = [" ".join(_number(number, "") for number in value) for value in (one, two)]
-        if max(map(len, texts)) > _WIDE:  # those that differ, which a cut would hide
-            apart = [pair for pair in zip(one, two, strict=True) if pair[0] != pair[1]]
-            cut = () if len(apart) == len(one) else ("…",)
-            one, two = ((*(pair[k] for pair in apart), *cut) for k in (0, 1))
-    left, right = _value(one, unit), _value(two, unit)
-    if left == right and _relative(figure):  # numbers, which read the same: with all their digits
-        a, b = (np.array(value, dtype=float).ravel() for value in figure[1:])
-        left, right = (f"{each[np.argmax(a != b)]:.12g}" for each in (a, b))
-    return left, right
 
 
 def _value(value: object, unit: str) -> str:
     if value is None:
         return NONE
     if isinstance(value, tuple):
-        text = " ".join(_number(number, "") for number in value)
-        return text if len(text) <= _WIDE else f"{text[: _WIDE - 1].rstrip()}…"
-    return _number(value, unit)
-
-
-def _number(value: object, unit: str) -> str:
+        return " ".join(_value(number, "") for number in value)
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, int | float):
         return quantity(float(value), unit) if unit else significant(float(value))
-    text = str(value)
-    return text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…"
+    return str(value)
 
 
 def _amount(result: Explanation, value: float) -> str:

@@ -1,0 +1,235 @@
+"""What each side of a comparison was told, what made it, and what it presses on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..compare import Agreement, Comparison, Contact, SidesRun, Touch
+from ..interface import Array, JointType
+from ..measures.text import (
+    NONE,
+    figure,
+    listed,
+    milliseconds,
+    numbers,
+    quantity,
+    sentence,
+    short_time,
+)
+from ..page import Block, Headline, Items, Section, Table, TableCell, Text
+from ..runs import Header, Trace
+from . import template
+from .finding import moment, name_of, short_labels, window
+from .template import if_true
+from .why import missing
+
+_NEAR = 0.2  # rad: joints that end as near as this to their ctrl were told an angle
+_PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
+# Of the promises that a backend may emulate, those that move the arm, in plain words.
+PHYSICS = {
+    "position servo": "servos with the gains of the model",
+    "armature": "armature",
+    "joint damping": "damping",
+    "dry friction": "dry friction",
+    "joint limits": "joint limits",
+}
+
+
+def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> list[Block]:
+    """What each actuator was told, at the start and in the end; empty without actuators."""
+    actuators = one.header.actuators
+    if not actuators or actuators != two.header.actuators:
+        return []
+    if all(trace.header.options.get("actuation") is False for trace in (one, two)):
+        return [Text("The actuators are off on both sides: nothing is commanded.")]
+    misses = [_ends(trace) for trace in (one, two)]
+    # The trace does not say so, but ctrl is an angle where most joints end near it.
+    angle = all(np.isfinite(miss).all() and np.median(miss) < _NEAR for miss in misses)
+    unit, scale = ("°", 180 / np.pi) if angle else ("", 1.0)
+    same = _same(one.ctrl, two.ctrl)
+    traces = {"": one} if same else {f"{labels[0]}, ": one, f"{labels[1]}, ": two}
+    columns = {
+        f"{side}{when}": [f"{figure(round(ctrl * scale, 9))}{unit}" for ctrl in trace.ctrl[row]]
+        for side, trace in traces.items()
+        for when, row in (("at the start", 0), ("in the end", -1))
+    }
+    for miss, label in zip(misses, labels, strict=True):
+        if angle:
+            columns[f"missed in the end, {label}"] = [quantity(far, "rad") for far in miss.tolist()]
+    rows = list(zip(actuators, *columns.values(), strict=True))
+    heading = f"What was commanded ({'' if same else 'not '}the same on both sides)"
+    title = f"{'Commanded' if angle else 'ctrl'}, by actuator"
+    table = Table(("actuator", *columns), rows, title)
+    return [Section("", heading, [table], folded=True, detail=True)]
+
+
+def _same(one: Array, two: Array) -> bool:
+    """Whether two runs were told the same, each at its own rows."""
+    rows = np.linspace(0, 1, 50)
+    a, b = (c[np.round(rows * (len(c) - 1)).astype(int)] for c in (one, two))
+    return bool(np.allclose(a, b, rtol=0, atol=1e-9)) or (
+        len(one) == len(two) and bool(np.allclose(one[:-1], two[:-1], rtol=0, atol=1e-9))
+    )
+
+
+def _ends(trace: Trace) -> Array:
+    """How far each actuator's joint is from its ctrl in the end (nu,) [rad]; NaN for no hinge."""
+    header = trace.header
+    misses = np.full(header.nu, np.nan)
+    for k, joint in enumerate(header.actuator_jntid):
+        if joint >= 0 and JointType(header.jnt_type[joint]) is JointType.HINGE:
+            misses[k] = abs(trace.qpos[-1, header.jnt_qposadr[joint]] - trace.ctrl[-1, k])
+    return misses
+
+
+def contact_words(comparison: Comparison, touches: Sequence[Touch]) -> Table:
+    """How hard each pair of bodies presses in the end on each side, and how deep it overlaps."""
+
+    def size(touch: Touch) -> tuple[float, float]:
+        return (
+            max(touch.one.force, touch.two.force),
+            max(touch.one.deepest, touch.two.deepest),
+        )
+
+    labels = short_labels(comparison)
+    hardest = sorted(touches, key=size, reverse=True)[:_PAIRS_SHOWN]
+    return Table(
+        ("bodies", "side", "force, N", "with friction, N", "deepest", "at, s", "last touch"),
+        [
+            (touch.pair, label, *_contact_cells(side))
+            for touch in hardest
+            for label, side in zip(labels, (touch.one, touch.two), strict=True)
+        ],
+        f"Who presses on what ({len(hardest)} of {len(touches)} pairs; forces are means over "
+        f"{window(comparison)})",
+        words=frozenset({0, 1}),
+        wide=frozenset({5}),
+    )
+
+
+def _contact_cells(contact: Contact) -> tuple[str, ...]:
+    if contact.first is None:
+        return NONE, NONE, NONE, NONE, "never touches"
+    return (
+        figure(contact.force),
+        figure(contact.total),
+        quantity(contact.deepest, "m"),
+        moment(contact.deepest_at),
+        "in the end" if contact.ends else short_time(contact.last or 0.0),
+    )
+
+
+def unmatched(run: SidesRun | None) -> list[Block]:
+    """What one side has nothing of, what could not be matched, and what was not by name."""
+    lines = [*missing(run.missing), *run.unmatched] if run else []
+    return [Items([sentence(line) for line in lines])] if lines else []
+
+
+def told(run: SidesRun | None) -> list[Block]:
+    """Whether the two sides were told the same, where that takes one sentence."""
+    if run is None:
+        return []
+    lacking = run.matched.only[0].get("actuator", ()) if run.matched else ()
+    commands = run.commands
+    return template.blocks(
+        "loops_told",
+        same=if_true(commands == "the same"),
+        recorded=if_true(commands == "recorded"),
+        more=if_true(commands == "more than ctrl"),
+        lacking=if_true(lacking and commands != "its own"),
+    )
+
+
+def loops(comparison: Comparison, played: Comparison | None) -> list[Block]:
+    """The figures of both loops, quantity by quantity; nothing where they are the same."""
+    if played is None:
+        return []
+    closed = {found.name: found for found in comparison.agreements}
+    opened = {found.name: found for found in played.agreements}
+    rows = [
+        (name_of(name), *_cells(closed.get(name)), *_cells(opened.get(name)))
+        for name in closed | opened
+    ]
+    left, right = short_labels(comparison)
+    table = Table(
+        ("quantity", "closed loop", "largest", "open loop", "largest"),
+        rows,
+        f"{left} against {right}: each with its own commands, and both with the left's",
+        words=frozenset({0, 1, 3}),
+    )
+    return [Section("loops", "Closed loop and open loop", template.blocks("loops", table=table))]
+
+
+def also_open(headline: Headline, played: Comparison | None) -> Headline:
+    """The headline, and what the open loop says where it says something else."""
+    if played is None or played.agrees == headline.holds:
+        return headline
+    verdict = "agree" if played.agrees else "do not agree"
+    lead = f"{headline.lead}; in open loop, with the left's commands on both, they {verdict}"
+    return replace(headline, lead=lead, holds=headline.holds and played.agrees)
+
+
+def _cells(agreement: Agreement | None) -> tuple[str, str]:
+    if agreement is None:
+        return NONE, NONE
+    note = agreement.note if agreement.kind == "contact" else ""
+    verdict = TableCell(agreement.verdict, verdict=agreement.verdict)
+    return verdict, note or quantity(agreement.max, agreement.unit)
+
+
+def emulated(comparison: Comparison) -> list[Block]:
+    """What of the model a backend keeps instead of its engine."""
+    sides = {
+        side.engine: side.provenance.emulated
+        for side in (comparison.one, comparison.two)
+        if side.provenance.emulated and side.defaults == "model"
+    }
+    blocks: list[Block] = []
+    for engine, promises in sides.items():
+        moving = [PHYSICS[name] for name in promises if name in PHYSICS]
+        rest = "; ".join(name for name in promises if name not in PHYSICS)
+        text = Text(f"Promises of this library, and conventions of its states and forces: {rest}.")
+        heading = f"What else this library adds to {engine}"
+        blocks += template.blocks(
+            "provenance",
+            engine=engine,
+            moving=listed(moving) if moving else None,
+            rest=[Section("", heading, [text], folded=True, detail=True)] if rest else [],
+        )
+    return blocks
+
+
+def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
+    """What made both sides."""
+    left, right = (header.provenance.versions for header in headers)
+    a, b = (facts_of(header) for header in headers)
+    ran = ["recorded, opened here" if h.recorded else "run for this page" for h in headers]
+    rows = [
+        ("ran as", *ran),
+        *((name, left.get(name, NONE), right.get(name, NONE)) for name in left | right),
+        ("rows", f"{comparison.one.rows}", f"{comparison.two.rows}"),
+        *((name, a[name], b[name]) for name in a if a[name] or b[name]),
+    ]
+    labels = comparison.one.label, comparison.two.label
+    return Table(("what", *labels), rows, "What made the two runs", words=frozenset({0, 1, 2}))
+
+
+def facts_of(header: Header) -> dict[str, str]:
+    """What made a run, apart from versions."""
+    made = header.provenance
+    substeps = f" in {header.substeps} substeps" if header.substeps > 1 else ""
+    return {
+        "model": made.model_file,
+        "its SHA-256": TableCell(made.model_sha256, code=True),
+        "defaults": header.defaults,
+        "options": ", ".join(f"{name} {value}" for name, value in header.options.items()) or "none",
+        "starts in": header.keyframe or "the default state",
+        "timestep": milliseconds(header.timestep) + substeps,
+        "gravity": numbers(header.gravity) + " m/s²",
+        "seed": "none drawn" if made.seed is None else f"{made.seed}",
+        "energies by": header.energy_by or NONE,
+        "made again by": TableCell(header.command, code=True),
+    }
