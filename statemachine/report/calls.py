@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby, zip_longest
 
 from ..engines import room
 from ..engines.call_watch import CallWords
 from ..interface import DERIVED
-from ..measures.text import NONE, few
+from ..measures.text import NONE, few, grouped
 from ..page import Block, Code, Table, Text
 from ..probes.calls import Call, CallRecording, Statement
 from . import template
+from .template import if_true
 
 _NAMES_SHOWN = 8  # of what a call changed
 _ROWS_SHOWN = 6  # of the calls on one thing, before those that changed nothing share one
@@ -19,33 +20,26 @@ _ROWS_SHOWN = 6  # of the calls on one thing, before those that changed nothing 
 
 def blocks(recordings: Mapping[str, CallRecording]) -> list[Block]:
     """Blocks for the recordings of one code, by engine; the code's backend may differ."""
-    several = len(recordings) > 1
-    prefix = {name: f"{name}: " if several else "" for name in recordings}
+    prefix = {name: f"{name}: " if len(recordings) > 1 else "" for name in recordings}
     looks = [f"{prefix[name]}{_words(each.engine).shown}" for name, each in recordings.items()]
+    ended = {name: recording.error for name, recording in recordings.items() if recording.error}
     statements: list[Block] = []
     for together in zip_longest(*(each.statements for each in recordings.values())):
         pairs = zip(recordings, together, strict=True)
         ran = {name: statement for name, statement in pairs if statement is not None}
-        first = next(iter(ran.values()))
-        if first.source.startswith(("import ", "from ")) and not any(
-            each.calls or each.changed for each in ran.values()
-        ):
-            continue
-        sources = dict.fromkeys(each.source for each in ran.values())
-        statements.append(Code([line for source in sources for line in source.splitlines()]))
-        statements += _answers(ran)
+        sources = dict.fromkeys(statement.source for statement in ran.values())
+        is_import = next(iter(sources)).startswith(("import ", "from "))
+        if not is_import or any(each.calls or each.changed for each in ran.values()):
+            statements.append(Code([line for source in sources for line in source.splitlines()]))
+            statements += _answers(ran)
     return template.blocks(
         "calls",
         engines=" and ".join(f"{name} {each.version}" for name, each in recordings.items()),
         none=NONE,
         looks="; ".join(looks),
         statements=statements,
-        ended=[
-            Text(f"{prefix[name]}The run ended there: {recording.error}")
-            for name, recording in recordings.items()
-            if recording.error
-        ],
-        legend=list(_legend(recordings)),
+        ended=[Text(f"{prefix[name]}The run ended there: {why}") for name, why in ended.items()],
+        legend=[text for each in recordings.values() for text in _legend(each)],
     )
 
 
@@ -54,46 +48,44 @@ def not_asked(backend: str) -> Text:
     return Text(f"{backend}: not asked which of its own functions it ran.")
 
 
-def _answers(ran: Mapping[str, Statement]) -> Iterator[Block]:
+def _answers(ran: Mapping[str, Statement]) -> list[Block]:
     """What a line made each engine do; once, if nothing and the same of all."""
     silent = {name: _unheard(each) for name, each in ran.items() if not each.calls}
-    if len(silent) == len(ran) and len(set(silent.values())) == 1:
-        yield Text(next(iter(silent.values())))
-        return
-    for name, statement in ran.items():
-        yield Text(f"{name}: {silent[name]}") if name in silent else _table(name, statement)
+    if len(silent) == len(ran) and len({*silent.values()}) == 1:
+        return [Text(next(iter(silent.values())))]
+    return [
+        Text(f"{name}: {silent[name]}") if name in silent else _table(name, statement)
+        for name, statement in ran.items()
+    ]
 
 
 def _unheard(statement: Statement) -> str:
-    if statement.due:
-        written = f" Changed: {', '.join(statement.changed)}." if statement.changed else ""
-        return (
-            f"No call yet.{written} All that is derived of {' and '.join(statement.due)} now "
-            "belongs to this moment: it is computed when it is read."
-        )
-    if statement.changed:
-        return f"No call. Changed: {', '.join(statement.changed)}, and nothing else."
-    return "No call. Nothing changed."
+    """What a line did that ran nothing of the engine."""
+    changed = ", ".join(statement.changed) or None
+    (text,) = template.texts(
+        "calls_unheard",
+        later=" and ".join(statement.due) or None,
+        written=changed if statement.due else None,
+        changed=None if statement.due else changed,
+        nothing=if_true(not statement.due and not changed),
+    )
+    return text
 
 
 def _table(engine: str, statement: Statement) -> Table:
+    """The calls, those on one thing under its name; then what changed outside of them."""
     rows: list[tuple[str, str, str]] = []
     titles: set[int] = set()
-    for (owner, on), group in groupby(statement.calls, key=lambda call: (call.engine, call.on)):
-        titles.add(len(rows))
+    for (owner, on), calls in groupby(statement.calls, key=lambda call: (call.engine, call.on)):
         of = "" if owner == engine else f"{owner}: "
-        rows.append((f"{of}{on or 'no object'}", "", ""))
-        rows += _rows(list(group))
-    if statement.changed:
-        computed = [each for each in statement.changed if each.rpartition(".")[2] in DERIVED]
-        others = [each for each in statement.changed if each not in computed]
-        for title, names in (
-            ("outside these calls", others),
-            ("computed because it was read", computed),
-        ):
-            if names:
-                titles.add(len(rows))
-                rows.append((title, "", ", ".join(names)))
+        titles.add(len(rows))
+        rows += [(f"{of}{on or 'no object'}", "", ""), *_rows(list(calls))]
+    changed = grouped((name.rpartition(".")[2] in DERIVED, name) for name in statement.changed)
+    others = {"outside these calls": False, "computed because it was read": True}
+    for title, derived in others.items():
+        if derived in changed:
+            titles.add(len(rows))
+            rows.append((title, "", ", ".join(changed[derived])))
     return Table(
         (engine, "times", "changed"),
         rows,
@@ -102,20 +94,21 @@ def _table(engine: str, statement: Statement) -> Table:
     )
 
 
-def _rows(calls: Sequence[Call]) -> Iterator[tuple[str, str, str]]:
+def _rows(calls: Sequence[Call]) -> list[tuple[str, str, str]]:
     """The calls on one thing; where they are many, those without effect in one row."""
     idle = [call for call in calls if not call.changed]
-    together = len(calls) > _ROWS_SHOWN and len(idle) > 1
-    for call in calls:
-        if call.changed or not together:
-            yield f"  {call.function}", f"{call.count:,}", _names(call.changed)
-    if together:
+    if len(calls) <= _ROWS_SHOWN or len(idle) < 2:
+        idle = []
+    rows = [
+        (f"  {call.function}", f"{call.count:,}", _names(call.changed))
+        for call in calls
+        if call not in idle
+    ]
+    if idle:
         names = ", ".join(call.function for call in idle)
-        yield (
-            f"  {len(idle)} others",
-            f"{sum(call.count for call in idle):,}",
-            f"{NONE}: {names}",
-        )
+        times = sum(call.count for call in idle)
+        rows.append((f"  {len(idle)} others", f"{times:,}", f"{NONE}: {names}"))
+    return rows
 
 
 def _names(changed: Sequence[str]) -> str:
@@ -127,26 +120,21 @@ def _words(engine: str) -> CallWords:
     return room(engine).call_watch().words
 
 
-def _legend(recordings: Mapping[str, CallRecording]) -> Iterator[Text]:
+def _legend(recording: CallRecording) -> list[Text]:
     """What the roles are that appear, with what this run says of them."""
-    for recording in recordings.values():
-        words = _words(recording.engine)
-        calls = [call for statement in recording.statements for call in statement.calls]
-        for role, text in words.roles.items():
-            own = [call for call in calls if role in call.on]
-            if own:
-                yield Text(text.format(_times(_steps(own, words.step))))
-        if words.note:
-            yield Text(words.note)
-        for engine, text in words.helpers.items():
-            own = [call for call in calls if call.engine == engine]
-            if own:
-                yield Text(text.format(_times(_steps(own, _words(engine).step), "called")))
-
-
-def _steps(calls: Sequence[Call], name: str) -> int:
-    return sum(call.count for call in calls if call.function.startswith(name))
-
-
-def _times(count: int, verb: str = "stepped") -> str:
-    return {0: f"never {verb}", 1: f"{verb} once"}.get(count, f"{verb} {count:,} times")
+    words = _words(recording.engine)
+    calls = [call for statement in recording.statements for call in statement.calls]
+    legend = [
+        (text, words.step, [call for call in calls if role in call.on])
+        for role, text in words.roles.items()
+    ]
+    legend.append((words.note, "", calls if words.note else []))
+    legend += [
+        (text, _words(engine).step, [call for call in calls if call.engine == engine])
+        for engine, text in words.helpers.items()
+    ]
+    return [
+        Text(text.format(sum(call.count for call in own if call.function.startswith(step))))
+        for text, step, own in legend
+        if own
+    ]

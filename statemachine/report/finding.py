@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -63,31 +62,31 @@ def headline(
 ) -> Headline:
     """The largest difference, what explains it, and what is left of it in the end."""
     agreements, until = comparison.agreements, comparison.until
-    holds, main = comparison.agrees, subject(comparison, explanation)
-    of = main.found if main else None
-    if holds:
-        kind = "same" if all(agreement.max == 0 for agreement in agreements) else "agree"
-    elif comparison.ended:
-        kind = "ended"
-    else:
-        kind = "differ" if main is None else "contact" if of and of.kind == "contact" else "apart"
-    sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
+    if comparison.agrees:
+        same = all(agreement.max == 0 for agreement in agreements)
+        return Headline(LEADS["same" if same else "agree"].format(until=until))
+    if comparison.ended:
+        sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
+        lead = LEADS["ended"].format(
+            sides=" and ".join(sides),
+            until=until,
+            agrees=sum(agreement.verdict == "agrees" for agreement in agreements),
+            total=len(agreements),
+        )
+        return Headline(lead, holds=False)
+    main = subject(comparison, explanation)
+    if main is None:
+        return Headline(LEADS["differ"], holds=False)
+    contact = main.found if main.found and main.found.kind == "contact" else None
     left, right = short_labels(comparison)
-    slots = {"what": main.named, "far": main.far, "at": short_time(main.at)} if main else {}
-    if of and kind == "contact":
-        slots |= {"what": name_of(of.name), "far": of.note or slots["far"]}
-    lead = LEADS[kind].format(
-        until=until,
-        sides=" and ".join(sides),
-        agrees=sum(agreement.verdict == "agrees" for agreement in agreements),
-        total=len(agreements),
+    lead = LEADS["contact" if contact else "apart"].format(
+        what=name_of(contact.name) if contact else main.named,
+        far=contact.note or main.far if contact else main.far,
+        at=short_time(main.at),
         left=left,
         right=right,
         parting=_parting(comparison, events),
-        **slots,
     )
-    if kind not in ("apart", "contact"):
-        return Headline(lead, holds=holds)
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
     return Headline(capital(lead), causes, _in_the_end(comparison, curves), holds=False)
 
@@ -97,13 +96,13 @@ def _parting(comparison: Comparison, events: Sequence[Event]) -> str:
     at = parting(comparison)
     if at is None:
         return ""
+    step = max(comparison.one.timestep, comparison.two.timestep)
     spacing = comparison.until / max(1, comparison.moments - 1)
-    steps = comparison.one.timestep, comparison.two.timestep
     kind = "at the start" if at == 0 else "exact"
-    if at and spacing > 1.5 * max(steps):
+    if at and spacing > 1.5 * step:
         kind = "first" if at <= 1.001 * spacing else "coarse"
     # A touch later than a step after the parting has nothing to do with it.
-    slack = 1.001 * max(steps) if at and kind != "first" else -1.0
+    slack = 1.001 * step if at and kind != "first" else -1.0
     touches = (e.what for e in events if e.kind == "touch" and e.time and abs(e.time - at) <= slack)
     body, _, ground = next(touches, "").partition(" on ")
     when = f", when {body} touches {ground}" if body else ""
@@ -175,17 +174,16 @@ def subject(
         if lead is None:
             return None
         return MainDifference(named(lead), quantity(lead.max, lead.unit), lead.at, lead)
-    gap = explanation.first[explanation.quantity]
-    kind = {"joints": "joint", "slides": "slide"}.get(explanation.quantity)
+    gap, quantities = explanation.first[explanation.quantity], explanation.quantity
+    kind = {"joints": "joint", "slides": "slide"}.get(quantities)
     same = [
         agreement
         for agreement in comparison.agreements
-        if (kind or f"{explanation.quantity}, position")
-        == (agreement.kind if kind else agreement.name)
+        if (agreement.kind == kind if kind else agreement.name == f"{quantities}, position")
         and abs(agreement.max - gap.worst) <= 1e-6 * gap.worst
     ]
+    who = f"one of the {quantities}" if kind else f"the {quantities}"
     far = quantity(gap.worst, explanation.unit)
-    who = f"one of the {explanation.quantity}" if kind else f"the {explanation.quantity}"
     first = same[0] if same else None
     return MainDifference(named(first) if first else who, far, gap.at, first)
 
@@ -217,27 +215,23 @@ def in_words(comparison: Comparison) -> list[Block]:
     agreements, holds, ended = comparison.agreements, comparison.agrees, comparison.ended
     worst, first = leading(comparison), parting(comparison)
     counts = Counter(agreement.verdict for agreement in agreements)
-    unlike = not holds and not ended
-    slots: dict[str, Any] = {"nearest": None, "farthest": None, "first": None}
-    if worst is not None:
-        slots["far"], slots["tolerance"] = (
-            quantity(size, worst.unit) for size in (worst.max, worst.tolerance)
-        )
-        slots["at"] = short_time(worst.at)
-        slots["nearest"] = name_of(worst.name) if holds and worst.max else None
-        slots["farthest"] = named(worst) if unlike and worst.kind != "contact" else None
-    if ended and not holds and first is not None:
-        slots["first"] = named(next(a for a in agreements if a.since == first))
-        slots["at"] = short_time(first)
+    unlike, cut = not holds and not ended, bool(ended and not holds)
+    parted = [named(a) for a in agreements if first is not None and a.since == first]
     return template.blocks(
         "finding",
         total=len(agreements),
         moments=comparison.moments,
         within=if_true(holds),
-        cut=if_true(ended and not holds),
+        cut=if_true(cut),
         unlike=if_true(unlike),
         **{kind: counts[kind] for kind in ("agrees", "settles", "differs")},
-        **slots,
+        far=worst and quantity(worst.max, worst.unit),
+        tolerance=worst and quantity(worst.tolerance, worst.unit),
+        at=worst and short_time(worst.at),
+        nearest=name_of(worst.name) if worst and holds and worst.max else None,
+        farthest=named(worst) if worst and unlike and worst.kind != "contact" else None,
+        first=parted[0] if cut and parted else None,
+        parted=short_time(first or 0.0),
     )
 
 
@@ -249,16 +243,19 @@ def floor_words(comparison: Comparison, floor: ChaosFloor) -> list[Block]:
     ]
     sizes = [f"{quantity(b.most, b.unit)} ({name_of(b.name)})" for b in largest if b]
     motion = [band for band in floor.bands if band.kind != "contact"]
-    within = [band for band in motion if band.inside_from is not None]
     moving = [
-        f"{name_of(b.name)} from {short_time(b.inside_from or 0.0)} on"
-        for b in within
-        if b.most > 0
+        f"{name_of(band.name)} from {short_time(band.inside_from)} on"
+        for band in motion
+        if band.inside_from is not None and band.most > 0
     ]
-    everywhere = len(within) == len(motion) and all(band.inside_from == 0 for band in within)
+    everywhere = all(band.inside_from == 0 for band in motion)
+    inside = bool(moving) and not everywhere
     verdicts = {agreement.name: agreement.verdict for agreement in comparison.agreements}
-    chance = [b.name for b in floor.bands if not b.beyond and verdicts[b.name] != "agrees"]
-    inside = moving and not everywhere
+    chance = [
+        name_of(band.name)
+        for band in floor.bands
+        if inside and not band.beyond and verdicts[band.name] != "agrees"
+    ]
     return template.blocks(
         "floor",
         side=short_labels(comparison)[0],
@@ -269,7 +266,7 @@ def floor_words(comparison: Comparison, floor: ChaosFloor) -> list[Block]:
         no_gap=if_true(not moving),
         every_gap=if_true(moving and everywhere),
         inside=", ".join(moving) if inside else None,
-        chance=listed([name_of(name) for name in chance]) if chance and inside else None,
+        chance=listed(chance) if chance else None,
     )
 
 

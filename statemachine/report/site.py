@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..backends import backend_names, load
+from ..backends import load
 from ..compare import Request, compare, run_sides, series, witness
 from ..compare.why import explain
 from ..errors import MissingEngineError
@@ -41,21 +42,18 @@ def make_path(
         MissingEngineError: A backend that was asked for, or matplotlib, is not installed.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    names = backends or available()[0]
     written = []
     for number, lesson in enumerate(LESSONS.values(), start=1):
         say(f"running the lesson {lesson.name} ...")
-        taken = {}
-        for backend in backends or backend_names():
-            try:
-                model = load(lesson.model, backend=backend)
-            except MissingEngineError:
-                if backends:
-                    raise
-                continue
-            taken[backend] = take(lesson, model, backend, dict.fromkeys(lesson.more, True))
+        models = {name: load(lesson.model, backend=name) for name in names}
+        taken = {
+            name: take(lesson, model, name, dict.fromkeys(lesson.more, True))
+            for name, model in models.items()
+        }
         page = with_picture(page_of_lesson(lesson, taken), lesson.name)
         name, typed = f"{number:02}-{lesson.name}", f"statemachine lesson {lesson.name}"
-        written.append(_write(folder, name, page, lesson.question, typed))
+        written.append(_write(folder, name, page, typed, f"**{lesson.question}** "))
     return written
 
 
@@ -69,16 +67,13 @@ def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Pat
     folder.mkdir(parents=True, exist_ok=True)
     installed, _ = available()
     say("asking the engines ...")
-    asked = conventions.page(probe(installed))
     table = phrasebook.run(installed)
     pages = {
-        "conventions": markdown(asked, lambda _: ""),
+        "conventions": markdown(conventions.page(probe(installed)), lambda _: ""),
         "calls": markdown(conventions.calls_page(table), lambda _: ""),
         "cheat-sheet": cheat_sheet(table),
     }
-    for name, text in pages.items():
-        _save(folder / f"{name}.md", text.encode())
-    return [folder / f"{name}.md" for name in pages]
+    return [_save(folder / f"{name}.md", text.encode()) for name, text in pages.items()]
 
 
 def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[Path]:
@@ -92,7 +87,7 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
         The pages that were written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    found = []
+    written = []
     for name in ("hold", "gravity", "box"):
         say(f"comparing: {name} ...")
         run = run_sides(Request((name,)))
@@ -107,50 +102,46 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
         }
         apart = Traces("How far apart", "time [s]", "difference [°]", curves, log=True)
         page = replace(page, blocks=[page.blocks[0], apart, *page.blocks[1:]])
-        found.append(_write(folder, name, page, "", f"statemachine compare {name}"))
+        written.append(_write(folder, name, page, f"statemachine compare {name}"))
         if not (one.header.recorded or two.header.recorded):
-            found.append(_explain(folder, name, (one.header.backend, two.header.backend)))
-    return found
+            page = _why_as_they_come(name, (one.header.backend, two.header.backend))
+            typed = f"statemachine compare {name} --why --defaults engine"
+            written.append(_write(folder, f"{name}-why", page, typed))
+    return written
 
 
-def _explain(folder: Path, name: str, backends: tuple[str, str]) -> Path:
+def _why_as_they_come(name: str, backends: tuple[str, str]) -> Page:
     """The page that says why, for engines as they come."""
     asked = scenario(name)
-    models = [load(asked.model, backend=backend, defaults="engine") for backend in backends]
-    page = why.page(explain(models[0], models[1], asked))
+    left, right = (load(asked.model, backend=backend, defaults="engine") for backend in backends)
+    page = why.page(explain(left, right, asked))
     title = f"{name}, engines as they come: why"
-    page = replace(page, title=title, blocks=[Text(f"{page.title}."), *page.blocks])
-    return _write(
-        folder, f"{name}-why", page, "", f"statemachine compare {name} --why --defaults engine"
-    )
+    return replace(page, title=title, blocks=[Text(f"{page.title}."), *page.blocks])
 
 
-def _write(folder: Path, name: str, page: Page, question: str, typed: str) -> Path:
-    pictures: list[str] = []
+def _write(folder: Path, name: str, page: Page, typed: str, lead: str = "") -> Path:
+    """Write a page and its pictures; what is already the same is left alone."""
+    numbers = itertools.count(1)
 
     def picture(block: Picture) -> str:
-        robot = isinstance(block, RobotPicture)
         try:
             content, _ = drawn_picture(block)
         except MissingEngineError:
-            if robot:
+            if isinstance(block, RobotPicture):
                 return ""  # the page has its words
             raise
-        file = f"{name}-robot.webp" if robot else f"{name}-{len(pictures) + 1}.svg"
-        pictures.extend([] if robot else [file])
+        is_robot = isinstance(block, RobotPicture)
+        file = f"{name}-robot.webp" if is_robot else f"{name}-{next(numbers)}.svg"
         _save(folder / file, content)
         return file
 
-    text = markdown(page, picture)
-    heading, _, rest = text.partition("\n\n")
-    lead = f"**{question}** " if question else ""
-    path = folder / f"{name}.md"
-    _save(path, f"{heading}\n\n{lead}In a terminal: `{typed}`\n\n{rest}".encode())
-    return path
+    heading, _, rest = markdown(page, picture).partition("\n\n")
+    text = f"{heading}\n\n{lead}In a terminal: `{typed}`\n\n{rest}"
+    return _save(folder / f"{name}.md", text.encode())
 
 
-def _save(path: Path, content: bytes) -> None:
+def _save(path: Path, content: bytes) -> Path:
     """Write beside, then rename: a page is never half there."""
-    if path.exists() and path.read_bytes() == content:
-        return
-    replace_bytes(path, content)
+    if not path.exists() or path.read_bytes() != content:
+        replace_bytes(path, content)
+    return path

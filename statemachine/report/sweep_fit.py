@@ -58,42 +58,38 @@ def _is_own(each: BroughtTogether) -> bool:
 
 def _fit(found: SweepReport, each: BroughtTogether) -> list[Block]:
     """What a fit says, how it was made, and what a run says of it."""
-    unit, fit, picture = found.quantity.unit, each.fit, fit_curve(found, each)
+    unit, fit = found.quantity.unit, each.fit
     if fit is None:
         return [Text(line(found, each))]
+    within, measured = fit.within(found.quantity.tolerance), each.measured is not None
     figures = {
-        "the model's own value": None if each.own is None else _times(each, each.own),
+        "the model's own value": each.own is not None and _times(each, each.own),
         "values looked at": " to ".join(_times(each, end) for end in fit.bounds),
-        "predicted within tolerance": _between(each, fit.within(found.quantity.tolerance)),
+        "predicted within tolerance": within and " to ".join(_times(each, end) for end in within),
         "curves in the mean, over settings and seeds": str(fit.curves),
-        "± is the standard error, from": fit.of if fit.error is not None and not each.tried else "",
+        "± is the standard error, from": fit.error is not None and not each.tried and fit.of,
+        "gap of runs there": measured and quantity(each.measured, unit),
+        "predicted for them": measured and quantity(each.predicted, unit),
+        "pairs of runs": measured and str(each.pairs),
     }
-    if each.measured is not None:
-        figures["gap of runs there"] = quantity(each.measured, unit)
-        figures["predicted for them"] = quantity(each.predicted, unit)
-        figures["pairs of runs"] = str(each.pairs)
     rows = [(name, value) for name, value in figures.items() if value]
     values = each.tried[0] if each.tried is not None and each.error is not None else None
     right = each.varied == "right"
     return template.blocks(
         "sweep_fit",
-        line=[Text(line(found, each))],
-        table=[Table(("the fit", each.label), rows, words=frozenset({0, 1}))],
+        line=line(found, each),
+        table=Table(("the fit", each.label), rows, words=frozenset({0, 1})),
         left=found.sides[0] if right else None,
         right=found.sides[1],
         both=if_true(not right),
         label=each.label,
-        why_not=each.why_not if each.measured is None else None,
+        why_not=None if measured else each.why_not,
         number=str(len(values) - 1) if values else None,
         low=_times(each, min(values or [0.0])),
         high=_times(each, max(values or [0.0])),
         apart=_times(each, each.error or 0.0),
-        pictures=[picture] if picture else [],
+        picture=fit_curve(found, each),
     )
-
-
-def _between(each: BroughtTogether, ends: tuple[float, float] | None) -> str:
-    return "" if ends is None else f"{_times(each, ends[0])} to {_times(each, ends[1])}"
 
 
 def _fitted(each: BroughtTogether) -> str:
@@ -103,8 +99,7 @@ def _fitted(each: BroughtTogether) -> str:
     times = "x" if each.times else ""
     if error is None or not error > 0:
         return f"{value:.3g}{times}"
-    wide = fit.bounds[1] - fit.bounds[0]
-    error = max(error, 1e-4 * wide)  # the interpolation knows no more
+    error = max(error, 1e-4 * (fit.bounds[1] - fit.bounds[0]))  # the interpolation knows no more
     digits = max(0, -int(f"{error:e}".partition("e")[2]) + 1)
     return f"{value:.{digits}f}{times} ± {error:.{digits}f}{times}"
 

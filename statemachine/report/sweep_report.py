@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from ..measures.text import NONE, few, fixed, listed, quantity, reading, rough, rounded
-from ..page import Block, Headline, Page, Section, Table, TableCell, Text
+from ..page import Block, Headline, Page, Section, Table, TableCell
 from ..sweep.analysis import SweepReport
-from ..sweep.analysis_gaps import VERDICTS, GapMap, SettingGap
+from ..sweep.analysis_gaps import GapMap, SettingGap
 from . import template
 from .sweep_fit import line, together
 from .sweep_pictures import axis, bars, map_picture, setting_word
@@ -22,18 +23,6 @@ CAUSES = {
     "rank": "The gap goes most with {label}.",
     "share": "The gap is most sensitive to {label} (total {total}).",
 }
-NO_SHARES = {
-    "rounding": "To nothing: every gap is inside the chaos floor.",
-    "same": "Nothing can be said: the gap is the same everywhere, or there are too few.",
-    "alone": "One parameter was varied: what changes the gap is that alone.",
-}
-METHODS = {
-    "sobol": "Sobol indices by Saltelli's design and estimators; samples in each block: {samples}.",
-    "factorial": "Computed from a full factorial, which has every combination of the values "
-    "(ANOVA, the analysis of variance): the shares mean what Sobol indices mean, over these "
-    "values; settings: {samples}.",
-    "rank": "Squares of Spearman's rank correlation; settings: {samples}.",
-}
 
 
 def page(found: SweepReport, command: str = "") -> Page:
@@ -45,10 +34,8 @@ def page(found: SweepReport, command: str = "") -> Page:
     """
     sections = [Section("where", "Where they agree", _where(found))]
     if found.parameters:
-        sections += [
-            Section("sensitive", "What the gap is sensitive to", _sensitive(found)),
-            Section("together", "What brings them together", together(found)),
-        ]
+        sections.append(Section("sensitive", "What the gap is sensitive to", _sensitive(found)))
+        sections.append(Section("together", "What brings them together", together(found)))
     failed = {f"failed with {kind}": number for kind, number in found.failed.items()}
     counts = {**failed, "have not run": found.missing}
     left_out = [f"{kind}: {number}" for kind, number in counts.items() if number]
@@ -88,26 +75,21 @@ def _headline(found: SweepReport) -> Headline:
 
 
 def _quantities(found: SweepReport) -> Table:
-    rows = []
-    for each in found.quantities:
-        counts = [str(each.counts.get(v, 0)) for v in VERDICTS[:4]]
-        rows.append(
-            (
-                each.says,
-                rounded(each.tolerance, each.unit, 2),
-                *counts,
-                quantity(each.median, each.unit),
-                quantity(each.worst, each.unit),
-            )
-        )
-    return Table(
-        ("gap of", "within", "agree", "some seeds", "chaos", "differ", "median", "worst"),
-        rows,
+    return Table.of(
+        found.quantities,
+        {
+            "gap of": lambda gaps: gaps.says,
+            "within": lambda gaps: rounded(gaps.tolerance, gaps.unit, 2),
+            "agree": lambda gaps: str(gaps.counts.get("agrees", 0)),
+            "some seeds": lambda gaps: str(gaps.counts.get("some seeds", 0)),
+            "chaos": lambda gaps: str(gaps.counts.get("chaos", 0)),
+            "differ": lambda gaps: str(gaps.counts.get("differs", 0)),
+            "median": lambda gaps: quantity(gaps.median, gaps.unit),
+            "worst": lambda gaps: quantity(gaps.worst, gaps.unit),
+        },
         f"How many settings, of {len(found.settings)}",
-        emphasis=frozenset(
-            k for k, each in enumerate(found.quantities) if each.name == found.quantity.name
-        ),
-        wide=frozenset({6}),
+        emphasis=lambda gaps: gaps.name == found.quantity.name,
+        wide={"median"},
     )
 
 
@@ -126,25 +108,23 @@ def _floor_slots(found: SweepReport) -> dict[str, Any]:
 
 
 def _where(found: SweepReport) -> list[Block]:
-    blocks: list[Block] = [_quantities(found)]
-    picture = map_picture(found)
-    if found.map is not None:
-        blocks += template.blocks(
-            "sweep_map",
-            tables=_map_tables(found, found.map),
-            others=listed(found.map.others) or None,
-            sampled=listed(found.map.sampled) or None,
-            pictures=[picture] if picture else [],
-        )
-    if len(found.settings) > _SHOWN or found.map is None:
-        blocks.append(_largest(found))
-    return blocks
+    chart = found.map
+    return template.blocks(
+        "sweep_map",
+        quantities=_quantities(found),
+        tables=_map_tables(found, chart) if chart else [],
+        legend=if_true(chart),
+        others=(chart and listed(chart.others)) or None,
+        sampled=(chart and listed(chart.sampled)) or None,
+        picture=map_picture(found),
+        largest=_largest(found) if len(found.settings) > _SHOWN or chart is None else None,
+    )
 
 
 def _map_tables(found: SweepReport, chart: GapMap) -> list[Table]:
     """The map; of many columns, in parts that a terminal has room for."""
-    unit, tolerance = found.quantity.unit, found.quantity.tolerance
-    scale, name = reading(unit)
+    tolerance = found.quantity.tolerance
+    scale, unit = reading(found.quantity.unit)
 
     def cell(r: int, c: int) -> str:
         value = chart.gap[r][c]
@@ -153,24 +133,19 @@ def _map_tables(found: SweepReport, chart: GapMap) -> list[Table]:
         mark = "~" if chart.inside[r][c] else "=" if value <= tolerance else ""
         return f"{mark}{rough(value * scale)}"
 
-    places = [setting_word(found, chart.across, value) for value in chart.columns]
-    rows = [
-        (
-            setting_word(found, chart.up, chart.rows[r]) if chart.up else "gap",
-            *(cell(r, c) for c in range(len(places))),
-        )
-        for r in reversed(range(len(chart.gap)))
-    ]
     up, across = (
         label if label in found.scaled else axis(found, label)  # an x behind each value says it
         for label in (chart.up, chart.across)
     )
+    places = [setting_word(found, chart.across, value) for value in chart.columns]
+    names = [setting_word(found, chart.up, value) for value in chart.rows] if chart.up else ["gap"]
+    rows = [(name, *(cell(r, c) for c in range(len(places)))) for r, name in enumerate(names)]
     down = f"{up} down, " if chart.up else ""
-    title = f"The gap of the {found.quantity.says},{name}: {down}{across} across"
+    title = f"The gap of the {found.quantity.says},{unit}: {down}{across} across"
     return [
         Table(
             (chart.up or chart.across, *places[k : k + _COLUMNS]),
-            [(row[0], *row[1 + k : 1 + k + _COLUMNS]) for row in rows],
+            [(row[0], *row[1 + k : 1 + k + _COLUMNS]) for row in reversed(rows)],
             title,
         )
         for k in range(0, len(places), _COLUMNS)
@@ -178,20 +153,19 @@ def _map_tables(found: SweepReport, chart: GapMap) -> list[Table]:
 
 
 def _largest(found: SweepReport) -> Table:
-    known = [each for each in found.settings if each.median is not None]
-    known.sort(key=lambda each: -(each.median or 0.0))
+    known = [setting for setting in found.settings if setting.median is not None]
+    known.sort(key=lambda setting: -(setting.median or 0.0))
     unit = found.quantity.unit
-    rows = [
-        (
-            _setting(found, each),
-            quantity(each.median, unit),
-            quantity(each.worst, unit),
-            each.verdict,
-        )
-        for each in known[:_SHOWN]
-    ]
-    return Table(
-        ("setting", "median", "worst", "verdict"), rows, "The largest gaps", words=frozenset({0, 3})
+    return Table.of(
+        known[:_SHOWN],
+        {
+            "setting": partial(_setting, found),
+            "median": lambda setting: quantity(setting.median, unit),
+            "worst": lambda setting: quantity(setting.worst, unit),
+            "verdict": lambda setting: setting.verdict,
+        },
+        "The largest gaps",
+        words={"verdict"},
     )
 
 
@@ -202,11 +176,15 @@ def _setting(found: SweepReport, setting: SettingGap) -> str:
 
 
 def _sensitive(found: SweepReport) -> list[Block]:
-    shares = found.sensitivity
-    if found.only_rounding or shares is None:
-        return [Text(NO_SHARES["rounding" if found.only_rounding else "same"])]
-    if len(shares.indices) == 1:
-        return [Text(NO_SHARES["alone"])]
+    shares = None if found.only_rounding else found.sensitivity
+    alone = shares is not None and len(shares.indices) == 1
+    if shares is None or alone:
+        return template.blocks(
+            "sweep_no_shares",
+            rounding=if_true(found.only_rounding),
+            same=if_true(not found.only_rounding and not alone),
+            alone=if_true(alone),
+        )
     rank = shares.method == "rank"
     rows = [
         (
@@ -222,16 +200,18 @@ def _sensitive(found: SweepReport) -> list[Block]:
     table = Table(heads, rows, "Shares of the gap's variance")
     if rank:
         table = Table(("parameter", "rank²"), [row[:2] for row in rows], "What the gap goes with")
-    picture = bars(found)
+    samples = {shares.method: shares.samples}
     return template.blocks(
         "sweep_shares",
-        table=[table],
-        sobol=if_true(not rank),
-        method=METHODS[shares.method].format(samples=shares.samples),
+        table=table,
+        shares=if_true(not rank),
+        sobol=samples.get("sobol"),
+        factorial=samples.get("factorial"),
+        rank=samples.get("rank"),
         error=shares.error or None,
         no_error=if_true(not rank and not shares.error),
         notes=" ".join(shares.notes) or None,
-        pictures=[picture] if picture else [],
+        picture=bars(found),
     )
 
 

@@ -154,14 +154,14 @@ class PybulletWatch(CallWatch):
         roles={
             "the still copy": "The still copy is the robot with its true inertias, in a world of "
             "its own; the one that is stepped carries extra inertia for its servos. The interface "
-            "asks the copy for poses, the mass matrix and the bias. In this run it was {}.",
+            "asks the copy for poses, the mass matrix and the bias. Its steps in this run: {}.",
             "the look-ahead": "The look-ahead is another copy. It is put where your data is and "
             "takes one step, so that contacts and forces can be read after forward and no time "
-            "passes in yours. In this run it was {}.",
+            "passes in yours. Its steps in this run: {}.",
         },
         helpers={
             "mujoco": "On pybullet the interface uses MuJoCo as a library: its parser reads the "
-            "model's file, and it solves small linear systems. Its own step was {} there.",
+            "model's file, and it solves small linear systems. Its own steps there: {}.",
         },
     )
 
