@@ -10,7 +10,7 @@ import pytest
 import statemachine as sm
 from statemachine.compare import TimestepConvergence, convergence
 from statemachine.errors import EndedEarlyError
-from statemachine.report.convergence import page
+from statemachine.report.steps import convergence as page
 from statemachine.runs import Trace, record, write
 
 from .conftest import Cli, one_line, written

@@ -12,7 +12,7 @@ from statemachine.compare import StepComparison, one_step, rerun_of
 from statemachine.compare.one_step import RELATIVE
 from statemachine.compare.stages import STAGES
 from statemachine.errors import BadInputError
-from statemachine.report.one_step import page
+from statemachine.report.steps import one_step as page
 from statemachine.runs.rerun import Rerun
 from statemachine.runs.scenarios import scenario
 

@@ -10,7 +10,7 @@ import pytest
 
 from statemachine.errors import BadInputError
 from statemachine.page import Question
-from statemachine.report.predictions import RecordedReader
+from statemachine.report.quiz import RecordedReader
 
 from .conftest import Cli, assert_in, one_line, written
 from .test_lessons import _at_a_terminal

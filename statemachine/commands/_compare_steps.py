@@ -61,19 +61,19 @@ def run(options: argparse.Namespace, request: Any) -> int:
 def _one_step(options: argparse.Namespace, request: Any) -> int:
     from ..compare import one_step, prepare_sides
     from ..compare.labels import numbered
-    from ..report.one_step import page
+    from ..report import steps
     from ..report.progress import progress
 
     (left, right), _, _ = prepare_sides(request)
     with progress("one step") as told:
         result = one_step(left, right.model, names=request.names, progress=told)
     labels = numbered(tuple(side.label for side in request.sides) or request.backends)
-    return show(page(result, labels, _name(request)), result, options.json)
+    return show(steps.one_step(result, labels, _name(request)), result, options.json)
 
 
 def _converge(options: argparse.Namespace, request: Any) -> int:
     from ..compare import convergence, run_sides
-    from ..report.convergence import page
+    from ..report import steps
     from ..report.progress import progress
 
     def with_more(options: dict[str, Any], usual: int, times: int) -> dict[str, Any]:
@@ -89,15 +89,15 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
 
     with progress("converge") as told:
         result = convergence(run, progress=told)
-    return show(page(result, _name(request)), result, options.json)
+    return show(steps.convergence(result, _name(request)), result, options.json)
 
 
 def _versions(options: argparse.Namespace, request: Any) -> int:
     from ..compare import compare, run_sides
     from ..measures import parse_tolerances
     from ..releases import backends_of, published
+    from ..report import steps
     from ..report.progress import progress
-    from ..report.versions import page
     from ..runs.drive import part_of
 
     tolerances = parse_tolerances(options.tolerance)
@@ -118,7 +118,7 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
             for k, pair in enumerate(pairs)
         ]
     write_junit(options, comparisons)
-    return show(page(comparisons, _name(request)), comparisons, options.json)
+    return show(steps.versions(comparisons, _name(request)), comparisons, options.json)
 
 
 def _around_a_change(

@@ -243,6 +243,6 @@ def _reader(options: argparse.Namespace, lesson: Lesson) -> Any:
         return Reader(lesson.name) if asked else None
     if not asked:
         raise BadInputError("--record keeps what you predict: it needs a terminal that asks")
-    from ..report.predictions import RecordedReader
+    from ..report.quiz import RecordedReader
 
     return RecordedReader(Path(options.record), lesson.name)

@@ -142,7 +142,7 @@ def run(options: argparse.Namespace) -> int:
     if options.report not in (None, True):
         found, page = _report(options, options.report)
         return show(page, found, options.json)
-    from ..report import sweep as words
+    from ..report import sweep_report as words
     from ..report.progress import progress
     from ..sweep import prepared, run_sweep
 
@@ -162,7 +162,7 @@ def run(options: argparse.Namespace) -> int:
             progress=told,
         )
     if not (options.report and options.json):
-        show(words.page(ready, summary), summary, options.json)
+        show(words.summary_page(ready, summary), summary, options.json)
     code = 0
     if options.report:
         found, answer = _report(options, out)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from ..grading.class_table import NOTHING, ClassEntry
 from ..grading.judges import JUDGES
@@ -18,23 +18,16 @@ def page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
         entries: What became of each submission.
         ignored: Names of files that were not looked at.
     """
-    columns = {
-        "file": [entry.student or entry.name for entry in entries],
-        "right": [f"{e.right} of {len(JUDGES)}" if e.judged else "?" for e in entries],
-        "what is not right": [entry.reasons for entry in entries],
-        "tests": [entry.tests.partition(";")[0] for entry in entries],
-        "predictions": [entry.predictions for entry in entries],
-        "alike": [entry.alike for entry in entries],
+    columns: dict[str, Callable[[ClassEntry], str]] = {
+        "file": lambda entry: entry.student or entry.name,
+        "right": lambda entry: f"{entry.right} of {len(JUDGES)}" if entry.judged else "?",
+        "what is not right": lambda entry: entry.reasons,
+        "tests": lambda entry: entry.tests.partition(";")[0],
+        "predictions": lambda entry: entry.predictions,
+        "alike": lambda entry: entry.alike,
     }
-    shown = {name: cells for name, cells in columns.items() if any(cells)}
-    rows = list(zip(*shown.values(), strict=True))
-    all_words, wide = range(len(shown)), {"predictions", "alike"}
-    table = Table(
-        list(shown),
-        rows,
-        words=frozenset(all_words),
-        wide=frozenset(k for k, name in enumerate(shown) if name in wide),
-    )
+    shown = {name: cell for name, cell in columns.items() if any(map(cell, entries))}
+    table = Table.of(entries, shown, words=shown, wide={"predictions", "alike"})
     copies = [(e.name, f"has the same code as {e.same_as}.") for e in entries if e.same_as]
     looks = [(f"{entry.name}:", look) for entry in entries for look in entry.looks]
     unjudged = {
@@ -46,7 +39,7 @@ def page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
         "classroom",
         files=count(sum(entry.refusal != NOTHING for entry in entries), "file"),
         made_with=entries[0].made_with,
-        table=[table],
+        table=table,
         solved=sum(entry.right == len(JUDGES) for entry in entries),
         ignored=", ".join(ignored) or None,
         notes=[Text(f"{name} {note}") for name, note in (*copies, *looks)],

@@ -50,31 +50,22 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
     yield f"*{_escaped(page.origin)}*"
     if page.headline:
         yield f"**{_escaped(page.headline.text)}**"
-    blocks = list(page.blocks)
-    while blocks:
-        block = blocks.pop(0)
-        if isinstance(block, Heading):
-            yield _folded(_until(blocks, (Question, Heading), picture), _escaped(block.text))
-            continue
-        if not isinstance(block, Question):
-            yield block_as_markdown(block, picture)
-            continue
-        says, inside = Verdict if block.always else Printed, []
-        while blocks and isinstance(blocks[0], says):
-            inside.append(block_as_markdown(blocks.pop(0), picture))
-        inside.append(answer(block))
-        inside += _until(blocks, (Question, Heading), picture)
-        yield f"{asked(block)}\n\n{_folded(inside)}"
-
-
-def _until(
-    blocks: list[Block], ends: tuple[type, ...], picture: Callable[[Picture], str]
-) -> list[str]:
-    """Take the blocks before the next that begins something else, as Markdown."""
-    taken = []
-    while blocks and not isinstance(blocks[0], ends):
-        taken.append(block_as_markdown(blocks.pop(0), picture))
-    return taken
+    groups: list[list[Block]] = [[]]
+    for block in page.blocks:
+        groups += [[]] if isinstance(block, Question | Heading) else []
+        groups[-1].append(block)
+    yield from (block_as_markdown(block, picture) for block in groups[0])
+    for opening, *rest in groups[1:]:
+        inside = [block_as_markdown(block, picture) for block in rest]
+        if isinstance(opening, Question):
+            says = Verdict if opening.always else Printed  # stands before the answer
+            place = next(
+                (k for k, each in enumerate(rest) if not isinstance(each, says)), len(rest)
+            )
+            inside.insert(place, answer(opening))
+            yield f"{asked(opening)}\n\n{_folded(inside)}"
+        elif isinstance(opening, Heading):
+            yield _folded(inside, _escaped(opening.text))
 
 
 def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:

@@ -12,12 +12,16 @@ _WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
 
 def page(found: Examination) -> Page:
     """The examination as a page."""
-    trials = Table(
-        ("fault", "what is wrong", "caught by"),
-        [(trial.mutant.name, trial.mutant.wrong, _catchers(trial)) for trial in found.trials],
-        title="One fault at a time",
-        words=frozenset({0, 1, 2}),
-        emphasis=frozenset(k for k, trial in enumerate(found.trials) if not trial.caught),
+    trials = Table.of(
+        found.trials,
+        {
+            "fault": lambda trial: trial.mutant.name,
+            "what is wrong": lambda trial: trial.mutant.wrong,
+            "caught by": _catchers,
+        },
+        "One fault at a time",
+        words={"what is wrong", "caught by"},
+        emphasis=lambda trial: not trial.caught,
     )
     failures, hints = found.failures, [(m.name, m.hint) for m in found.survivors]
     idle = found.idle and len(found.trials) > 1 and not failures
@@ -27,7 +31,7 @@ def page(found: Examination) -> Page:
         tests=count(len(found.tests), "test"),
         backend=found.backend,
         version=found.engine_version,
-        trials=[] if failures else [trials],
+        trials=None if failures else trials,
         hints=[] if failures else [Text(f"{name}: {hint}.") for name, hint in hints],
         idle=", ".join(found.idle) if idle else None,
         healthy=None if failures else not hints,

@@ -1,15 +1,23 @@
-"""A reader who sits at a terminal: shown a screenful at a time, and asked questions."""
+"""A reader who sits at a terminal: shown a screenful at a time, and asked questions.
+
+What they predict is written to a file to hand in, where they want it.
+"""
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sys
 import textwrap
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
+from .. import __version__
+from ..grading.predictions import KIND, answers_in
 from ..page import LETTERS, Question
+from ..runs.whole import replace_text
 
 _WIDTH_MOST = 100
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
@@ -98,6 +106,66 @@ class Reader:
             raise Stopped
         self._rows = 0
         return typed
+
+
+class RecordedReader(Reader):
+    """A reader whose answers are written to a file, after each.
+
+    The first answer to a question counts. A file of an earlier session is gone on with.
+    """
+
+    def __init__(self, file: Path, lesson: str = "") -> None:
+        """Open a file, or begin one.
+
+        Args:
+            file: Where the answers are kept, as JSON.
+            lesson: Whose questions are asked first.
+
+        Raises:
+            BadInputError: The file is there and is no record of predictions.
+        """
+        super().__init__(lesson)
+        self._file = file
+        self._answers = answers_in(file) if file.exists() else {}
+        self._write()
+
+    def ask(self, question: Question) -> int | None:
+        """Ask, and keep the answer."""
+        choice = super().ask(question)
+        if choice is not None:
+            right, predicted = question.right, question.choices[choice]
+            first = self._answers.setdefault(
+                f"{self.lesson}: {question.text}",
+                {
+                    "lesson": self.lesson,
+                    "question": question.text,
+                    "predicted": predicted,
+                    "found": None if right is None else question.choices[right],
+                    "right": choice == right,
+                },
+            )
+            self._write()
+            if first["predicted"] != predicted:
+                print(f"(In {self._file.name} your first answer counts: {first['predicted']}.)")
+        return choice
+
+    @property
+    def summary(self) -> str:
+        """What the file says by now, in a line."""
+        right = sum(bool(answer["right"]) for answer in self._answers.values())
+        return f"{self._file.name}: {right} of {len(self._answers)} predictions right"
+
+    def _write(self) -> None:
+        answers = list(self._answers.values())
+        record = {
+            "kind": KIND,
+            "statemachine": __version__,
+            "python": sys.version.split()[0],
+            "score": sum(bool(answer["right"]) for answer in answers),
+            "of": len(answers),
+            "answers": answers,
+        }
+        replace_text(self._file, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
 
 
 def _forget_typed_ahead() -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from ..measures.text import NONE, few, fixed, listed, quantity, reading, rough, rounded
+from ..measures.text import NONE, count, few, fixed, listed, quantity, reading, rough, rounded
 from ..page import Block, Headline, Page, Section, Table, TableCell
+from ..sweep import PreparedSweep, SweepSummary
 from ..sweep.analysis import SweepReport
 from ..sweep.analysis_gaps import GapMap, SettingGap
 from . import template
@@ -217,3 +218,31 @@ def _sensitive(found: SweepReport) -> list[Block]:
 
 def _interval(pair: tuple[float, float] | None) -> str:
     return NONE if pair is None else f"{fixed(pair[0], 2)} to {fixed(pair[1], 2)}"
+
+
+def summary_page(ready: PreparedSweep, summary: SweepSummary) -> Page:
+    """The summary, and how the dataset is read."""
+    asked, failed = ready.sweep, sum(summary.failed.values())
+    before = summary.cells - summary.ran
+    rows = [(kind, str(n)) for kind, n in {"done": summary.done, **summary.failed}.items()]
+    outcomes = Table(("what became of them", "cells"), rows, words=frozenset({0}))
+    return template.page(
+        "sweep",
+        what=asked.what.rpartition("/")[2],
+        versions=versions_of(ready.versions),
+        points=count(summary.points, "point"),
+        varied=f" ({listed(asked.vary)})" if asked.vary else "",
+        seeds=count(asked.seeds, "seed"),
+        backends=listed(list(ready.backends)),
+        cells=count(summary.cells, "cell"),
+        idle=if_true(not summary.ran),
+        ran=summary.ran or None,
+        seconds=summary.seconds,
+        before=f"; {count(before, 'cell')} there before" if before else "",
+        outcomes=outcomes if summary.failed else None,
+        read=summary.read,
+        bad=False if failed else None,
+        failed=count(failed, "cell"),
+        good=None if failed else True,
+        done=count(summary.done, "cell"),
+    )

@@ -1,0 +1,217 @@
+"""Pages of the closer looks: finer timesteps, one step at a time, release after release."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..compare import Comparison, QuantityLimit, StepComparison, TimestepConvergence
+from ..compare.one_step import StageGap
+from ..measures.text import NONE, figure, listed, milliseconds, quantity, sentence, short_time
+from ..page import Headline, Items, Page, Table, Text
+from . import template
+from .finding import leading, moment, name_of
+from .template import if_true
+
+LEADS = {
+    "rounding": "There is no gap beyond rounding, whatever the timestep",
+    "vanishes": "The gap vanishes with the timestep: it is discretisation",
+    "neither": "The gap neither vanishes with the timestep nor stays as it is",
+    "stays": "The gap does not vanish with the timestep: that of {name} is {coarse}, and {fine} "
+    "with a quarter of it",
+}
+TOUCH = {
+    True: "Before the first touch, at {touch}, there is no gap.",
+    False: "Before the first touch, at {touch}, there is nothing but discretisation.",
+}
+SAME_BITS = "From the same state both sides take the same step, to the last bit"
+SAME_STEP = "From the same state both sides take the same step"
+PART = "The sides part in the stage “{stage}”, {when} (at {beyond} of {moments} moments): {where}"
+BEFORE = "What comes before it in a step is the same on both sides."
+OTHERS = "At other moments the first stage that differs is {stages}: that has another cause."
+CHANGED = "The motion changes between {pairs}"
+SAME = "The motion is the same on all of them, within its tolerances"
+
+
+def convergence(result: TimestepConvergence, experiment: str, said: Sequence[str] = ()) -> Page:
+    """What vanishes with the timestep, and what does not.
+
+    Args:
+        result: What was found.
+        experiment: What was run.
+        said: Lines to say before anything else.
+    """
+    at = "" if result.touch is None else short_time(result.touch)
+    title = f"The gap with finer steps, before the first touch at {at}"
+    steps = dict.fromkeys(milliseconds(step, 3) for step in result.steps)
+    return template.page(
+        "convergence",
+        _of_the_limit(result, at),
+        experiment=experiment,
+        left=result.labels[0],
+        right=result.labels[1],
+        until=result.until,
+        said=[Text(line) for line in said],
+        steps=" and ".join(steps),
+        before=_limits(result.before, title) if at else None,
+        whole=_limits(result.whole, "The gap with finer steps, over the whole run"),
+        touch=if_true(at),
+        left_most=_own(result.whole, "left"),
+        right_most=_own(result.whole, "right"),
+    )
+
+
+def _limits(limits: Sequence[QuantityLimit], title: str) -> Table:
+    return Table.of(
+        limits,
+        {
+            "quantity": lambda limit: name_of(limit.name),
+            "the gap is": lambda limit: limit.verdict,
+            "at h": lambda limit: quantity(limit.gaps[0], limit.unit),
+            "h/2": lambda limit: quantity(limit.gaps[1], limit.unit),
+            "h/4": lambda limit: quantity(limit.gaps[2], limit.unit),
+            "at 0": lambda limit: quantity(limit.limit, limit.unit),
+            "left's own": lambda limit: quantity(limit.left[0], limit.unit),
+            "right's own": lambda limit: quantity(limit.right[0], limit.unit),
+        },
+        title,
+        words={"the gap is"},
+        emphasis=lambda limit: limit.verdict in ("stays", "in part"),
+        wide={"left's own", "right's own"},
+    )
+
+
+def _of_the_limit(result: TimestepConvergence, touch: str) -> Headline:
+    if all(limit.verdict == "rounding" for limit in result.whole):
+        return Headline(LEADS["rounding"])
+    if result.vanishes:
+        return Headline(LEADS["vanishes"])
+    stay = [limit for limit in result.whole if limit.verdict in ("stays", "in part")]
+    same = [limit for limit in stay if limit.unit == stay[0].unit]
+    lead = LEADS["neither"]
+    if same:
+        most = max(same, key=lambda limit: limit.gaps[2])
+        coarse, fine = (quantity(most.gaps[k], most.unit) for k in (0, 2))
+        lead = LEADS["stays"].format(name=name_of(most.name), coarse=coarse, fine=fine)
+    before = {limit.verdict for limit in result.before}
+    tells = touch and before and before <= {"rounding", "discretisation"}
+    end = TOUCH[before == {"rounding"}].format(touch=touch) if tells else ""
+    return Headline(lead, end=end, holds=False)
+
+
+def _own(limits: Sequence[QuantityLimit], side: str) -> str | None:
+    """How far a side moves itself at most when its steps get finer, and in what."""
+    known = [limit for limit in limits if limit.unit == limits[0].unit]
+    most = max(known, key=lambda limit: getattr(limit, side)[0], default=None)
+    return most and f"{quantity(getattr(most, side)[0], most.unit)} ({name_of(most.name)})"
+
+
+def one_step(
+    result: StepComparison, labels: tuple[str, str], experiment: str, said: Sequence[str] = ()
+) -> Page:
+    """What each stage of a step gives on both sides: what parts first, and where.
+
+    Args:
+        result: What was found.
+        labels: What the sides are called.
+        experiment: What was run.
+        said: Lines to say before anything else.
+    """
+    compared = [gap for gap in result.stages if gap.told and gap.unit]
+    null = max(compared, key=lambda gap: gap.null / (gap.tolerance or 1e-300))
+    notes = [f"{gap.stage} is not compared: {gap.reason}." for gap in result.stages if not gap.told]
+    notes += [sentence(line) for line in result.notes]
+    return template.page(
+        "one_step",
+        _of_the_step(result),
+        experiment=experiment,
+        left=labels[0],
+        right=labels[1],
+        moments=result.moments,
+        until=result.until,
+        said=[Text(line) for line in said],
+        every=result.every,
+        primed=result.primed or "nothing",
+        stages=_stages(result),
+        relative=figure(result.relative),
+        null=quantity(null.null, null.unit),
+        stage=null.stage,
+        spikes=Table.of(
+            result.spikes,
+            {
+                "at, s": lambda spike: moment(spike.at),
+                "acceleration apart": lambda spike: quantity(spike.size, spike.unit),
+                "joint": lambda spike: spike.joint,
+                "first stage": lambda spike: spike.stage,
+                "where": lambda spike: spike.where,
+            },
+            "The moments that stand out",
+            words={"joint", "first stage", "where"},
+        ),
+        notes=Items(notes),
+    )
+
+
+def _stages(result: StepComparison) -> Table:
+    heads = ("differs", "first", "largest", "at, s", "where", "from, s", "null", "tolerance")
+    return Table(
+        ("stage", *heads),
+        [(gap.stage, *_stage_cells(gap)) for gap in result.stages],
+        "The stages of a step, in their order",
+        words=frozenset({0, 5}),
+        emphasis=frozenset(k for k, gap in enumerate(result.stages) if gap is result.first),
+        wide=frozenset({7, 8}),
+    )
+
+
+def _stage_cells(gap: StageGap) -> tuple[str, ...]:
+    if not gap.told or not gap.unit:
+        return NONE, NONE, gap.reason or NONE, NONE, NONE, NONE, NONE, NONE
+    return (
+        str(gap.beyond),
+        str(gap.leads),
+        quantity(gap.worst, gap.unit) if gap.beyond else "≈ 0" if gap.worst else "0",
+        moment(gap.at) if gap.beyond and gap.at is not None else NONE,
+        gap.where if gap.beyond else NONE,
+        moment(gap.first),
+        quantity(gap.null, gap.unit),
+        quantity(gap.tolerance, gap.unit),
+    )
+
+
+def _of_the_step(result: StepComparison) -> Headline:
+    first = result.first
+    if first is None:
+        same = all(gap.worst == 0 for gap in result.stages)
+        return Headline(SAME_BITS if same else SAME_STEP)
+    when = "from the start" if first.first == 0 else f"from {short_time(first.first or 0.0)} on"
+    lead = PART.format(
+        stage=first.stage, when=when, beyond=first.beyond, moments=result.moments, where=first.where
+    )
+    others = [f"{gap.stage} ({gap.leads})" for gap in result.stages if gap.leads and gap != first]
+    end = f"{BEFORE} {OTHERS.format(stages=listed(others))}" if others else BEFORE
+    return Headline(lead, end=end, holds=False)
+
+
+def versions(comparisons: Sequence[Comparison], experiment: str) -> Page:
+    """What each comparison of a release with the next one found."""
+    sides = [(found.one, found.two) for found in comparisons]
+    pairs = [tuple(s.provenance.versions[s.backend] for s in both) for both in sides]
+    rows, changed = [], []
+    for (left, right), found in zip(pairs, comparisons, strict=True):
+        cells, worst = (NONE,) * 4, leading(found)
+        if worst is not None:
+            largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
+            cells = (name_of(worst.name), largest, short_time(worst.at), tolerance)
+        rows.append((left, right, *cells, "agrees" if found.agrees else "DIFFERS"))
+        changed += [] if found.agrees else [f"MuJoCo {left} and {right}"]
+    heads = ("release", "next", "quantity", "largest", "at", "tolerance", "verdict")
+    headline = Headline(CHANGED.format(pairs=listed(changed)), holds=False)
+    return template.page(
+        "versions",
+        headline if changed else Headline(SAME),
+        experiment=experiment,
+        first=pairs[0][0],
+        last=pairs[-1][1],
+        until=max(found.until for found in comparisons),
+        steps=Table(heads, rows, "From release to release", words=frozenset({0, 1, 2, 6})),
+    )
