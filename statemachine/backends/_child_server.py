@@ -21,11 +21,12 @@ A message and its answer are two lengths, a header in JSON, and bytes; it ends w
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
+import runpy
 import struct
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -84,19 +85,11 @@ class Answerer:
         return {}, world.derived()
 
 
-def engine_in(file):
-    """The module of a file; it may lie anywhere."""
-    spec = importlib.util.spec_from_file_location("engine", file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def main() -> None:
     """Answer until there is nobody to ask."""
     source, out = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what an engine prints is no answer
-    server = Answerer(engine_in(sys.argv[1]))
+    server = Answerer(SimpleNamespace(**runpy.run_path(sys.argv[1])))
     while True:
         lengths = source.read(SIZES.size)
         if len(lengths) < SIZES.size:
