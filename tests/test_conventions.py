@@ -16,7 +16,7 @@ from rich.cells import cell_len
 
 from statemachine import engines
 from statemachine.cli import main
-from statemachine.compare.models.engines import own_ways
+from statemachine.compare.models import own_ways
 from statemachine.engines import room, samples
 from statemachine.engines.mujoco import pile
 from statemachine.engines.samples import TREE

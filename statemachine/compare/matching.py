@@ -13,41 +13,34 @@ import numpy as np
 
 from ..engines import room
 from ..engines.description.match import Matching, Pair, match, renamed
-from ..engines.description.meshes import one_to_one
 from ..engines.description.records import Robot
+from ..engines.description.shapes import one_to_one
 from ..engines.description.tree import GroupTree
-from ..engines.records import BodyPair
+from ..engines.records import BodyPair, Counterparts, Pairs
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
 from ..interface import Array, Model
 from ..rotations import HERE
 from ..runs.rerun import SideStart
 
-Pairs = tuple[tuple[int, int], ...]
 Only = Mapping[str, tuple[str, ...]]
 _ONE_PLACE = 1e-6  # [m] within which two sites without a common name are one
 
 
-@dataclass(frozen=True, eq=False)
-class Matched:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Matched(Counterparts):
     """What of one Model is what of another.
 
     Attributes:
         one, two: The Models.
-        joints, bodies, sites: Pairs of ids.
-        actuators: Pairs of places in ctrl.
-        solids: The rigid parts that both have, parents first; the world is the first.
+        bodies: Pairs of ids.
         only: For each Model what it alone has: names, by "joint", "site" and "actuator".
         notes: What a reader should know, in sentences.
     """
 
     one: Model
     two: Model
-    joints: Pairs
     bodies: Pairs
-    sites: Pairs
-    actuators: Pairs
-    solids: tuple[BodyPair, ...]
     only: tuple[Only, Only]
     notes: tuple[str, ...]
 
@@ -115,10 +108,10 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
     ours = {a: b for a, b in given.items() if a in robots[0].names}
     trees = [GroupTree(renamed(robots[0], ours)), GroupTree(robots[1])]
     found = match(trees[0], trees[1], one_world=all(robot.rooted for robot in robots))
-    moving = [(p.one.joint, p.two.joint) for p in found.pairs if p.one.joint and p.two.joint]
+    moving = [(p.left.joint, p.right.joint) for p in found.pairs if p.left.joint and p.right.joint]
     joints = tuple(sorted((a.number, b.number) for a, b in moving if a.kind == b.kind))
     # A body with several joints is several parts of a description, of which the last has its mass.
-    by_body = {solid.one: solid for solid in map(_solid, found.pairs)}
+    by_body = {solid.left: solid for solid in map(_solid, found.pairs)}
     solids = (*by_body.values(), *_led(one, two, given))
     sites = _sites(one, two, given, found, trees)
     actuators = _actuators(one, two, joints, given)
@@ -135,7 +128,7 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
         two=two,
         joints=joints,
         bodies=_and_further(
-            ((solid.one, solid.two) for solid in solids),
+            ((solid.left, solid.right) for solid in solids),
             _by_name(one.body_names, two.body_names, given),
         ),
         sites=sites,
@@ -162,7 +155,15 @@ def match_alike(one: Model, two: Model) -> Matched:
             )
         pairs[kind] = tuple((k, k) for k in range(len(names[0])))
     return Matched(
-        one, two, pairs["joint"], pairs["body"], pairs["site"], pairs["actuator"], (), ({}, {}), ()
+        one=one,
+        two=two,
+        joints=pairs["joint"],
+        bodies=pairs["body"],
+        sites=pairs["site"],
+        actuators=pairs["actuator"],
+        solids=(),
+        only=({}, {}),
+        notes=(),
     )
 
 
@@ -176,7 +177,7 @@ def _description(model: Model) -> Robot:
 
 
 def _solid(pair: Pair) -> BodyPair:
-    bodies = [group.links[0][0].body for group in (pair.one, pair.two)]
+    bodies = [group.links[0][0].body for group in (pair.left, pair.right)]
     return BodyPair(bodies[0], bodies[1], pair.align, pair.moved)
 
 
@@ -225,7 +226,7 @@ def _sites(
     def in_one_place(sites: tuple[int, int]) -> bool:
         (number, place), (there, other) = places[0][sites[0]], places[1][sites[1]]
         pair = found.of(number)
-        if pair is None or there != pair.two.number:
+        if pair is None or there != pair.right.number:
             return False
         return (pair.align @ place).distance(other) < _ONE_PLACE
 

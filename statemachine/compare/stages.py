@@ -66,7 +66,7 @@ class StageReader:
         self._models = left, right = matched.one, matched.two
         here, names, turns = _dofs(left, [a for a, _ in matched.joints])
         self._dofs = here, _dofs(right, [b for _, b in matched.joints])[0]
-        frames = [left.body_names[s.one] or f"body {s.one}" for s in matched.solids[1:]]
+        frames = [left.body_names[s.left] or f"body {s.left}" for s in matched.solids[1:]]
         frames += [left.site_names[a] or f"site {a}" for a, _ in matched.sites]
         self._upper = np.triu_indices(len(names))
         entries = list(zip(*(places.tolist() for places in self._upper), strict=True))
@@ -139,7 +139,7 @@ class StageReader:
         """Origins and rotations of the left's frames, wherever the right's are in the solids."""
         xpos, xquat, positions, rotations = data.xpos, data.xquat, [], []
         for solid in self._matched.solids[1:]:
-            body = (solid.one, solid.two)[side]
+            body = (solid.left, solid.right)[side]
             position, rotation = xpos[body], matrix_from_quat(xquat[body])
             if side:
                 position = position + rotation @ solid.align.pos

@@ -96,28 +96,34 @@ class BodyPair:
     """A rigid part of one model, or the world, and its counterpart in another.
 
     Attributes:
-        one, two: Ids of the bodies that carry it.
-        align: The frame of `one` in that of `two`, as the same solid.
+        left, right: Ids of the bodies that carry it.
+        align: The frame of `left` in that of `right`, as the same solid.
         moved: Whether it hangs on another part in the other model.
     """
 
-    one: int
-    two: int
+    left: int
+    right: int
     align: Placement
     moved: bool
 
 
-class Counterparts(Protocol):
-    """What of one model is what of another: pairs of ids; actuators by their place in ctrl."""
+Pairs = tuple[tuple[int, int], ...]
 
-    @property
-    def joints(self) -> tuple[tuple[int, int], ...]: ...
-    @property
-    def sites(self) -> tuple[tuple[int, int], ...]: ...
-    @property
-    def actuators(self) -> tuple[tuple[int, int], ...]: ...
-    @property
-    def solids(self) -> tuple[BodyPair, ...]: ...
+
+@dataclass(frozen=True, eq=False)
+class Counterparts:
+    """What of one model is what of another.
+
+    Attributes:
+        joints, sites: Pairs of ids.
+        actuators: Pairs of places in ctrl.
+        solids: The rigid parts that both have, parents first; the world is the first.
+    """
+
+    joints: Pairs
+    sites: Pairs
+    actuators: Pairs
+    solids: tuple[BodyPair, ...]
 
 
 # An array of a compiled model or an option, where in it, and what is to stand there.

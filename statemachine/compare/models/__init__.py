@@ -6,8 +6,7 @@
   an engine's own is read by its room
 - `ledger`: the list. Every figure has a key, element and quantity
 - `compiled`: what the files differ in as compiled models, by key; `..why` explains a gap with that
-- `diff`: walks two readings and enters their figures; by subject in `places`, `parts`, `figures`
-- `engines`: what engines do of themselves
+- `diff`: walks two readings and enters their figures; by subject in `geometry` and `figures`
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ from ...engines.description.tree import GroupTree
 from ...errors import StateMachineError, UnsupportedError, unknown_name
 from ...installed import DEFAULT
 from ...models import SUFFIXES, resolve
+from ...probes import conventions
 from ...releases import is_release
-from .compiled import Compiled, compiled, enter_rest
+from .compiled import compiled, enter_rest
 from .diff import Posed, diff
-from .engines import own_ways
 from .ledger import AgreedFigures, Difference, Ledger
 
 __all__ = [
@@ -47,6 +46,9 @@ __all__ = [
     "read",
     "split",
 ]
+
+# Of the conventions, those that stand between a description and what comes of it.
+_ASKED = ("actuation", "damping", "friction")
 
 
 @dataclass(frozen=True)
@@ -150,8 +152,8 @@ def read(
             return urdf.read(path)
         return room(DEFAULT).read_file(path, name)
     if is_release(engine):
-        made = load(path, backend=engine, defaults="engine")
-        described = room(DEFAULT).describe(made.compiled, name)
+        loaded = load(path, backend=engine, defaults="engine")
+        described = room(DEFAULT).describe(loaded.compiled, name)
         return replace(described, reader=engine.replace("==", " "), format="engine")
     backend_engine(engine)
     own = room(engine)
@@ -194,26 +196,26 @@ def compare(
     """
     robots = [read(m, e, menagerie) for m, e in zip((one, two), engines, strict=True)]
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
-    sides, skipped = Compiled({}, None, complete=False), list[str]()
-    formats = [robot.format for robot in robots]
+    formats, skipped = [robot.format for robot in robots], list[str]()
     compilers = [engine or DEFAULT for engine in engines]
+    differences, matched = {}, None
     if all(name == DEFAULT or is_release(name) for name in compilers) and formats != ["URDF"] * 2:
-        files = [resolve(m, menagerie) for m in (one, two)]
         try:
             models = [
-                load(file, backend=name, defaults="engine")
-                for file, name in zip(files, compilers, strict=True)
+                load(resolve(m, menagerie), backend=name, defaults="engine")
+                for m, name in zip((one, two), compilers, strict=True)
             ]
-            sides = compiled(models, rename or {}, trees[0], complete="URDF" not in formats)
+            differences, matched = compiled(models, rename or {}, trees[0])
         except StateMachineError as error:
             why = str(error).splitlines()[0]
             skipped.append(f"what only a compiled model tells was not compared: {why}")
-    book = Ledger(digits, sides.differences, sides.complete)
+    book = Ledger(digits, differences, complete=matched is not None and "URDF" not in formats)
     posed, notes = diff(book, trees[0], trees[1], frames, seed)
-    skipped += enter_rest(book, sides, robots, max(tree.reach for tree in trees))
+    if matched:
+        skipped += enter_rest(book, matched, robots, max(tree.reach for tree in trees))
     for question, left, right in own_ways(*engines):
         book.differ("engine", "", question, (left, right), share=0.5)
-    found = Found(
+    result = Found(
         differences=book.ordered(),
         agreements=tuple(book.agreements()),
         posed=posed,
@@ -230,8 +232,29 @@ def compare(
             engine, _, version = robot.reader.partition(" ")
             versions[engine] = version
     return Compared(
-        _side(trees[0].robot), _side(robots[1]), found, digits, versions, tuple(skipped)
+        _side(trees[0].robot), _side(robots[1]), result, digits, versions, tuple(skipped)
     )
+
+
+def own_ways(one: str | None, two: str | None) -> tuple[tuple[str, str, str], ...]:
+    """For each question that two engines answer otherwise: its title, and both answers.
+
+    They are asked on small models, whatever a file says.
+    """
+    engines = [engine for engine in (one, two) if engine and room(engine).can("measurement")]
+    if len({*engines}) < 2:
+        return ()
+    answers = [
+        (
+            asked.question.title,
+            *(
+                "; ".join(f"{a.of}: {a.answer}" if a.of else a.answer for a in findings or ())
+                for findings in map(asked.findings.get, engines)
+            ),
+        )
+        for asked in conventions.probe(engines, _ASKED).questions
+    ]
+    return tuple((title, a, b) for title, a, b in answers if a and b and a != b)
 
 
 def _mass(robot: Robot) -> float:

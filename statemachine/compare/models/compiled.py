@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from .ledger import Key, Ledger, Telling, Value
 
 _CALLED = {"com": "centre of mass", "moments": "inertia"}  # of a part that is cut otherwise
 _SETTINGS = ("option", "flag")
+_EXTRA_JOINT = ("joint", "extra joint")
 # What a difference is a matter of, where no reading enters it; and what readings tell of at all.
 _SUBJECTS: dict[str, dict[str, str]] = {
     "body": {
@@ -56,35 +56,19 @@ _UNTOLD = ("filter", "adhesion", "moving surface")  # of which a URDF's reading 
 _UNTOLD_FIGURES = {"dampingpoly", "stiffnesspoly", "springyield", "gap"}
 
 
-@dataclass(frozen=True)
-class Compiled:
-    """Two files, compiled.
-
-    Attributes:
-        differences: By key; those of options and flags figure by figure.
-        matched: What of one is what of the other; None where nothing was compiled.
-        complete: Whether both files say all that a compiled model has, as an MJCF does.
-    """
-
-    differences: Mapping[Key, Sequence[ModelDifference]]
-    matched: Matched | None
-    complete: bool
-
-
 def compiled(
-    models: Sequence[Model],
-    names: Mapping[str, str],
-    tree: GroupTree,
-    *,
-    complete: bool,
-) -> Compiled:
-    """What two files differ in.
+    models: Sequence[Model], names: Mapping[str, str], tree: GroupTree
+) -> tuple[dict[Key, list[ModelDifference]], Matched]:
+    """What two files differ in by their compiled models.
 
     Args:
         models: The two.
         names: Joints, links and frames of the first that go by other names in the second.
         tree: The reading of the first, by these names.
-        complete: Whether both say all that a compiled model has.
+
+    Returns:
+        The differences by key, an option or a flag by each figure; and what of one model is what
+        of the other.
 
     Raises:
         StateMachineError: They cannot be matched.
@@ -94,46 +78,43 @@ def compiled(
     matched = match_models(one, two, {a: b for a, b in names.items() if a in here})
     differences: dict[Key, list[ModelDifference]] = {}
     for difference in differences_of(one, two, matched):
-        setting = difference.kind in _SETTINGS
-        # Settings one by one.
-        rows = [(value,) for value in difference.values] if setting else [difference.values]
-        for figure in (replace(difference, values=values) for values in rows):
-            where = names.get(figure.where, figure.where)
-            if figure.kind == "body" and where in tree.at:
-                where = tree.groups[tree.at[where][0]].name
-            kind = "option" if setting else figure.kind
-            usual = figure.values[0][0] if setting else figure.subject
-            words = {_CALLED.get(name, usual) for name, _, _ in figure.values} or {usual}
-            for word in sorted(words):
-                differences.setdefault((kind, where, word), []).append(figure)
-    return Compiled(differences, matched, complete)
+        kind, where = difference.kind, names.get(difference.where, difference.where)
+        figures, usual = [name for name, _, _ in difference.values], difference.subject
+        if kind == "body" and where in tree.at:
+            where = tree.groups[tree.at[where][0]].name
+        words = {_CALLED.get(name, usual) for name in figures} or {usual}
+        if kind in _SETTINGS:
+            kind, words = "option", {*figures}
+        for word in sorted(words):
+            differences.setdefault((kind, where, word), []).append(difference)
+    return differences, matched
 
 
-def enter_rest(book: Ledger, sides: Compiled, robots: Sequence[Robot], reach: float) -> list[str]:
+def enter_rest(book: Ledger, matched: Matched, robots: Sequence[Robot], reach: float) -> list[str]:
     """Enter what no reading told of; and what could not be compared.
 
     Args:
         book: Where the readings were entered.
-        sides: What the files differ in as compiled models.
+        matched: What of one compiled model is what of the other.
         robots: The two readings.
         reach: How far the robot reaches [m], which distances are set against.
     """
     skipped = []
-    if sides.matched is None:
-        return skipped
     drives = {drive.name: drive.joint for robot in robots for drive in robot.actuators or ()}
-    everything = [(key, d) for key, group in sides.differences.items() for d in group]
-    alone = {d.where for _, d in everything if d.subject == "extra joint"}
-    for key, difference in everything:
-        if difference.kind == "model":
-            skipped.append(f"{difference.title}: compared as a whole only, and it differs")
-        if drives.get(difference.where) in alone and difference.subject == "extra actuator":
-            continue  # it goes with the joint
-        if key not in book.entered and (sides.complete or not _is_told(difference)):
-            _enter(book, key, difference, reach)
-    _enter_order(book, sides.matched)
-    _enter_keyframes(book, sides.matched)
-    _enter_sensors(book, sides.matched)
+    alone = {where for kind, where, word in book.compiled if (kind, word) == _EXTRA_JOINT}
+    for key, differences in book.compiled.items():
+        for difference in differences:
+            if difference.kind == "model":
+                skipped.append(f"{difference.title}: compared as a whole only, and it differs")
+            if drives.get(difference.where) in alone and difference.subject == "extra actuator":
+                continue  # it goes with the joint
+            if key not in book.entered and (book.complete or not _is_told(difference)):
+                _enter(book, key, difference, reach)
+    if matched.reordered:  # who writes ctrl by number meets other actuators
+        names = [few(list(model.actuator_names), 6) for model in (matched.one, matched.two)]
+        book.differ("further", "ctrl", "order", names, share=0.5)
+    _enter_keyframes(book, matched)
+    _enter_sensors(book, matched)
     return skipped
 
 
@@ -147,8 +128,7 @@ def _is_told(difference: ModelDifference) -> bool:
 
 def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) -> None:
     """The figures of a difference, as the compiled models name them."""
-    usual = "settings" if difference.kind in _SETTINGS else "further"
-    subject = _SUBJECTS.get(difference.kind, {}).get(difference.subject, usual)
+    subject = _SUBJECTS.get(difference.kind, {}).get(difference.subject, "further")
     for name, *values in difference.values or (("", "as it is", "another"),):
         if name.endswith("limited") and len(difference.values) > 1:
             continue  # the range says so
@@ -171,13 +151,6 @@ def _value(value: Any) -> Value:
     if isinstance(value, tuple):
         return tuple(map(float, value))
     return float(value) if isinstance(value, int | float) else str(value)
-
-
-def _enter_order(book: Ledger, matched: Matched) -> None:
-    """Whether who writes ctrl by number meets other actuators."""
-    if matched.reordered:
-        names = [few(list(model.actuator_names), 6) for model in (matched.one, matched.two)]
-        book.differ("further", "ctrl", "order", names, share=0.5)
 
 
 def _enter_keyframes(book: Ledger, matched: Matched) -> None:

@@ -12,7 +12,7 @@ from ...engines.description.match import Matching, frame_names, match
 from ...engines.description.tree import Group, GroupTree
 from ...measures.text import rounded
 from ...rotations import HERE
-from . import figures, parts, places
+from . import figures, geometry
 from .ledger import Ledger
 
 POSES = 100  # at which the same positions are put into both
@@ -39,8 +39,8 @@ class Posed:
 
 def diff(
     book: Ledger,
-    one: GroupTree,
-    two: GroupTree,
+    left: GroupTree,
+    right: GroupTree,
     frames: Mapping[str, str] | None = None,
     seed: int = 0,
 ) -> tuple[Posed, list[str]]:
@@ -48,9 +48,9 @@ def diff(
 
     Args:
         book: Where what differs and what agrees is entered.
-        one: A reading, as a tree.
-        two: The other.
-        frames: Names of frames of `one` that are others in `two`.
+        left: A reading, as a tree.
+        right: The other.
+        frames: Names of frames of `left` that are others in `right`.
         seed: Of the poses.
 
     Returns:
@@ -59,27 +59,29 @@ def diff(
     Raises:
         UnknownNameError: A frame that was given is not there.
     """
-    named = frame_names(one, two, frames)
-    found = match(one, two)
-    reach = max(one.reach, two.reach)
-    notes = [*found.notes(), *_structure(book, one, two, found), *_suggestions(found)]
-    for pair in found.pairs:
-        above = found.of(pair.one.parent) if pair.one.parent >= 0 and not pair.moved else None
+    named = frame_names(left, right, frames)
+    matching = match(left, right)
+    reach = max(left.reach, right.reach)
+    notes = [*matching.notes(), *_structure(book, left, right, matching), *_suggestions(matching)]
+    for pair in matching.pairs:
+        above = matching.of(pair.left.parent) if pair.left.parent >= 0 and not pair.moved else None
         if pair.by != "root" and above is not None:
-            places.of_joints(book, pair, above, one, reach)
-        notes += parts.of_masses(book, pair, one, two, reach)
-        parts.of_shapes(book, pair, one, two, reach)
+            geometry.of_joints(book, pair, above, left, reach)
+        notes += geometry.of_masses(book, pair, left, right, reach)
+        geometry.of_shapes(book, pair, left, right, reach)
         if pair.by != "root":
-            figures.of_joints(book, pair, one, two)
-    figures.of_loose_drives(book, one, two)
-    notes += places.of_frames(book, found, one, two, named, reach)
-    notes += figures.of_settings(book, one, two)
-    return _posed(found, one, two, seed), notes
+            figures.of_joints(book, pair, left, right)
+    figures.of_loose_drives(book, left, right)
+    notes += geometry.of_frames(book, matching, left, right, named, reach)
+    notes += figures.of_settings(book, left, right)
+    return _posed(matching, left, right, seed), notes
 
 
-def _structure(book: Ledger, one: GroupTree, two: GroupTree, found: Matching) -> Iterator[str]:
+def _structure(
+    book: Ledger, left: GroupTree, right: GroupTree, matching: Matching
+) -> Iterator[str]:
     """Parts that only one has, other parents, and other names; what to note of them."""
-    for side, (only, tree) in enumerate(((found.only_one, one), (found.only_two, two))):
+    for side, (only, tree) in enumerate(((matching.only_left, left), (matching.only_right, right))):
         for group in only:
             if group.joint is None and not group.shapes:
                 continue  # the world
@@ -89,16 +91,16 @@ def _structure(book: Ledger, one: GroupTree, two: GroupTree, found: Matching) ->
             sides = ("nothing", name) if side else (name, "nothing")
             keys = [("joint", name, "extra joint")]
             book.differ("structure", group.name, kind, sides, effect=mass, keys=keys)
-    for pair in found.pairs:
-        a, b = pair.one, pair.two
+    for pair in matching.pairs:
+        a, b = pair.left, pair.right
         if pair.moved:
-            above = one.groups[a.parent].name, two.groups[b.parent].name
+            above = left.groups[a.parent].name, right.groups[b.parent].name
             keys = [("body", a.name, "parent")]
             book.differ("structure", _label(a), "hangs on", above, keys=keys)
         kinds = [group.joint.kind if group.joint else "fixed" for group in (a, b)]
         if pair.by == "root" and "free" in kinds and kinds[0] != kinds[1]:
             words = ["floats" if kind == "free" else "stands" for kind in kinds]
-            rooted = one.robot.rooted and two.robot.rooted
+            rooted = left.robot.rooted and right.robot.rooted
             keys = [("joint", _label(group), "extra joint") for group in (a, b) if group.joint]
             book.differ("structure", a.name, "base", words, matters=rooted, keys=keys)
         if pair.align is not HERE and pair.by != "root":
@@ -108,18 +110,18 @@ def _structure(book: Ledger, one: GroupTree, two: GroupTree, found: Matching) ->
                 f"{rounded(far, 'm')} and {rounded(turn, 'rad')} off: it moves "
                 "alike, and its pose reads otherwise"
             )
-    pairs = [(pair.one.name, pair.two.name) for pair in found.pairs if pair.by != "root"]
+    pairs = [(pair.left.name, pair.right.name) for pair in matching.pairs if pair.by != "root"]
     names = [f"{a} is {b}" for a, b in pairs if a != b]
     if names:
         yield f"links go by other names: {', '.join(names)}"
 
 
-def _suggestions(found: Matching) -> Iterator[str]:
+def _suggestions(matching: Matching) -> Iterator[str]:
     """Joints that may be one: of one kind, each the only one left on the same part."""
-    for a in found.only_one:
-        above = found.of(a.parent)
-        ours = [g for g in found.only_one if g.parent == a.parent]
-        theirs = [b for b in found.only_two if above and b.parent == above.two.number]
+    for a in matching.only_left:
+        above = matching.of(a.parent)
+        ours = [g for g in matching.only_left if g.parent == a.parent]
+        theirs = [b for b in matching.only_right if above and b.parent == above.right.number]
         if len(ours) == len(theirs) == 1 and a.joint and theirs[0].joint:
             left, right = a.joint, theirs[0].joint
             if left.kind == right.kind:
@@ -133,30 +135,26 @@ def _label(group: Group) -> str:
     return group.joint.name if group.joint else group.name
 
 
-def _posed(found: Matching, one: GroupTree, two: GroupTree, seed: int) -> Posed:
+def _posed(matching: Matching, left: GroupTree, right: GroupTree, seed: int) -> Posed:
     """The same joint positions in both: how far apart are the same links?"""
     random = np.random.default_rng(seed)
-    ranges: dict[str, tuple[str, float, float]] = {}
-    for pair in found.pairs:
-        a, b = pair.one.joint, pair.two.joint
-        if a is None or b is None or pair.by == "root" or a.kind not in ("hinge", "slide"):
-            continue
-        wide = math.pi if a.kind == "hinge" else 0.1
-        bounds = [each.limits or (-wide, wide) for each in (a, b)]
-        low, high = max(low for low, _ in bounds), min(high for _, high in bounds)
-        ranges[a.name] = (b.name, low, max(low, high))
-    root = found.pairs[0]
-    worst, angle, link = 0.0, 0.0, root.one.name
+    ranges: dict[tuple[str, str], tuple[float, float]] = {}
+    for pair in matching.pairs:
+        a, b = pair.left.joint, pair.right.joint
+        if a and b and pair.by != "root" and a.kind in ("hinge", "slide"):
+            wide = math.pi if a.kind == "hinge" else 0.1
+            ends = zip(*(joint.limits or (-wide, wide) for joint in (a, b)), strict=True)
+            low, high = (choose(values) for choose, values in zip((max, min), ends, strict=True))
+            ranges[a.name, b.name] = low, max(low, high)
+    root = matching.pairs[0]
+    farthest, angle = (0.0, root.left.name), 0.0
     for k in range(POSES):
-        drawn = {n: random.uniform(lo, hi) if k else 0.0 for n, (_, lo, hi) in ranges.items()}
-        ours = one.poses(drawn)
-        theirs = two.poses({other: drawn[name] for name, (other, _, _) in ranges.items()})
-        start = theirs[root.two.number] @ root.align @ ours[root.one.number].inverse
-        for pair in found.pairs:
-            a = start @ ours[pair.one.number]
-            b = theirs[pair.two.number] @ pair.align
-            far = a.distance(b)
-            if far > worst:
-                worst, link = far, pair.one.name
+        drawn = {names: random.uniform(*ends) if k else 0.0 for names, ends in ranges.items()}
+        ours = left.poses({name: position for (name, _), position in drawn.items()})
+        theirs = right.poses({name: position for (_, name), position in drawn.items()})
+        start = theirs[root.right.number] @ root.align @ ours[root.left.number].inverse
+        for pair in matching.pairs:
+            a, b = start @ ours[pair.left.number], theirs[pair.right.number] @ pair.align
+            farthest = max(farthest, (a.distance(b), pair.left.name), key=lambda far: far[0])
             angle = max(angle, a.angle(b))
-    return Posed(POSES, seed, worst, angle, link, len(ranges))
+    return Posed(POSES, seed, farthest[0], angle, farthest[1], len(ranges))

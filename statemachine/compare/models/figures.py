@@ -54,7 +54,7 @@ class _Driven:
 
     def __init__(self, tree: GroupTree, number: int, joint: RobotJoint) -> None:
         self.joint, self.slides = joint, joint.kind == "slide"
-        self.inertia, self.load = tree.inertia(number), tree.load(number)
+        self.inertia, self.load = tree.felt(number)
         effort, damping = joint.effort or 0.0, joint.damping
         effort = effort if math.isfinite(effort) else 0.0
         slows = milliseconds(self.inertia / damping, 3) if damping and self.inertia > 0 else "never"
@@ -94,12 +94,12 @@ class _Driven:
         return rounded(value, _FORCE[self.slides])
 
 
-def of_joints(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree) -> None:
+def of_joints(book: Ledger, pair: Pair, left: GroupTree, right: GroupTree) -> None:
     """Everything but where the joint is."""
-    a, b = pair.one.joint, pair.two.joint
+    a, b = pair.left.joint, pair.right.joint
     if a is None or b is None or a.kind != b.kind:
         return
-    sides = _Driven(one, pair.one.number, a), _Driven(two, pair.two.number, b)
+    sides = _Driven(left, pair.left.number, a), _Driven(right, pair.right.number, b)
     scalar = a.kind in ("hinge", "slide")
     if scalar:
         _limits(book, a, b)
@@ -177,63 +177,54 @@ def _drives(book: Ledger, left: _Driven, right: _Driven) -> None:
             book.enter(subject, name, figure, values, unit, effect=effect, keys=keys)
 
 
-def of_loose_drives(book: Ledger, one: GroupTree, two: GroupTree) -> None:
+def of_loose_drives(book: Ledger, left: GroupTree, right: GroupTree) -> None:
     """Actuators that drive something else than a joint: tendons, sites, bodies."""
     loose = [
         {drive.name for drive in tree.robot.actuators or () if not drive.joint}
-        for tree in (one, two)
+        for tree in (left, right)
     ]
     for name in sorted(loose[0] ^ loose[1]):
         sides = ["drives" if name in names else "nothing" for names in loose]
         book.differ("drive", name, "drive", sides, keys=[("actuator", name, "extra actuator")])
 
 
-def of_settings(book: Ledger, one: GroupTree, two: GroupTree) -> Iterator[str]:
+def of_settings(book: Ledger, left: GroupTree, right: GroupTree) -> Iterator[str]:
     """Settings of the simulation; where a format has none, what the other would change."""
-    robots = one.robot, two.robot
+    robots = left.robot, right.robot
     settings = [robot.settings for robot in robots]
-    if settings.count(None) == 1:
-        silent, said = robots if settings[0] is None else robots[::-1]
-        for name, value in (said.settings or {}).items():
-            usual = said.defaults.get(name)
-            if value != usual:
-                values = [value if robot is said else None for robot in robots]
-                effect = f"{said.reader.split()[0]} would take {_said(usual)}"
-                _setting(book, name, values, _share(name, value, usual), effect)
+    says = next((robot for robot in robots if robot.settings), robots[0])
+    silent = [robot.format for robot in robots if robot.settings is None]
+    for name, value in (says.settings or {}).items():
+        values = [None if known is None else known.get(name) for known in settings]
+        other, effect = says.defaults.get(name) if silent else values[1], ""
+        if silent and other is not None:
+            taken = other if isinstance(other, str) else " ".join(f"{x:g}" for x in np.ravel(other))
+            effect = f"{says.reader.split()[0]} would take {taken}"
+        if (value == other) if silent else (other is None):
+            continue
+        book.enter(
+            *("settings", "", name, values, _UNITS.get(name, "")),
+            share=_share(name, value, other),
+            effect=effect,
+            keys=[("option", "", name)],
+        )
+    if len(silent) == 1:
         yield (
-            f"a {silent.format} says nothing of timestep, gravity and solver: the engine that "
+            f"a {silent[0]} says nothing of timestep, gravity and solver: the engine that "
             "loads it decides (--backends shows what it takes)"
         )
-        return
-    ours, theirs = (mapping or {} for mapping in settings)
-    for name in ours:
-        if name in theirs:
-            values = [ours[name], theirs[name]]
-            _setting(book, name, values, _share(name, *values))
-    for which, mine, other in (("left", ours, theirs), ("right", theirs, ours)):
-        alone = sorted(mine.keys() - other.keys())
-        if alone:
-            yield f"only the engine of the {which} has the settings {few(alone, 8)}"
+    if not silent:
+        names = [{*(known or ())} for known in settings]
+        for which, alone in (("left", names[0] - names[1]), ("right", names[1] - names[0])):
+            if alone:
+                yield f"only the engine of the {which} has the settings {few(sorted(alone), 8)}"
 
 
-def _setting(
-    book: Ledger, name: str, values: list[Setting], share: float, effect: str = ""
-) -> None:
-    more: Telling = {"share": share, "effect": effect, "keys": [("option", "", name)]}
-    book.enter("settings", "", name, values, _UNITS.get(name, ""), **more)
-
-
-def _said(value: Setting) -> str:
-    if isinstance(value, tuple):
-        return " ".join(f"{entry:g}" for entry in value)
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _share(name: str, one: Setting, two: Setting) -> float:
+def _share(name: str, left: Setting, right: Setting) -> float:
     """Of gravity and the timestep, how much of it; of the solver's settings at most a fifth."""
-    if one is None or two is None or isinstance(one, str) or isinstance(two, str):
+    if left is None or right is None or isinstance(left, str) or isinstance(right, str):
         return 0.5
-    a, b = np.atleast_1d(np.asarray(one)), np.atleast_1d(np.asarray(two))
+    a, b = np.ravel(left), np.ravel(right)
     most = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
     share = float(np.linalg.norm(a - b)) / most if most else 0.0
     return share if name in _MATTER_MOST else min(share, 0.2)

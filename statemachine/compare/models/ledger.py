@@ -126,6 +126,10 @@ class Ledger:
         compiled: What the compiled models differ in, by key.
         complete: Whether these are all that can differ. A figure with a key that is not among them
             then only sums up others, and is left out.
+
+    Attributes:
+        tolerance: The relative difference up to which two figures are rounded.
+        entered: Keys of what was entered as a difference.
     """
 
     def __init__(
@@ -134,7 +138,7 @@ class Ledger:
         self.tolerance = 0.5 * 10.0 ** (1 - digits)
         self.differences: list[Difference] = []
         self.entered = set[Key]()
-        self._compiled, self._complete = compiled, complete
+        self.compiled, self.complete = compiled, complete
         self._equal: dict[tuple[str, str], list[tuple[float, float, str]]] = {}
 
     def differ(
@@ -155,8 +159,8 @@ class Ledger:
         share = float(matters) * (1.0 if math.isnan(share) else min(max(share, 0.0), 1.0))
         one, two = ["unlimited" if value in (math.inf, -math.inf) else value for value in values]
         size = None if size is None or not math.isfinite(size) else size
-        known = [difference for key in keys for difference in self._compiled.get(key, ())]
-        if self._complete and keys and not known and keys[0][0] != "site":  # a link is a frame too
+        known = [difference for key in keys for difference in self.compiled.get(key, ())]
+        if self.complete and keys and not known and keys[0][0] != "site":  # a link is a frame too
             return
         self.entered.update(keys)
         causes = dict.fromkeys(difference.title for difference in known)

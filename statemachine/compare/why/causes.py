@@ -209,9 +209,9 @@ def _of_keyframe(matched: Matched, name: str) -> Iterator[ModelDifference]:
         edits: tuple[Edit, ...] = (("key_time", (keys[1],), times[0]),)
         yield ModelDifference("time of the start", "run", "", values, "s", edits)
     led = [
-        (int(one.body_mocapid[pair.one]), int(two.body_mocapid[pair.two]))
+        (int(one.body_mocapid[pair.left]), int(two.body_mocapid[pair.right]))
         for pair in matched.solids
-        if one.body_mocapid[pair.one] >= 0
+        if one.body_mocapid[pair.left] >= 0
     ]
     places = [(3 * a + k, 3 * b + k) for a, b in led for k in range(3)]
     turns = [(4 * a + k, 4 * b + k) for a, b in led for k in range(4)]

@@ -2,5 +2,5 @@
 
 - `records`: a robot as frozen records, in one set of conventions
 - `urdf`: from a URDF; what only an engine can read is read in that engine's room
-- `meshes`: their corners, volumes and extents
+- `shapes`: which is which, how they lie; corners, volumes and extents of meshes
 """

@@ -28,15 +28,15 @@ class Pair:
     """A rigid group of one description and its counterpart.
 
     Attributes:
-        one, two: The groups.
-        align: The frame of `one` in that of `two`, as the same solid: identity unless the
+        left, right: The groups.
+        align: The frame of `left` in that of `right`, as the same solid: identity unless the
             files put the frame of this link elsewhere.
         by: How it was found: root, name or place.
         moved: Whether it hangs on another part in the other file.
     """
 
-    one: Group
-    two: Group
+    left: Group
+    right: Group
     align: Placement
     by: str
     moved: bool = False
@@ -47,17 +47,17 @@ class Matching:
     """All pairs, parents first, and what is left over."""
 
     pairs: tuple[Pair, ...]
-    only_one: tuple[Group, ...]
-    only_two: tuple[Group, ...]
+    only_left: tuple[Group, ...]
+    only_right: tuple[Group, ...]
 
     def of(self, number: int) -> Pair | None:
         """The pair of a group of the first description."""
-        return next((pair for pair in self.pairs if pair.one.number == number), None)
+        return next((pair for pair in self.pairs if pair.left.number == number), None)
 
     def notes(self) -> Iterator[str]:
         """What was taken for one without a common name, or is of two kinds."""
         for pair in self.pairs:
-            a, b = pair.one.joint, pair.two.joint
+            a, b = pair.left.joint, pair.right.joint
             if pair.by == "place" and a and b and a.name != b.name:
                 yield (
                     f"joint {a.name!r} on the left is taken for {b.name!r} on the right: one kind, "
@@ -93,82 +93,82 @@ def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
     return replace(robot, links=links, frames=frames, actuators=drives)
 
 
-def match(one: GroupTree, two: GroupTree, *, one_world: bool = False) -> Matching:
+def match(left: GroupTree, right: GroupTree, *, one_world: bool = False) -> Matching:
     """Pairs of rigid groups.
 
     Args:
-        one: A description.
-        two: Another.
+        left: A description.
+        right: Another.
         one_world: Whether two worlds are laid on each other as they are, and not so that what is
             fixed to them coincides: gravity, and what floats, is told in the frame of the world.
     """
     pairs: dict[int, Pair] = {}
     taken: set[int] = set()
-    names = _fixed_frames(one, two)
+    names = _fixed_frames(left, right)
 
     def add(a: Group, b: Group, by: str, moved: bool = False) -> None:
         above, choices = pairs.get(a.parent), [HERE]
         if by == "root" and not (one_world and a.number == b.number == 0):
-            choices = _of_root(one, two, a, b)
+            choices = _of_root(left, right, a, b)
         elif by != "root" and above is not None and not moved:
             # One frame, or two of a solid that is in one place.
             choices = [HERE, b.place.inverse @ above.align @ a.place]
-        pairs[a.number] = Pair(a, b, _best(one, two, a, b, names, choices), by, moved)
+        pairs[a.number] = Pair(a, b, _best(left, right, a, b, names, choices), by, moved)
         taken.add(b.number)
 
-    add(*_bases(one, two), "root")
-    for group in one.groups:
+    add(*_bases(left, right), "root")
+    for group in left.groups:
         if group.number in pairs or group.joint is None:
             continue
         above = pairs.get(group.parent)
-        named = two.by_joint.get(group.joint.name)
+        named = right.by_joint.get(group.joint.name)
         if named is not None and named.number not in taken:
-            hung = above is not None and above.two.number == named.parent
+            hung = above is not None and above.right.number == named.parent
             add(group, named, "name", moved=not hung)
         elif above is not None:
-            found = _placed(one, two, group, above, taken)
-            if found is not None:
-                add(group, found, "place")
+            placed = _placed(left, right, group, above, taken)
+            if placed is not None:
+                add(group, placed, "place")
     return Matching(
         tuple(pairs.values()),
-        tuple(group for group in one.groups if group.number not in pairs),
-        tuple(group for group in two.groups if group.number not in taken),
+        tuple(group for group in left.groups if group.number not in pairs),
+        tuple(group for group in right.groups if group.number not in taken),
     )
 
 
-def _bases(one: GroupTree, two: GroupTree) -> tuple[Group, Group]:
+def _bases(left: GroupTree, right: GroupTree) -> tuple[Group, Group]:
     """The roots; a base that floats in one file and stands still in the other is one too."""
-    for name, a in one.by_joint.items():
-        b = two.by_joint.get(name)
+    for name, a in left.by_joint.items():
+        b = right.by_joint.get(name)
         if b is None or a.parent < 0 or b.parent < 0:
             continue
-        above = one.groups[a.parent], two.groups[b.parent]
-        floats = [bool(each.joint and each.joint.kind == "free") for each in above]
+        above = left.groups[a.parent], right.groups[b.parent]
+        floats = [bool(group.joint and group.joint.kind == "free") for group in above]
         if floats[0] != floats[1] and above[floats[0]].parent < 0:
             return above
         break
-    return one.groups[0], two.groups[0]
+    return left.groups[0], right.groups[0]
 
 
 def _placed(
-    one: GroupTree, two: GroupTree, group: Group, above: Pair, taken: set[int]
+    left: GroupTree, right: GroupTree, group: Group, above: Pair, taken: set[int]
 ) -> Group | None:
     """A group of the second description that hangs where `group` does, by the same axis."""
     joint = group.joint
     assert joint is not None
-    found: dict[float, Group] = {}
-    for other in (g for g in two.children(above.two.number) if g.number not in taken):
+    place, nearest = None, _NEAR
+    for other in (g for g in right.children(above.right.number) if g.number not in taken):
         hers = other.joint
-        if hers is None or hers.kind != joint.kind or hers.name in one.by_joint:
+        if hers is None or hers.kind != joint.kind or hers.name in left.by_joint:
             continue
-        if joint.kind not in ("hinge", "slide"):
-            if group.name == other.name:
-                return other
-            continue
-        (at, axis), (there, along) = _line(group, above.align), _line(other, HERE)
-        if _apart(at, there, along) < _NEAR and abs(axis @ along) > np.cos(_TILT):
-            found.setdefault(_apart(at, there, along), other)
-    return found[min(found)] if found else None
+        if joint.kind in ("hinge", "slide"):
+            (at, axis), (there, along) = _line(group, above.align), _line(other, HERE)
+            apart = _apart(at, there, along)
+            if apart < nearest and abs(axis @ along) > np.cos(_TILT):
+                place, nearest = other, apart
+        elif group.name == other.name:
+            return other
+    return place
 
 
 def _line(group: Group, align: Placement) -> tuple[Array, Array]:
@@ -184,7 +184,7 @@ def _apart(point: Array, other: Array, axis: Array) -> float:
     return float(np.linalg.norm(np.cross(axis, point - other)))
 
 
-def _of_root(one: GroupTree, two: GroupTree, a: Group, b: Group) -> list[Placement]:
+def _of_root(left: GroupTree, right: GroupTree, a: Group, b: Group) -> list[Placement]:
     """How the frames of two roots may lie: as they are, or so that links of them coincide."""
     theirs = {link.name: place for link, place in b.links}
     choices = [theirs[link.name] @ at.inverse for link, at in a.links if link.name in theirs]
@@ -193,23 +193,25 @@ def _of_root(one: GroupTree, two: GroupTree, a: Group, b: Group) -> list[Placeme
         group.links[1][1]
         if tree.robot.rooted and group.number == 0 and len(group.links) > 1
         else HERE
-        for tree, group in ((one, a), (two, b))
+        for tree, group in ((left, a), (right, b))
     ]
     return [HERE, *choices, firsts[1] @ firsts[0].inverse]
 
 
 def _best(
-    one: GroupTree, two: GroupTree, a: Group, b: Group, names: Places, choices: list[Placement]
+    left: GroupTree, right: GroupTree, a: Group, b: Group, names: Places, choices: list[Placement]
 ) -> Placement:
     fixed = names.get((a.number, b.number), [])
-    scores = [sum(e / (e + _ODD) for e in _errors(one, two, a, b, fixed, each)) for each in choices]
+    scores = [
+        sum(e / (e + _ODD) for e in _errors(left, right, a, b, fixed, align)) for align in choices
+    ]
     least = min(scores)
-    return next(each for each, score in zip(choices, scores, strict=True) if score <= least + 0.5)
+    return next(align for align, score in zip(choices, scores, strict=True) if score <= least + 0.5)
 
 
 def _errors(
-    one: GroupTree,
-    two: GroupTree,
+    left: GroupTree,
+    right: GroupTree,
     a: Group,
     b: Group,
     fixed: list[tuple[Placement, Placement]],
@@ -220,8 +222,8 @@ def _errors(
         yield float(np.linalg.norm(align.mat @ a.joint.axis - b.joint.axis)) / 10
         if a.joint.kind == "hinge":
             yield _apart(align.of(a.joint.anchor), b.joint.anchor, b.joint.axis)
-    for child in one.children(a.number):
-        other = two.by_joint.get(child.joint.name) if child.joint else None
+    for child in left.children(a.number):
+        other = right.by_joint.get(child.joint.name) if child.joint else None
         if other is None or other.joint is None or other.parent != b.number:
             continue
         if other.joint.kind in ("hinge", "slide"):
@@ -237,18 +239,18 @@ def _errors(
         yield (align @ place).distance(other_place)
 
 
-def _fixed_frames(one: GroupTree, two: GroupTree) -> Places:
+def _fixed_frames(left: GroupTree, right: GroupTree) -> Places:
     """Frames of one name by the groups that carry them, those of the groups themselves apart."""
-    found: Places = {}
-    for name, other_name in frame_names(one, two).items():
-        (at, place), (there, other) = one.frames[name], two.frames[other_name]
+    fixed: Places = {}
+    for name, other_name in frame_names(left, right).items():
+        (at, place), (there, other) = left.frames[name], right.frames[other_name]
         if not (place is HERE and other is HERE):
-            found.setdefault((at, there), []).append((place, other))
-    return found
+            fixed.setdefault((at, there), []).append((place, other))
+    return fixed
 
 
 def frame_names(
-    one: GroupTree, two: GroupTree, given: Mapping[str, str] | None = None
+    left: GroupTree, right: GroupTree, given: Mapping[str, str] | None = None
 ) -> dict[str, str]:
     """Frames that are one: those given, of one name, or of names that say the same.
 
@@ -257,18 +259,18 @@ def frame_names(
     Raises:
         UnknownNameError: A frame that was given is not there.
     """
-    found = dict(given or {})
-    for pair in found.items():
-        for tree, name in zip((one, two), pair, strict=True):
+    names = dict(given or {})
+    for pair in names.items():
+        for tree, name in zip((left, right), pair, strict=True):
             check_name(f"frame in {tree.robot.name}", name, tree.frames)
-    rest = [name for name in two.frames if name not in found.values()]
+    rest = [name for name in right.frames if name not in names.values()]
     plain = {_plain(name): name for name in reversed(rest)}
-    for name in one.frames:
-        if name not in found:
+    for name in left.frames:
+        if name not in names:
             other = name if name in rest else plain.get(_plain(name))
-            if other is not None and other not in found.values():
-                found[name] = other
-    return found
+            if other is not None and other not in names.values():
+                names[name] = other
+    return names
 
 
 def _plain(name: str) -> str:

@@ -44,8 +44,8 @@ class CollisionShape:
         volume: Of a mesh that was read [m³].
         name: As in the file, may be empty.
         label: What the list of two compiled models calls it.
-        friction: (sliding, torsional, rolling) coefficients, or None where not said.
-        contact: Further settings of its contacts, by name.
+        contact: Settings of its contacts by name, those that are said; `friction` has the sliding,
+            torsional and rolling coefficients.
     """
 
     kind: str
@@ -55,7 +55,6 @@ class CollisionShape:
     volume: float | None = None
     name: str = ""
     label: str = ""
-    friction: tuple[float, ...] | None = None
     contact: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property

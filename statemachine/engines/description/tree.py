@@ -15,8 +15,10 @@ import numpy as np
 
 from ...interface import Array
 from ...rotations import HERE, Placement
-from .meshes import with_capsules
 from .records import CollisionShape, Inertial, Link, Robot, RobotJoint, moved
+from .shapes import with_capsules
+
+GRAVITY = 9.81  # [m/s²]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,7 @@ class Group:
     number: int
     parent: int
     place: Placement
-    links: tuple[tuple[Link, Placement], ...]
+    links: list[tuple[Link, Placement]]
 
     @property
     def name(self) -> str:
@@ -69,10 +71,7 @@ def together(parts: list[Inertial]) -> Inertial:
     if len(parts) == 1:
         return parts[0]
     mass = sum(part.mass for part in parts)
-    if not mass:
-        tensor = sum((part.tensor for part in parts), np.zeros((3, 3)))
-        return Inertial(0.0, np.zeros(3), tensor)
-    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / mass
+    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / (mass or 1.0)
     tensor = sum(
         (part.tensor + _shifted(part.mass, part.com - com) for part in parts), np.zeros((3, 3))
     )
@@ -95,23 +94,17 @@ class GroupTree:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        members: list[list[tuple[Link, Placement]]] = []
-        carried: list[tuple[int, Placement]] = []
+        self.groups: list[Group] = []
         self.at: dict[str, tuple[int, Placement]] = {}
         for link in robot.links:
+            number, frame = self.at[link.parent] if link.parent else (-1, HERE)
+            place = frame @ link.place
             if not link.parent or link.joint:
-                up, frame = self.at[link.parent] if link.parent else (-1, HERE)
-                self.at[link.name] = (len(members), HERE)
-                carried.append((up, frame @ link.place))
-                members.append([(link, HERE)])
+                self.at[link.name] = (len(self.groups), HERE)
+                self.groups.append(Group(len(self.groups), number, place, [(link, HERE)]))
             else:
-                number, frame = self.at[link.parent]
-                self.at[link.name] = (number, frame @ link.place)
-                members[number].append((link, frame @ link.place))
-        self.groups = [
-            Group(k, up, place, tuple(links))
-            for k, ((up, place), links) in enumerate(zip(carried, members, strict=True))
-        ]
+                self.at[link.name] = (number, place)
+                self.groups[number].links.append((link, place))
         self.by_joint = {g.joint.name: g for g in self.groups if g.joint}
 
     def children(self, number: int) -> list[Group]:
@@ -124,21 +117,21 @@ class GroupTree:
 
         Where a site and a link share a name, the site goes by "name (site)".
         """
-        found = dict(self.at)
+        frames = dict(self.at)
         for frame in self.robot.frames:
             number, place = self.at[frame.link]
-            name = f"{frame.name} (site)" if frame.name in found else frame.name
-            found[name] = (number, place @ frame.place)
-        return found
+            name = f"{frame.name} (site)" if frame.name in frames else frame.name
+            frames[name] = (number, place @ frame.place)
+        return frames
 
     def poses(self, positions: Mapping[str, float] | None = None) -> list[Placement]:
         """World poses of the groups, joints at `positions` by name, others at zero."""
-        found: list[Placement] = []
+        poses: list[Placement] = []
         for group in self.groups:
-            above = found[group.parent] if group.parent >= 0 else HERE
+            above = poses[group.parent] if group.parent >= 0 else HERE
             amount = (positions or {}).get(group.joint.name, 0.0) if group.joint else 0.0
-            found.append(above @ group.place @ moved(group.joint, amount))
-        return found
+            poses.append(above @ group.place @ moved(group.joint, amount))
+        return poses
 
     @cached_property
     def reach(self) -> float:
@@ -151,34 +144,25 @@ class GroupTree:
     @cached_property
     def carried(self) -> list[Inertial]:
         """By number each group and all beyond it, as one body at zero, in the group's frame."""
-        found = [group.inertial for group in self.groups]
+        carried = [group.inertial for group in self.groups]
         for group in reversed(self.groups):  # children before parents
             if group.parent >= 0:
-                held = found[group.number].seen_from(group.place)
-                found[group.parent] = together([found[group.parent], held])
-        return found
+                body = carried[group.number].seen_from(group.place)
+                carried[group.parent] = together([carried[group.parent], body])
+        return carried
 
-    def inertia(self, number: int) -> float:
-        """M_ii of the group's joint at zero, armature included [kg m² or kg]."""
-        joint = self.groups[number].joint
-        if joint is None or joint.kind not in ("hinge", "slide"):
-            return math.nan
-        body, rotor = self.carried[number], joint.armature or 0.0
-        if joint.kind == "slide":
-            return body.mass + rotor
-        tensor = body.tensor + _shifted(body.mass, body.com - joint.anchor)
-        return float(joint.axis @ tensor @ joint.axis) + rotor
+    def felt(self, number: int) -> tuple[float, float]:
+        """What the group's joint feels of all that it carries, at zero; NaN of other joints.
 
-    def load(self, number: int, gravity: float = 9.81) -> float:
-        """The most that the weight of all it carries exerts on a joint [N·m or N].
-
-        Of a hinge: the arm as it is at zero, its axis level and its centre of mass beside it.
+        Returns:
+            M_ii, armature included [kg m² or kg], and the largest force or torque of the weight
+            [N or N·m]. Of a hinge: its axis level, and the centre of mass beside it.
         """
-        joint = self.groups[number].joint
+        joint, body = self.groups[number].joint, self.carried[number]
         if joint is None or joint.kind not in ("hinge", "slide"):
-            return math.nan
-        body = self.carried[number]
+            return math.nan, math.nan
+        rotor, weight, arm = joint.armature or 0.0, body.mass * GRAVITY, body.com - joint.anchor
         if joint.kind == "slide":
-            return body.mass * gravity
-        arm = np.cross(joint.axis, body.com - joint.anchor)
-        return body.mass * gravity * float(np.linalg.norm(arm))
+            return body.mass + rotor, weight
+        inertia = joint.axis @ (body.tensor + _shifted(body.mass, arm)) @ joint.axis
+        return float(inertia) + rotor, weight * float(np.linalg.norm(np.cross(joint.axis, arm)))

@@ -8,6 +8,8 @@ on Windows; both refuse a file for one missing mesh. The format is small, so its
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -18,8 +20,8 @@ from ... import models
 from ...errors import ModelError
 from ...interface import Array
 from ...rotations import HERE, Placement
-from .meshes import read_mesh, volume_of
 from .records import CollisionShape, Follows, Inertial, Link, Robot, RobotJoint
+from .shapes import read_mesh, volume_of
 
 _LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere
 _MOST = 2_000  # links
@@ -75,18 +77,18 @@ class _Reader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.root = _parse(path)
         self.notes: list[str] = []
-        self._meshes: dict[str, tuple[Array | None, str]] = {}
+        self._read_mesh = cache(lambda name: read_mesh(name, path.parent))
 
     def robot(self) -> Robot:
-        elements = _by_name(self.root, "link")
+        root = _parse(self.path)
+        elements = _by_name(root, "link")
         if len(elements) > _MOST:
             raise ModelError(f"it has {len(elements):,} links, and {_MOST:,} are the most here")
         if not elements:
             raise ModelError("it has no <link>")
         hung: dict[str, tuple[str, Element]] = {}
-        for joint in _by_name(self.root, "joint").values():
+        for joint in _by_name(root, "joint").values():
             parent, child = _end(joint, "parent", elements), _end(joint, "child", elements)
             if child in hung:
                 raise ModelError(f"link {child!r} hangs on two joints")
@@ -95,7 +97,7 @@ class _Reader:
         links = tuple(
             self._link(name, elements[name], *hung.get(name, ("", None))) for name in order
         )
-        if self.root.find("transmission") is not None:
+        if root.find("transmission") is not None:
             self.notes.append(
                 "its <transmission> elements are for a controller and are not compared"
             )
@@ -112,39 +114,44 @@ class _Reader:
         )
 
     def _link(self, name: str, element: Element, parent: str, joint: Element | None) -> Link:
+        where = f"link {name!r}"
         place, moves = HERE, None
         if joint is not None:
             place, moves = _origin(joint, f"joint {_name(joint)!r}"), _joint(joint)
-        friction = self._friction(element, name)
-        shapes = [self._shape(each, name, friction) for each in element.findall("collision")]
-        return Link(name, parent, place, moves, _inertial(element, name), tuple(shapes))
+        # PyBullet's own element.
+        frictions = [
+            _said(element, f"contact/{kind}_friction", "value", where)
+            for kind in ("lateral", "spinning", "rolling")
+        ]
+        said = frictions[0] is not None
+        contact = {"friction": tuple(value or 0.0 for value in frictions)} if said else {}
+        shapes = [
+            replace(self._shape(shape, where), contact=contact)
+            for shape in element.findall("collision")
+        ]
+        return Link(name, parent, place, moves, _inertial(element, where), tuple(shapes))
 
-    def _friction(self, element: Element, name: str) -> tuple[float, ...] | None:
-        """Of PyBullet's own element <contact>, where there is one."""
-        kinds = ("lateral", "spinning", "rolling")
-        found = [element.find(f"contact/{kind}_friction") for kind in kinds]
-        if found[0] is None:
-            return None
-        return tuple(
-            0.0 if each is None else _number(each, "value", f"link {name!r}") for each in found
-        )
-
-    def _shape(
-        self, element: Element, link: str, friction: tuple[float, ...] | None
-    ) -> CollisionShape:
-        where = f"a collision shape of link {link!r}"
+    def _shape(self, element: Element, link: str) -> CollisionShape:
+        where = f"a collision shape of {link}"
         solid = element.find("geometry/*")
         if solid is None:
             raise ModelError(f"{where} has no geometry")
         kind, size, points = solid.tag, (), None
         if kind == "mesh":
-            points = self._mesh(solid, link, where)
+            file = solid.get("filename", "")
+            scale = _numbers(solid, ".", "scale", 3, where, (1.0, 1.0, 1.0))
+            points, trouble = self._read_mesh(file)
+            if points is None:
+                note = f"the mesh {file!r} of {link} {trouble}: its size is not known"
+                self.notes.append(note)
+            else:
+                points = points * scale
         elif kind == "box":
-            size = tuple(edge / 2 for edge in _numbers(solid, "size", 3, where))
+            size = tuple(edge / 2 for edge in _numbers(solid, ".", "size", 3, where))
         elif kind == "sphere":
-            size = (_number(solid, "radius", where),)
+            size = (_number(solid, ".", "radius", where),)
         elif kind in ("cylinder", "capsule"):
-            size = (_number(solid, "radius", where), _number(solid, "length", where) / 2)
+            size = _number(solid, ".", "radius", where), _number(solid, ".", "length", where) / 2
         else:
             self.notes.append(f"{where} is a <{kind}>, which is not known here")
         if min(size, default=0) < 0:
@@ -157,22 +164,7 @@ class _Reader:
             volume=None if points is None else volume_of(points),
             name=element.get("name", ""),
             label=element.get("name", ""),
-            friction=friction,
         )
-
-    def _mesh(self, solid: Element, link: str, where: str) -> Array | None:
-        """Triangles (n, 3, 3) of a mesh [m], or None."""
-        file = solid.get("filename", "")
-        scale = _numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0))
-        if file not in self._meshes:
-            self._meshes[file] = read_mesh(file, self.path.parent)
-        points, trouble = self._meshes[file]
-        if points is None:
-            self.notes.append(
-                f"the mesh {file!r} of link {link!r} {trouble}: its size is not known"
-            )
-            return None
-        return points * scale
 
 
 def _by_name(root: Element, tag: str) -> dict[str, Element]:
@@ -203,20 +195,18 @@ def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
 
 def _order(names: list[str], parent: dict[str, str]) -> list[str]:
     """Parents before children, depth first, siblings as in the file."""
-    roots = [name for name in names if name not in parent]
-    if len(roots) > 1:
-        raise ModelError(f"{len(roots)} links hang on nothing: {', '.join(roots[:4])}")
     children: dict[str, list[str]] = {}
-    for name in names:
-        if name in parent:
-            children.setdefault(parent[name], []).append(name)
+    for name in reversed(names):
+        children.setdefault(parent.get(name, ""), []).append(name)
+    waiting = children.pop("", [])
+    if len(waiting) > 1:
+        named = ", ".join(waiting[:-5:-1])
+        raise ModelError(f"{len(waiting)} links hang on nothing: {named}")
     order: list[str] = []
-    waiting = roots
     while waiting:
-        name = waiting.pop()
-        order.append(name)
-        waiting += reversed(children.get(name, []))
-    if len(order) < len(names):
+        order.append(waiting.pop())
+        waiting += children.pop(order[-1], [])
+    if children:
         left = next(name for name in names if name not in set(order))
         raise ModelError(f"its links go round in a circle, {left!r} among them")
     return order
@@ -229,71 +219,55 @@ def _joint(element: Element) -> RobotJoint | None:
         return None
     if kind not in _KINDS:
         raise ModelError(f"{where} is of type {kind!r}; known: fixed, {', '.join(_KINDS)}")
-    axis = np.array([1.0, 0.0, 0.0])  # what the format takes where none is given
-    if (given := element.find("axis")) is not None:
-        axis = _numbers(given, "xyz", 3, where, (1.0, 0.0, 0.0))
+    # What the format takes where no axis is given.
+    axis = _numbers(element, "axis", "xyz", 3, where, (1.0, 0.0, 0.0))
     length = float(np.linalg.norm(axis))
     if length < 1e-9 and kind != "floating":
         raise ModelError(f"the axis of {where} is zero")
-    limit, dynamics, mimic = (element.find(tag) for tag in ("limit", "dynamics", "mimic"))
-
-    def of(part: Element | None, attribute: str, default: float | None = None) -> float | None:
-        if part is None or part.get(attribute) is None:
-            return default if part is not None else None
-        return _number(part, attribute, where)
-
-    limits = None
+    limits = follows = None
     if kind in ("revolute", "prismatic"):
-        if limit is None:
+        if element.find("limit") is None:
             raise ModelError(f"{where} is {kind} and has no <limit>")
-        low, high = of(limit, "lower", 0.0) or 0.0, of(limit, "upper", 0.0) or 0.0
+        low, high = (_said(element, "limit", end, where) or 0.0 for end in ("lower", "upper"))
         limits = (low, high) if low <= high else None  # PyBullet's way to say "none"
+    if (mimic := element.find("mimic")) is not None:
+        factor = float(_numbers(mimic, ".", "multiplier", 1, where, (1.0,))[0])
+        follows = Follows(mimic.get("joint", ""), factor, _said(mimic, ".", "offset", where) or 0.0)
     return RobotJoint(
         name=name,
         kind=_KINDS[kind],
         axis=axis / max(length, 1e-9),
         anchor=np.zeros(3),
         limits=limits,
-        velocity=of(limit, "velocity"),
-        effort=of(limit, "effort"),
-        damping=of(dynamics, "damping"),
-        friction=of(dynamics, "friction"),
-        follows=None
-        if mimic is None
-        else Follows(
-            mimic.get("joint", ""),
-            of(mimic, "multiplier", 1.0) or 0.0,
-            of(mimic, "offset", 0.0) or 0.0,
-        ),
+        velocity=_said(element, "limit", "velocity", where),
+        effort=_said(element, "limit", "effort", where),
+        damping=_said(element, "dynamics", "damping", where),
+        friction=_said(element, "dynamics", "friction", where),
+        follows=follows,
     )
 
 
-def _inertial(link: Element, name: str) -> Inertial | None:
-    element = link.find("inertial")
+def _inertial(link: Element, of: str) -> Inertial | None:
+    element, where = link.find("inertial"), f"the <inertial> of {of}"
     if element is None:
         return None
-    where = f"the <inertial> of link {name!r}"
-    heavy, inertia = element.find("mass"), element.find("inertia")
-    if heavy is None:
-        raise ModelError(f"{where} has no <mass>")
-    mass = _number(heavy, "value", where)
+    mass = _number(element, "mass", "value", where)
     if mass < 0:
         raise ModelError(f"{where} gives a mass of {mass} kg")
     tensor = np.zeros((3, 3))
-    if inertia is not None:
+    if element.find("inertia") is not None:
         for i, j in zip(*np.triu_indices(3), strict=True):
-            tensor[i, j] = tensor[j, i] = _number(inertia, f"i{'xyz'[i]}{'xyz'[j]}", where)
+            entry = f"i{'xyz'[i]}{'xyz'[j]}"
+            tensor[i, j] = tensor[j, i] = _number(element, "inertia", entry, where)
     place = _origin(element, where)
     return Inertial(mass, place.pos, place.mat @ tensor @ place.mat.T)
 
 
 def _origin(element: Element, where: str) -> Placement:
-    origin = element.find("origin")
-    if origin is None:
-        return HERE
-    pos = _numbers(origin, "xyz", 3, where, (0.0, 0.0, 0.0))
-    roll, pitch, yaw = _numbers(origin, "rpy", 3, where, (0.0, 0.0, 0.0))
-    return Placement(pos, _matrix_from_rpy(roll, pitch, yaw))
+    zeros = (0.0, 0.0, 0.0)
+    pos = _numbers(element, "origin", "xyz", 3, where, zeros)
+    rpy = _numbers(element, "origin", "rpy", 3, where, zeros).tolist()
+    return Placement(pos, _matrix_from_rpy(*rpy))
 
 
 def _matrix_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
@@ -310,19 +284,31 @@ def _matrix_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
     )
 
 
-def _number(element: Element, attribute: str, where: str) -> float:
-    return float(_numbers(element, attribute, 1, where)[0])
+def _said(element: Element, path: str, attribute: str, where: str) -> float | None:
+    """The number of an attribute of an element below; None where the file does not give it."""
+    part = element.find(path)
+    said = part is not None and part.get(attribute) is not None
+    return _number(element, path, attribute, where) if said else None
+
+
+def _number(element: Element, path: str, attribute: str, where: str) -> float:
+    return float(_numbers(element, path, attribute, 1, where)[0])
 
 
 def _numbers(
     element: Element,
+    path: str,
     attribute: str,
     count: int,
     where: str,
     default: tuple[float, ...] | None = None,
 ) -> Array:
-    text = element.get(attribute)
-    if text is None and default is None:
-        raise ModelError(f"{where}: <{element.tag}> has no {attribute}")
-    given = default if text is None else models.numbers(text, count, f"{where}: {attribute}")
-    return np.array(given)
+    """The numbers (count,) of an attribute of an element below, "." for the element itself."""
+    part = element.find(path)
+    text = None if part is None else part.get(attribute)
+    if text is not None:
+        return np.array(models.numbers(text, count, f"{where}: {attribute}"))
+    if default is None:
+        tag = path if part is None else part.tag
+        raise ModelError(f"{where} has no <{tag}> with {attribute}")
+    return np.array(default)

@@ -33,8 +33,8 @@ _OBJECTS = (("sensor_objtype", "sensor_objid"), ("sensor_reftype", "sensor_refid
 
 def drives(sides: Sides) -> Iterator[ModelDifference]:
     """Actuators, by their gains, ranges, laws and what they drive."""
-    one, two = sides.one, sides.two
-    owners = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
+    left, right = sides.left, sides.right
+    owners = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (left, right)]
     places = sides.pairs.actuators
     actuators = sorted({(int(owners[0][a]), int(owners[1][b])) for a, b in places})
     for a, b in actuators:
@@ -42,20 +42,20 @@ def drives(sides: Sides) -> Iterator[ModelDifference]:
         yield from _delay(sides, a, b)
         targets = [_targets(sides, side, k) for side, k in enumerate((a, b))]
         if targets[0] != targets[1]:
-            values = (("drives", _words(one, a), _words(two, b)),)
+            values = (("drives", _words(left, a), _words(right, b)),)
             why = "it drives another thing, or in another way"
             yield sides.tell("transmission", "actuator", a, values, refused=why)
-    if one.opt.disableactuator or two.opt.disableactuator:
+    if left.opt.disableactuator or right.opt.disableactuator:
         yield from sides.rows("actuator", fields.GROUP, actuators)
     for a, b in places:
-        name = name_of(one, "actuator", int(owners[0][a]))
+        name = name_of(left, "actuator", int(owners[0][a]))
         yield from sides.rows("actuator", fields.CONTROL, [(a, b)], name)
     yield from sides.extras("actuator", actuators, lambda raw, k: zeros(_STILL, raw, k))
 
 
 def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """Rows of an actuator; together, where its own state moves by another law."""
-    laws = _law(sides.one, a), _law(sides.two, b)
+    laws = _law(sides.left, a), _law(sides.right, b)
     sized = laws[0][1:] == laws[1][1:]
     rows = [row for row in fields.ACTUATOR if sized or row.when != "actuator_dyntype"]
     found = list(sides.rows("actuator", rows, [(a, b)]))
@@ -82,11 +82,11 @@ def _law(raw: Any, k: int) -> tuple[int, ...]:
 
 def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """A delay needs a memory of commands: without one it is taken away from the other."""
-    one, two = sides.one, sides.two
-    sizes = one.actuator_history[a], two.actuator_history[b]
+    left, right = sides.left, sides.right
+    sizes = left.actuator_history[a], right.actuator_history[b]
     back = bool(sizes[0][0] and not sizes[1][0])
     yield from sides.rows("actuator", fields.DELAY, [(a, b)], back=back)
-    if one.actuator_delay[a] and two.actuator_delay[b] and not same(*sizes):
+    if left.actuator_delay[a] and right.actuator_delay[b] and not same(*sizes):
         values = (("history", plain(sizes[0]), plain(sizes[1])),)
         why = "it keeps another number of commands, or reads between them in another way"
         yield sides.tell("memory of commands", "actuator", a, values, refused=why)
@@ -94,7 +94,7 @@ def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 
 def _targets(sides: Sides, side: int, k: int) -> tuple[int, ...]:
     """What an actuator acts on, in ids of the second model."""
-    raw = (sides.one, sides.two)[side]
+    raw = (sides.left, sides.right)[side]
     kind, ids = int(raw.actuator_trntype[k]), raw.actuator_trnid[k].tolist()
     for place, target in enumerate(_DRIVES.get(kind, ())):
         ids[place] = sides.there(side, target, ids[place])
@@ -110,32 +110,32 @@ def _words(raw: Any, k: int) -> str:
     return f"{word.lower()} {', '.join(names)}"
 
 
-def sensors(one: Any, two: Any, pairs: Counterparts) -> list[ModelDifference]:
+def sensors(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]:
     """What the sensors of two compiled models differ in, on which nothing but a controller depends.
 
     Args:
-        one: An mjModel.
-        two: Another; its sensors of the same name are the counterparts.
+        left: An mjModel.
+        right: Another; its sensors of the same name are the counterparts.
         pairs: What of one is what of the other.
     """
     why = "a sensor is built by the compiler"  # so only a cutoff can be brought over
     return [
         each if each.subject == "cutoff" else replace(each, edits=(), edits_one=(), refused=why)
-        for each in _sensors(Sides(one, two, pairs))
+        for each in _sensors(Sides(left, right, pairs))
     ]
 
 
 def _sensors(sides: Sides) -> Iterator[ModelDifference]:
-    one, two = sides.one, sides.two
+    left, right = sides.left, sides.right
     pairs = list(sides.by_name("sensor"))
     yield from sides.rows("sensor", fields.SENSOR, pairs)
     for a, b in pairs:
         values = []
-        kinds = [int(raw.sensor_type[k]) for raw, k in ((one, a), (two, b))]
+        kinds = [int(raw.sensor_type[k]) for raw, k in ((left, a), (right, b))]
         if kinds[0] != kinds[1]:
             values.append(("type", *(require("mujoco").mjtSensor(kind).name for kind in kinds)))
         for types, ids in _OBJECTS:
-            words = _object(one, types, ids, a), _object(two, types, ids, b)
+            words = _object(left, types, ids, a), _object(right, types, ids, b)
             if words[0] != words[1] and not _is_same(sides, types, ids, a, b):
                 values.append((ids.removeprefix("sensor_"), *words))
         if values:
@@ -143,7 +143,7 @@ def _sensors(sides: Sides) -> Iterator[ModelDifference]:
     yield from sides.extras("sensor", pairs, lambda raw, k: zeros(("sensor_cutoff",), raw, k))
     ours = [b for _, b in pairs]
     if ours != sorted(ours):
-        orders = [", ".join(name_of(two, "sensor", b) for b in s) for s in (ours, sorted(ours))]
+        orders = [", ".join(name_of(right, "sensor", b) for b in s) for s in (ours, sorted(ours))]
         yield ModelDifference("order of sensordata", "sensor", "", (("order", *orders),))
 
 
@@ -151,7 +151,7 @@ def _is_same(sides: Sides, types: str, ids: str, a: int, b: int) -> bool:
     """Whether what two sensors are of are counterparts, by whatever names."""
     (kind, here), (other, there) = (
         (int(getattr(raw, types)[k]), int(getattr(raw, ids)[k]))
-        for raw, k in ((sides.one, a), (sides.two, b))
+        for raw, k in ((sides.left, a), (sides.right, b))
     )
     word = str(require("mujoco").mju_type2Str(kind) or "").removeprefix("x")
     return kind == other and sides.ids.get(word, {}).get(here) == there

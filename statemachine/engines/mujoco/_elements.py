@@ -39,7 +39,7 @@ def elements(sides: Sides) -> Iterator[ModelDifference]:
     for a, b in sides.pairs.joints:
         yield from _joint(sides, a, b)
     # Of a geom that only a tendon wraps, or a medium flows around, the shape is all that acts.
-    touching = touches(sides.one), touches(sides.two)
+    touching = touches(sides.left), touches(sides.right)
     geoms = [(a, b) for a, b in sides.ids["geom"].items() if touching[0][a] or touching[1][b]]
     yield from sides.rows("geom", fields.GEOM, geoms)
     tendons = sorted(sides.ids["tendon"].items())
@@ -51,47 +51,48 @@ def elements(sides: Sides) -> Iterator[ModelDifference]:
 
 def _bodies(sides: Sides) -> Iterator[ModelDifference]:
     """The weight that is taken off bodies; of a model without any, nothing is kept."""
-    one, two = sides.one, sides.two
+    left, right = sides.left, sides.right
     sleep = int(require("mujoco").mjtEnableBit.mjENBL_SLEEP)
-    if (one.opt.enableflags | two.opt.enableflags) & sleep:
+    if (left.opt.enableflags | right.opt.enableflags) & sleep:
         trees = {
-            (int(one.body_treeid[p.one]), int(two.body_treeid[p.two])): p.one
+            (int(left.body_treeid[p.left]), int(right.body_treeid[p.right])): p.left
             for p in reversed(sides.pairs.solids)
         }
         for (a, b), body in sorted(trees.items()):
             if a >= 0 and b >= 0:
-                yield from sides.rows("body", fields.TREE, [(a, b)], name_of(one, "body", body))
+                yield from sides.rows("body", fields.TREE, [(a, b)], name_of(left, "body", body))
     # The engine looks only where the file had some.
     pairs = sorted(sides.ids["body"].items())
-    yield from sides.rows("body", fields.BODY, pairs, back=not two.ngravcomp)
+    yield from sides.rows("body", fields.BODY, pairs, back=not right.ngravcomp)
 
 
 def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    one, two = sides.one, sides.two
-    name, kind = name_of(one, "joint", a), int(one.jnt_type[a])
-    found = [*sides.rows("joint", fields.JOINT, [(a, b)]), *_rest(sides, a, b)]
-    here, there = int(one.jnt_dofadr[a]), int(two.jnt_dofadr[b])
+    left, right = sides.left, sides.right
+    name, kind = name_of(left, "joint", a), int(left.jnt_type[a])
+    differences = [*sides.rows("joint", fields.JOINT, [(a, b)]), *_rest(sides, a, b)]
+    here, there = int(left.jnt_dofadr[a]), int(right.jnt_dofadr[b])
     dofs = [(here + k, there + k) for k in range(_DOFS.get(kind, 1))]
     for row in fields.DOF:
         if differ := list(sides.rows("joint", [row], dofs, name)):
-            edits = tuple(edit for each in differ for edit in each.edits)
-            found.append(replace(differ[0], edits=edits))
-    for each in found:
-        yield replace(each, unit=_OF_A_SLIDE.get(each.unit, "")) if kind == SLIDE else each
+            edits = tuple(edit for difference in differ for edit in difference.edits)
+            differences.append(replace(differ[0], edits=edits))
+    for difference in differences:
+        unit = _OF_A_SLIDE.get(difference.unit, "") if kind == SLIDE else difference.unit
+        yield replace(difference, unit=unit)
 
 
 def _rest(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """Where the spring of a joint is slack."""
-    one, two = sides.one, sides.two
+    left, right = sides.left, sides.right
     stiff = ("jnt_stiffness", "jnt_stiffnesspoly")
-    if not any(getattr(one, n)[a].any() or getattr(two, n)[b].any() for n in stiff):
+    if not any(getattr(left, n)[a].any() or getattr(right, n)[b].any() for n in stiff):
         return
-    here, there = int(one.jnt_qposadr[a]), int(two.jnt_qposadr[b])
-    number = {0: 7, 1: 4}.get(int(one.jnt_type[a]), 1)
-    ours, theirs = one.qpos_spring[here : here + number], two.qpos_spring[there : there + number]
+    here, there = int(left.jnt_qposadr[a]), int(right.jnt_qposadr[b])
+    number = {0: 7, 1: 4}.get(int(left.jnt_type[a]), 1)
+    ours, theirs = left.qpos_spring[here : here + number], right.qpos_spring[there : there + number]
     if not same(ours, theirs):
         edits = [("qpos_spring", (there + k,), float(ours[k])) for k in range(number)]
-        unit = "rad" if int(one.jnt_type[a]) in (SLIDE, HINGE) else ""
+        unit = "rad" if int(left.jnt_type[a]) in (SLIDE, HINGE) else ""
         values = (("springref", plain(ours), plain(theirs)),)
         yield sides.tell("rest of the spring", "joint", a, values, unit, edits)
 
@@ -104,17 +105,17 @@ def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     if len(ours) != len(theirs) or numbers != differ:
         yield sides.tell("path", "tendon", a, refused="it takes another path")
     elif differ:
-        start, other = int(sides.one.tendon_adr[a]), int(sides.two.tendon_adr[b])
+        start, other = int(sides.left.tendon_adr[a]), int(sides.right.tendon_adr[b])
         values = [(f"coef[{k}]", ours[k][2], theirs[k][2]) for k in differ]
         edits: list[Edit] = [
-            ("wrap_prm", (other + k,), float(sides.one.wrap_prm[start + k])) for k in differ
+            ("wrap_prm", (other + k,), float(sides.left.wrap_prm[start + k])) for k in differ
         ]
         yield sides.tell("coefficients", "tendon", a, values, "", edits)
 
 
 def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]]:
     """What a tendon passes: its kind, its id in the second model, and a number."""
-    raw = (sides.one, sides.two)[side]
+    raw = (sides.left, sides.right)[side]
     start, found = int(raw.tendon_adr[tendon]), []
     for k in range(start, start + int(raw.tendon_num[tendon])):
         kind, number = int(raw.wrap_type[k]), round(float(raw.wrap_prm[k]), 9)
@@ -133,8 +134,8 @@ def equalities(sides: Sides) -> Iterator[ModelDifference]:
         if not _is_of_bodies(sides, a):
             yield from sides.rows("equality", [_KEPT], [(a, b)])
             continue
-        wanted, there = _wanted(sides, a, b), np.array(sides.two.eq_data[b])
-        used = 6 if int(sides.two.eq_type[b]) == _CONNECT else 11
+        wanted, there = _wanted(sides, a, b), np.array(sides.right.eq_data[b])
+        used = 6 if int(sides.right.eq_type[b]) == _CONNECT else 11
         off = np.abs(wanted - there)[:used]
         if used == 11:  # a quaternion and its negative turn alike
             turns = [matrix_from_quat(_unit(data[6:10])) for data in (wanted, there)]
@@ -152,23 +153,23 @@ def equalities(sides: Sides) -> Iterator[ModelDifference]:
 
 def _match(sides: Sides) -> Iterator[tuple[int, int]]:
     """What keeps the same two things in the same way; of several the most alike."""
-    left = list(range(sides.two.neq))
-    for a in range(sides.one.neq):
+    free = list(range(sides.right.neq))
+    for a in range(sides.left.neq):
         ours = _keeps(sides, 0, a)
         unlike = {
-            b: float(np.abs(_wanted(sides, a, b) - sides.two.eq_data[b]).max())
-            for b in left
+            b: float(np.abs(_wanted(sides, a, b) - sides.right.eq_data[b]).max())
+            for b in free
             if _keeps(sides, 1, b) == ours
         }
         if unlike:
             best = min(unlike, key=unlike.__getitem__)
-            left.remove(best)
+            free.remove(best)
             yield a, best
 
 
 def _keeps(sides: Sides, side: int, k: int) -> tuple[int, ...]:
     """How an equality keeps things, and which, as ids of the second model."""
-    raw = (sides.one, sides.two)[side]
+    raw = (sides.left, sides.right)[side]
     kind, of = int(raw.eq_type[k]), int(raw.eq_objtype[k])
     target = {_JOINT: "joint", _TENDON: "tendon"}.get(kind, _KEEPS.get(of))
     ids = [sides.there(side, target, int(each[k])) for each in (raw.eq_obj1id, raw.eq_obj2id)]
@@ -176,8 +177,8 @@ def _keeps(sides: Sides, side: int, k: int) -> tuple[int, ...]:
 
 
 def _is_of_bodies(sides: Sides, a: int) -> bool:
-    one = sides.one
-    return int(one.eq_objtype[a]) == _BODY and int(one.eq_type[a]) in (_CONNECT, _WELD)
+    left = sides.left
+    return int(left.eq_objtype[a]) == _BODY and int(left.eq_type[a]) in (_CONNECT, _WELD)
 
 
 def _wanted(sides: Sides, a: int, b: int) -> Array:
@@ -187,15 +188,15 @@ def _wanted(sides: Sides, a: int, b: int) -> Array:
     body 2. Of a weld it is the other way round, and a quaternion follows: the frame of body 2
     in that of body 1.
     """
-    one, data = sides.one, np.array(sides.one.eq_data[a])
+    left, data = sides.left, np.array(sides.left.eq_data[a])
     if not _is_of_bodies(sides, a):
         return data
-    bodies = [int(one.eq_obj1id[a]), int(one.eq_obj2id[a])]
-    turned = sides.ids["body"].get(bodies[0]) != int(sides.two.eq_obj1id[b])
+    bodies = [int(left.eq_obj1id[a]), int(left.eq_obj2id[a])]
+    turned = sides.ids["body"].get(bodies[0]) != int(sides.right.eq_obj1id[b])
     frames = [_frame(sides, body) for body in bodies]
     if not turned and all(frame is HERE for frame in frames):
         return data
-    weld = int(one.eq_type[a]) == _WELD
+    weld = int(left.eq_type[a]) == _WELD
     spans = [slice(3, 6), slice(0, 3)] if weld else [slice(0, 3), slice(3, 6)]
     points = [frame.of(data[span]) for frame, span in zip(frames, spans, strict=True)]
     for point, span in zip(points, reversed(spans) if turned else spans, strict=True):
@@ -228,7 +229,7 @@ def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
             {sides.there(side, "geom", int(g)) for g in (raw.pair_geom1[k], raw.pair_geom2[k])}
             for k in range(raw.npair)
         ]
-        for side, raw in enumerate((sides.one, sides.two))
+        for side, raw in enumerate((sides.left, sides.right))
     )
     pairs: Pairs = [(k, theirs.index(each)) for k, each in enumerate(ours) if each in theirs]
     yield from sides.rows("pair", fields.PAIR, pairs)
@@ -238,7 +239,7 @@ def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
             {sides.there(side, "body", b) for b in (int(s) >> 16, int(s) & 0xFFFF)}
             for s in raw.exclude_signature
         ]
-        for side, raw in enumerate((sides.one, sides.two))
+        for side, raw in enumerate((sides.left, sides.right))
     ]
     alike = [(k, apart[1].index(each)) for k, each in enumerate(apart[0]) if each in apart[1]]
     # The world is never apart from itself: an entry without an effect.

@@ -39,33 +39,33 @@ def weights(sides: Sides) -> Iterator[ModelDifference]:
     """Masses, centres of mass and inertias: body by body where a part is made alike."""
     ours, theirs = sides.solids
     for pair in sides.pairs.solids:
-        if not (pair.one and pair.two) or sides.one.body_mocapid[pair.one] >= 0:
+        if not (pair.left and pair.right) or sides.left.body_mocapid[pair.left] >= 0:
             continue  # what no force moves has no weight
-        here, there = ours.massive(pair.one), theirs.massive(pair.two)
-        whole = ours.inertial(*here).seen_from(pair.align)
-        if not (here or there) or not _differing(whole, theirs.inertial(*there)):
+        here, there = ours.massive(pair.left), theirs.massive(pair.right)
+        composite = ours.inertial(*here).seen_from(pair.align)
+        if not (here or there) or not _differing(composite, theirs.inertial(*there)):
             continue
         if len(there) == 1:
-            yield from _of_body(sides, pair, there[0], whole, here)
+            yield from _of_body(sides, pair, there[0], composite, here)
         elif pair.align is HERE and _made_alike(sides, here, there):
             for a, b in zip(here, there, strict=True):
-                yield from _of_body(sides, replace(pair, one=a), b, ours.inertial(a), [a])
+                yield from _of_body(sides, replace(pair, left=a), b, ours.inertial(a), [a])
         else:
-            yield _lumped(sides, pair, whole, there)
+            yield _lumped(sides, pair, composite, there)
 
 
-def _differing(one: Inertial, two: Inertial) -> dict[str, tuple[str, Any, Any]]:
+def _differing(left: Inertial, right: Inertial) -> dict[str, tuple[str, Any, Any]]:
     """What two bodies weigh otherwise, by subject: a figure's name and values."""
-    found: dict[str, tuple[str, Any, Any]] = {}
-    if not same(one.mass, two.mass):
-        found["mass"] = ("mass", one.mass, two.mass)
-    if not np.linalg.norm(one.com - two.com) <= NEAR:
-        found["centre of mass"] = ("com", plain(one.com), plain(two.com))
-    size = max(np.abs(one.tensor).max(), np.abs(two.tensor).max())
-    if not np.abs(one.tensor - two.tensor).max() <= 1e-9 * size:
-        moments = [plain(np.linalg.eigvalsh(each.tensor)[::-1]) for each in (one, two)]
-        found["inertia"] = ("moments", *moments)
-    return found
+    figures: dict[str, tuple[str, Any, Any]] = {}
+    if not same(left.mass, right.mass):
+        figures["mass"] = ("mass", left.mass, right.mass)
+    if not np.linalg.norm(left.com - right.com) <= NEAR:
+        figures["centre of mass"] = ("com", plain(left.com), plain(right.com))
+    size = max(np.abs(left.tensor).max(), np.abs(right.tensor).max())
+    if not np.abs(left.tensor - right.tensor).max() <= 1e-9 * size:
+        moments = [plain(np.linalg.eigvalsh(body.tensor)[::-1]) for body in (left, right)]
+        figures["inertia"] = ("moments", *moments)
+    return figures
 
 
 _UNITS = {"mass": "kg", "centre of mass": "m", "inertia": "kg m²"}
@@ -76,33 +76,33 @@ def _made_alike(sides: Sides, here: list[int], there: list[int]) -> bool:
     ours, theirs = sides.solids
     return len(here) == len(there) and all(
         max(apart(ours.place(a), theirs.place(b))) <= NEAR
-        and sides.one.body(a).name == sides.two.body(b).name
+        and sides.left.body(a).name == sides.right.body(b).name
         for a, b in zip(here, there, strict=True)
     )
 
 
 def _of_body(
-    sides: Sides, pair: BodyPair, target: int, there: Inertial, bodies: list[int]
+    sides: Sides, pair: BodyPair, target: int, wanted: Inertial, bodies: list[int]
 ) -> Iterator[ModelDifference]:
     """What the one body is to weigh that has the mass of a part."""
-    one, two, align = sides.one, sides.two, pair.align
-    exact = align is HERE and bodies == [pair.one]
+    left, right, align = sides.left, sides.right, pair.align
+    exact = align is HERE and bodies == [pair.left]
     # The engine stores the mass matrix of a body that turns about its centre of mass as a diagonal:
     # it has no place for what another one has, and the other is to become as this.
-    simple = one.body_simple[pair.one]
-    fits = not two.body_simple[target] or simple
+    simple = left.body_simple[pair.left]
+    fits = not right.body_simple[target] or simple
     back_fits = not simple and align is HERE
-    for subject, values in _differing(there, sides.solids[1].inertial(target)).items():
+    for subject, values in _differing(wanted, sides.solids[1].inertial(target)).items():
         edits, back, why = (), (), ""
         if subject == "mass" or fits:
-            edits = _weighs(sides, subject, target, there)
+            edits = _weighs(sides, subject, target, wanted)
             if subject == "inertia" and exact:
-                edits = copies(_WEIGHS[subject], one, pair.one, target)
+                edits = copies(_WEIGHS[subject], left, pair.left, target)
         elif back_fits:
-            back = copies(_WEIGHS[subject], two, pair.two, pair.one)
+            back = copies(_WEIGHS[subject], right, pair.right, pair.left)
         else:
             why = _DIAGONAL
-        yield sides.tell(subject, "body", pair.one, (values,), _UNITS[subject], edits, back, why)
+        yield sides.tell(subject, "body", pair.left, (values,), _UNITS[subject], edits, back, why)
 
 
 def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edit, ...]:
@@ -123,13 +123,13 @@ def _lumped(sides: Sides, pair: BodyPair, there: Inertial, bodies: list[int]) ->
     subject = next(iter(differing))
     edits: list[Edit] = []
     for body in bodies:
-        if body != pair.two:
-            edits += zeros(("body_mass", "body_inertia"), sides.two, body)
+        if body != pair.right:
+            edits += zeros(("body_mass", "body_inertia"), sides.right, body)
     for figure in _WEIGHS:
-        edits += _weighs(sides, figure, pair.two, there)
-    why = _DIAGONAL if sides.two.body_simple[pair.two] else ""
+        edits += _weighs(sides, figure, pair.right, there)
+    why = _DIAGONAL if sides.right.body_simple[pair.right] else ""
     return sides.tell(
-        *(subject, "body", pair.one, differing.values(), _UNITS[subject]),
+        *(subject, "body", pair.left, differing.values(), _UNITS[subject]),
         edits=() if why else edits,
         refused=why,
     )
@@ -147,32 +147,32 @@ def _principal(tensor: Array) -> tuple[Array, Array]:
 def places(sides: Sides) -> Iterator[ModelDifference]:
     """Rigid parts, joints and sites, in the frames of the second model."""
     for pair in sides.pairs.solids:
-        if pair.one and pair.two:
+        if pair.left and pair.right:
             yield from _hangs(sides, pair)
     for a, b in sides.pairs.sites:
-        pair = sides.part(int(sides.one.site_bodyid[a]))
-        if pair is None or sides.solids[1].head(int(sides.two.site_bodyid[b])) != pair.two:
+        pair = sides.part(int(sides.left.site_bodyid[a]))
+        if pair is None or sides.solids[1].head(int(sides.right.site_bodyid[b])) != pair.right:
             yield sides.tell("owner", "site", a, refused="it is on another part")
             continue
         wanted, theirs = pair.align @ sides.solids[0].on("site", a), sides.solids[1].on("site", b)
         if max(apart(wanted, theirs)) > NEAR:
-            yield sides.elsewhere("site", a, b, wanted, theirs, exact=False)
+            yield sides.elsewhere("site", a, b, wanted, theirs)
 
 
 def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
     """Where a part is on the one that carries it, and what it turns about."""
-    one, two = sides.one, sides.two
-    joints = [(a, b) for a, b in sides.pairs.joints if one.jnt_bodyid[a] == pair.one]
-    if any(one.jnt_type[a] == _FREE for a, _ in joints):
+    left, right = sides.left, sides.right
+    joints = [(a, b) for a, b in sides.pairs.joints if left.jnt_bodyid[a] == pair.left]
+    if any(left.jnt_type[a] == _FREE for a, _ in joints):
         return  # where it starts is a matter of the state
-    parent = sides.part(int(one.body_parentid[pair.one]))
+    parent = sides.part(int(left.body_parentid[pair.left]))
     if pair.moved or parent is None:
-        yield sides.tell("parent", "body", pair.one, refused="it hangs on another part")
+        yield sides.tell("parent", "body", pair.left, refused="it hangs on another part")
         return
-    numbers = int(one.body_jntnum[pair.one]), int(two.body_jntnum[pair.two])
+    numbers = int(left.body_jntnum[pair.left]), int(right.body_jntnum[pair.right])
     if numbers != (len(joints), len(joints)):
         values = (("joints", *numbers),)
-        yield sides.tell("joints", "body", pair.one, values, refused="it has other joints")
+        yield sides.tell("joints", "body", pair.left, values, refused="it has other joints")
         return
     for a, b in joints:
         yield from _axis(sides, pair, a, b)
@@ -180,49 +180,46 @@ def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
 
 
 def _axis(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[ModelDifference]:
-    one, two, align = sides.one, sides.two, pair.align
-    kind, axis, anchor = int(one.jnt_type[a]), align.mat @ one.jnt_axis[a], align.of(one.jnt_pos[a])
-    if kind in (SLIDE, HINGE) and np.abs(axis - two.jnt_axis[b]).max() > NEAR:
-        values = (("axis", plain(axis), plain(two.jnt_axis[b])),)
+    left, right, align = sides.left, sides.right, pair.align
+    kind, axis, anchor = (
+        int(left.jnt_type[a]),
+        align.mat @ left.jnt_axis[a],
+        align.of(left.jnt_pos[a]),
+    )
+    if kind in (SLIDE, HINGE) and np.abs(axis - right.jnt_axis[b]).max() > NEAR:
+        values = (("axis", plain(axis), plain(right.jnt_axis[b])),)
         yield sides.tell("axis", "joint", a, values, "", [("jnt_axis", (b,), axis)])
-    off = anchor - two.jnt_pos[b]
+    off = anchor - right.jnt_pos[b]
     if kind == HINGE:  # a point along the axis is as good
         off = off - axis * (off @ axis)
     if kind in (HINGE, _BALL) and np.linalg.norm(off) > NEAR:
-        values = (("anchor", plain(anchor), plain(two.jnt_pos[b])),)
+        values = (("anchor", plain(anchor), plain(right.jnt_pos[b])),)
         yield sides.tell("anchor", "joint", a, values, "m", [("jnt_pos", (b,), anchor)])
 
 
 def _place(
     sides: Sides, pair: BodyPair, parent: BodyPair, joints: list[tuple[int, int]]
 ) -> Iterator[ModelDifference]:
-    one, two = sides.one, sides.two
-    refs = [(_ref(one, a), _ref(two, b)) for a, b in joints]
-    ours, theirs = sides.solids[0].hangs(pair.one), sides.solids[1].hangs(pair.two)
+    left, right = sides.left, sides.right
+    refs = [(_ref(left, a), _ref(right, b)) for a, b in joints]
+    ours, theirs = sides.solids[0].hangs(pair.left), sides.solids[1].hangs(pair.right)
     alike = all(same(a, b) for a, b in refs)
-    kept = any(_is_kept(one, a) or _is_kept(two, b) for a, b in joints)
-    if not alike and (len(joints) > 1 or kept):  # an equality counts from the reference, too
+    held = any(_is_kept(left, a) or _is_kept(right, b) for a, b in joints)
+    if not alike and (len(joints) > 1 or held):  # an equality counts from the reference, too
         zero: list[Edit] = [
-            ("qpos0", (int(two.jnt_qposadr[b]),), ref)
+            ("qpos0", (int(right.jnt_qposadr[b]),), ref)
             for (_, b), (ref, other) in zip(joints, refs, strict=True)
             if not same(ref, other)
         ]
-        yield sides.tell("zero", "body", pair.one, (("ref", *zip(*refs, strict=True)),), "", zero)
+        yield sides.tell("zero", "body", pair.left, (("ref", *zip(*refs, strict=True)),), "", zero)
         alike = True
     wanted = parent.align @ ours @ pair.align.inverse
     if not alike:  # the same zero, another reference: turn back by ours, on by theirs
         (a, _), (ref, other) = joints[0], refs[0]
-        axis, anchor = pair.align.mat @ one.jnt_axis[a], pair.align.of(one.jnt_pos[a])
-        wanted = wanted @ motion(int(one.jnt_type[a]) == SLIDE, axis, anchor, other - ref)
+        axis, anchor = pair.align.mat @ left.jnt_axis[a], pair.align.of(left.jnt_pos[a])
+        wanted = wanted @ motion(int(left.jnt_type[a]) == SLIDE, axis, anchor, other - ref)
     if max(apart(wanted, theirs)) > NEAR:
-        exact = (
-            alike
-            and parent.align is HERE
-            and pair.align is HERE
-            and one.body_parentid[pair.one] == parent.one
-            and two.body_parentid[pair.two] == parent.two
-        )
-        yield sides.elsewhere("body", pair.one, pair.two, wanted, theirs, exact)
+        yield sides.elsewhere("body", pair.left, pair.right, wanted, theirs)
 
 
 def _ref(raw: Any, joint: int) -> float:

@@ -9,14 +9,14 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..description.meshes import volume_of
 from ..description.records import CollisionShape
+from ..description.shapes import volume_of
 from ..records import Edit, ModelDifference
 from ._sides import Sides, copies, name_of, placed, same
 
 MESH = 7  # mjtGeom
 PRIMITIVES = {"sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 2, "box": 3}  # sizes of each
-_CONTACT = ("condim", "priority", "solref", "solimp", "solmix", "margin", "gap")
+_CONTACT = ("friction", "condim", "priority", "solref", "solimp", "solmix", "margin", "gap")
 _CHUNK = 256
 
 # Arrays of which a part is a mesh's, by what it has of them.
@@ -43,7 +43,6 @@ def of(raw: Any, geom: int) -> CollisionShape:
         parts = _parts(raw, int(raw.geom_dataid[geom]))
         points = np.array(raw.mesh_vert[parts["mesh_vert"]], dtype=np.float64)
         volume = volume_of(points[raw.mesh_face[parts["mesh_face"]]])
-    touch = touch_of(raw, geom)
     return CollisionShape(
         kind=word,
         place=placed(raw.geom_pos[geom], raw.geom_quat[geom]),
@@ -52,8 +51,7 @@ def of(raw: Any, geom: int) -> CollisionShape:
         volume=volume,
         name=raw.geom(geom).name,
         label=name_of(raw, "geom", geom),
-        friction=touch.pop("friction"),
-        contact=touch,
+        contact=touch_of(raw, geom),
     )
 
 
@@ -61,7 +59,7 @@ def touch_of(raw: Any, geom: int) -> dict[str, tuple[float, ...]]:
     """Settings of a geom's contacts."""
     return {
         name: tuple(map(float, np.atleast_1d(getattr(raw, f"geom_{name}")[geom])))
-        for name in ("friction", *_CONTACT)
+        for name in _CONTACT
     }
 
 
@@ -75,36 +73,33 @@ def hull(raw: Any, geom: int, points: Any) -> Array:
     return points[raw.mesh_graph[start + 2 + number : start + 2 + 2 * number]]
 
 
-def apart(one: Array, two: Array) -> float:
+def apart(left: Array, right: Array) -> float:
     """How far a point of either set (n, 3) is from all of the other, at most [m]."""
-    return max(_farthest(one, two), _farthest(two, one))
+    away = [
+        np.linalg.norm(a[start : start + _CHUNK, None] - b, axis=2).min(axis=1).max()
+        for a, b in ((left, right), (right, left))
+        for start in range(0, len(a), _CHUNK)
+    ]
+    return float(max(away, default=0.0))
 
 
-def _farthest(one: Array, two: Array) -> float:
-    most = 0.0
-    for start in range(0, len(one), _CHUNK):
-        away = np.linalg.norm(one[start : start + _CHUNK, None] - two[None], axis=2)
-        most = max(most, float(away.min(axis=1).max()))
-    return most
-
-
-def copied(one: Any, two: Any, ours: int, theirs: int) -> tuple[tuple[Edit, ...], str]:
+def copied(left: Any, right: Any, ours: int, theirs: int) -> tuple[tuple[Edit, ...], str]:
     """Edits that make a mesh of the second model one of the first.
 
     Returns:
         The edits, without those of its geoms; and why there are none.
     """
     edits: list[Edit] = []
-    here, there = _parts(one, ours), _parts(two, theirs)
+    here, there = _parts(left, ours), _parts(right, theirs)
     for name, part in here.items():
-        values, old = np.array(getattr(one, name)[part]), getattr(two, name)[there[name]]
+        values, old = np.array(getattr(left, name)[part]), getattr(right, name)[there[name]]
         if len(values) != len(old):
             what = "has a convex hull" if name == "mesh_graph" else "is a mesh"
             return (), f"it {what} of another size"
         if name.endswith("adr") and len(values):  # in another array, where it begins elsewhere
             values += old[0] - values[0]
         edits.append((name, (there[name],), values))
-    return (*edits, *copies(_OF_A_MESH, one, ours, theirs)), ""
+    return (*edits, *copies(_OF_A_MESH, left, ours, theirs)), ""
 
 
 def _parts(raw: Any, mesh: int) -> dict[str, slice]:
@@ -113,65 +108,69 @@ def _parts(raw: Any, mesh: int) -> dict[str, slice]:
     def part(start: Any, number: Any) -> slice:
         return slice(int(start), int(start) + int(number))
 
-    found: dict[str, slice] = {}
+    parts: dict[str, slice] = {}
     for word, names in _PARTS.items():
         start, number = (getattr(raw, f"mesh_{word}{of}")[mesh] for of in ("adr", "num"))
-        found |= dict.fromkeys(names, part(start, number))
+        parts |= dict.fromkeys(names, part(start, number))
     for name in ("mesh_polyvert", "mesh_polymap"):  # as long as the lists of all its parts
         starts, numbers = (
-            getattr(raw, f"{name}{of}")[found[f"{name}{of}"]] for of in ("adr", "num")
+            getattr(raw, f"{name}{of}")[parts[f"{name}{of}"]] for of in ("adr", "num")
         )
-        found[name] = part(starts[0] if len(starts) else 0, numbers.sum())
+        parts[name] = part(starts[0] if len(starts) else 0, numbers.sum())
     start = raw.mesh_graphadr[mesh]
     number, faces = raw.mesh_graph[start : start + 2] if start >= 0 else (0, 0)
-    found["mesh_graph"] = part(start, 2 + 3 * number + 6 * faces) if start >= 0 else slice(0, 0)
-    return found
+    parts["mesh_graph"] = part(start, 2 + 3 * number + 6 * faces) if start >= 0 else slice(0, 0)
+    return parts
 
 
-def chosen(one: Any, two: Any, pairs: Iterable[tuple[int, int]]) -> dict[int, int]:
+def chosen(left: Any, right: Any, pairs: Iterable[tuple[int, int]]) -> dict[int, int]:
     """Meshes of the second model that its geoms can take to have those of the first.
 
     A mesh into which another one has to be copied, since no other has that, is nobody's choice.
 
     Args:
-        one: A compiled model.
-        two: Another.
+        left: A compiled model.
+        right: Another.
         pairs: Pairs of mesh geoms.
 
     Returns:
         The mesh, by geom of the second.
     """
-    own = {b: int(two.geom_dataid[b]) for _, b in pairs}
-    found = {
+    own = {b: int(right.geom_dataid[b]) for _, b in pairs}
+    choices = {
         b: next(
             # Its own, if that will do.
-            (m for m in (own[b], *range(two.nmesh)) if identical(one, one.geom_dataid[a], two, m)),
+            (
+                m
+                for m in (own[b], *range(right.nmesh))
+                if identical(left, left.geom_dataid[a], right, m)
+            ),
             None,
         )
         for a, b in pairs
     }
     while True:
-        kept = {mesh for b, mesh in found.items() if mesh == own[b]}
-        overwritten = {own[b] for b, mesh in found.items() if mesh is None} - kept
-        lost = [b for b, mesh in found.items() if mesh in overwritten]
+        own_choices = {mesh for b, mesh in choices.items() if mesh == own[b]}
+        overwritten = {own[b] for b, mesh in choices.items() if mesh is None} - own_choices
+        lost = [b for b, mesh in choices.items() if mesh in overwritten]
         if not lost:
-            return {b: mesh for b, mesh in found.items() if mesh is not None}
-        found |= dict.fromkeys(lost)
+            return {b: mesh for b, mesh in choices.items() if mesh is not None}
+        choices |= dict.fromkeys(lost)
 
 
-def identical(one: Any, ours: int, two: Any, theirs: int) -> bool:
+def identical(left: Any, ours: int, right: Any, theirs: int) -> bool:
     """Whether two meshes have the same vertices, faces and hull, in the same order."""
-    if one is two and ours == theirs:
+    if left is right and ours == theirs:
         return True
-    edits, why = copied(one, two, ours, theirs)
-    return not why and all(same(getattr(two, name)[index], value) for name, index, value in edits)
+    edits, why = copied(left, right, ours, theirs)
+    return not why and all(same(getattr(right, name)[index], value) for name, index, value in edits)
 
 
 def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """What two height fields differ in."""
-    one, two = sides.one, sides.two
-    ours, theirs = int(one.geom_dataid[a]), int(two.geom_dataid[b])
-    fields = (one, ours), (two, theirs)
+    left, right = sides.left, sides.right
+    ours, theirs = int(left.geom_dataid[a]), int(right.geom_dataid[b])
+    fields = (left, ours), (right, theirs)
     grids = [(int(raw.hfield_nrow[h]), int(raw.hfield_ncol[h])) for raw, h in fields]
     if grids[0] != grids[1]:
         values = (("points", *(f"{rows} x {columns}" for rows, columns in grids)),)
@@ -179,9 +178,12 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         yield sides.tell("heights", "geom", a, values, refused=why)
         return
     starts = [int(raw.hfield_adr[h]) for raw, h in fields]
-    spans = [slice(start, start + grids[0][0] * grids[0][1]) for start in starts]
-    data = one.hfield_data[spans[0]], two.hfield_data[spans[1]]
-    sizes = one.hfield_size[ours], two.hfield_size[theirs]
+    spans = [
+        slice(start, start + rows * columns)
+        for start, (rows, columns) in zip(starts, grids, strict=True)
+    ]
+    data = left.hfield_data[spans[0]], right.hfield_data[spans[1]]
+    sizes = left.hfield_size[ours], right.hfield_size[theirs]
     if same(*data) and same(*sizes):
         return
     # The heights of a field are from 0 to 1 of its largest.
@@ -189,9 +191,9 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     edits: tuple[Edit, ...] = (
         ("hfield_data", (spans[1],), np.array(data[0])),
         ("hfield_size", (theirs,), np.array(sizes[0])),
-        *copies(("geom_size", "geom_rbound", "geom_aabb"), one, a, b),
+        *copies(("geom_size", "geom_rbound", "geom_aabb"), left, a, b),
     )
-    users = (two.geom_type == two.geom_type[b]) & (two.geom_dataid == theirs)
+    users = (right.geom_type == right.geom_type[b]) & (right.geom_dataid == theirs)
     why = "another geom has this height field, too" if users.sum() > 1 else ""
     values = (("farthest point", 0.0, float(far)),)
     yield sides.tell("heights", "geom", a, values, "m", () if why else edits, refused=why)

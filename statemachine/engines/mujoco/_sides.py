@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,14 @@ from ...installed import require
 from ...interface import Array
 from ...rotations import HERE, Placement, matrix_from_quat
 from ..description.records import Inertial
+from ..description.shapes import one_to_one
 from ..description.tree import together
 from ..records import BodyPair, Counterparts, Edit, ModelDifference
 from . import _fields as fields
 
 SLIDE, HINGE = 2, 3  # mjtJoint
 NEAR = 1e-10  # [m], and of entries of matrices: less is rounding
+_SAME_PLACE = 1e-15  # the same: what composing with frames that are none leaves
 NOBODY = -2  # in the place of an id that has no counterpart; -1 is that of nothing
 _TOGETHER = 3  # entries: a longer array is told by those that differ
 _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves it
@@ -30,9 +33,9 @@ Pairs = Sequence[tuple[int, int]]
 Values = Iterable[tuple[Any, ...]]
 
 
-def same(one: Any, two: Any, slack: float = _ROUNDING) -> bool:
+def same(left: Any, right: Any, slack: float = _ROUNDING) -> bool:
     """Whether two values are equal, but for rounding."""
-    a, b = np.asarray(one), np.asarray(two)
+    a, b = np.asarray(left), np.asarray(right)
     if a.shape != b.shape:
         return False
     if a.dtype.kind != "f" and b.dtype.kind != "f":
@@ -49,18 +52,18 @@ def plain(value: Any) -> Any:
 
 
 def differing(
-    names: Sequence[str], one: Sequence[Any], two: Sequence[Any]
+    names: Sequence[str], left: Sequence[Any], right: Sequence[Any]
 ) -> tuple[tuple[str, Any, Any], ...]:
     """The figures of these that differ, by name; of a long array each entry that does."""
-    found: list[tuple[str, Any, Any]] = []
-    for name, a, b in zip(names, one, two, strict=True):
+    figures: list[tuple[str, Any, Any]] = []
+    for name, a, b in zip(names, left, right, strict=True):
         word, size = name.partition("_")[2] or name, np.size(a)
         if size <= _TOGETHER or np.shape(a) != np.shape(b):
-            found += [] if same(a, b) else [(word, plain(a), plain(b))]
+            figures += [] if same(a, b) else [(word, plain(a), plain(b))]
         else:
             places = [k for k in range(size) if not same(a[k], b[k])]
-            found += [(f"{word}[{k}]", plain(a[k]), plain(b[k])) for k in places]
-    return tuple(found)
+            figures += [(f"{word}[{k}]", plain(a[k]), plain(b[k])) for k in places]
+    return tuple(figures)
 
 
 def copies(names: Iterable[str], raw: Any, a: int, b: int) -> tuple[Edit, ...]:
@@ -96,9 +99,9 @@ def placed(pos: Array, quat: Array) -> Placement:
     return Placement(np.array(pos), matrix_from_quat(np.asarray(quat)))
 
 
-def apart(one: Placement, two: Placement) -> tuple[float, float]:
+def apart(left: Placement, right: Placement) -> tuple[float, float]:
     """How far two poses are from each other: [m], and the largest entry of the matrices."""
-    return one.distance(two), float(np.abs(one.mat - two.mat).max())
+    return left.distance(right), float(np.abs(left.mat - right.mat).max())
 
 
 def quat_of(mat: Array) -> Array:
@@ -180,20 +183,20 @@ class Sides:
     """Two compiled models, and what of one is what of the other.
 
     Attributes:
-        one, two: The mjModels.
+        left, right: The mjModels.
         pairs: What of one is what of the other.
         solids: Their rigid parts.
         ids: By kind of element the ids of the second model by those of the first; of geoms once
             there are `Geoms`.
     """
 
-    def __init__(self, one: Any, two: Any, pairs: Counterparts) -> None:
-        self.one, self.two, self.pairs = one, two, pairs
+    def __init__(self, left: Any, right: Any, pairs: Counterparts) -> None:
+        self.left, self.right, self.pairs = left, right, pairs
         self.solids = (
-            Solids(one, {pair.one for pair in pairs.solids}),
-            Solids(two, {pair.two for pair in pairs.solids}),
+            Solids(left, {pair.left for pair in pairs.solids}),
+            Solids(right, {pair.right for pair in pairs.solids}),
         )
-        self._by_one = {pair.one: pair for pair in pairs.solids}
+        self._by_one = {pair.left: pair for pair in pairs.solids}
         self.ids: dict[str, dict[int, int]] = {
             "joint": dict(pairs.joints),
             "site": dict(pairs.sites),
@@ -214,30 +217,27 @@ class Sides:
     def _bodies(self) -> Iterator[tuple[int, int]]:
         """Rigid parts, and the bodies fixed to them: by name, then in their order."""
         for pair in self.pairs.solids:
-            yield pair.one, pair.two
-            ours, theirs = (
-                solids.members(head)[1:]
-                for solids, head in zip(self.solids, (pair.one, pair.two), strict=True)
-            )
-            names = {self.two.body(b).name: b for b in theirs if self.two.body(b).name}
-            named = [(a, b) for a in ours if (b := names.get(self.one.body(a).name)) is not None]
-            yield from named
-            left = [b for b in theirs if b not in dict(named).values()]
-            yield from zip([a for a in ours if a not in dict(named)], left, strict=False)
+            yield pair.left, pair.right
+            heads = zip(self.solids, (pair.left, pair.right), strict=True)
+            ours, theirs = (solids.members(head)[1:] for solids, head in heads)
+            further = list(product(ours, theirs))
+            names = [(self.left.body(a).name, self.right.body(b).name) for a, b in further]
+            named = [bodies for bodies, (a, b) in zip(further, names, strict=True) if a == b != ""]
+            yield from one_to_one((*named, *further)).items()
 
     def by_name(self, kind: str) -> Iterator[tuple[int, int]]:
         """Elements of one name, and those without in their order."""
-        one, two = ([view(k).name for k in range(n)] for view, n in self._views(kind))
-        for k, name in enumerate(one):
-            if name and name in two:
-                yield k, two.index(name)
-            elif not name and k < len(two) and not two[k]:
+        left, right = ([view(k).name for k in range(n)] for view, n in self._views(kind))
+        for k, name in enumerate(left):
+            if name and name in right:
+                yield k, right.index(name)
+            elif not name and k < len(right) and not right[k]:
                 yield k, k
 
     def _views(self, kind: str) -> list[tuple[Callable[[int], Any], int]]:
         """How an element of each model is looked at, and how many there are."""
         word = _COUNTED.get(kind, kind)
-        return [(getattr(raw, word), getattr(raw, f"n{word}")) for raw in (self.one, self.two)]
+        return [(getattr(raw, word), getattr(raw, f"n{word}")) for raw in (self.left, self.right)]
 
     def tell(
         self,
@@ -251,7 +251,7 @@ class Sides:
         refused: str = "",
     ) -> ModelDifference:
         """A difference of an element of the first model; the rest as of ModelDifference."""
-        name = name_of(self.one, kind, element)
+        name = name_of(self.left, kind, element)
         return ModelDifference(
             subject, kind, name, tuple(values), unit, tuple(edits), tuple(back), refused
         )
@@ -282,9 +282,9 @@ class Sides:
                     for entry in entries
                 )
                 if values and acts:
-                    edits = () if back else copies(row.fields, self.one, a, b)
-                    edits_one = copies(row.fields, self.two, b, a) if back else ()
-                    where = name or name_of(self.one, kind, a)
+                    edits = () if back else copies(row.fields, self.left, a, b)
+                    edits_one = copies(row.fields, self.right, b, a) if back else ()
+                    where = name or name_of(self.left, kind, a)
                     yield ModelDifference(
                         row.subject, kind, where, values, row.unit, edits, edits_one
                     )
@@ -298,7 +298,7 @@ class Sides:
                 else np.array([-np.inf, np.inf])
                 for name in names
             ]
-            for raw, k in ((self.one, a), (self.two, b))
+            for raw, k in ((self.left, a), (self.right, b))
         ]
 
     def extras(
@@ -307,7 +307,7 @@ class Sides:
         """Elements that only one model has; `without` tells what takes the effect of one away."""
         for side, (_, count) in enumerate(self._views(kind)):
             for k in sorted({*range(count)} - {pair[side] for pair in pairs}):
-                if edits := without((self.one, self.two)[side], k):
+                if edits := without((self.left, self.right)[side], k):
                     yield self.alone(side, kind, k, edits)
 
     def alone(
@@ -329,13 +329,13 @@ class Sides:
             called: What it is called instead of its kind.
             what: What stands for it as a value.
         """
-        subject, name = f"extra {called or kind}", name_of((self.one, self.two)[side], kind, k)
+        subject, name = f"extra {called or kind}", name_of((self.left, self.right)[side], kind, k)
         if side:
             return ModelDifference(subject, kind, name, ((kind, None, what),), edits=edits)
         return ModelDifference(subject, kind, name, ((kind, what, None),), edits_one=edits)
 
     def elsewhere(
-        self, kind: str, a: int, b: int, wanted: Placement, theirs: Placement, exact: bool
+        self, kind: str, a: int, b: int, wanted: Placement, theirs: Placement
     ) -> ModelDifference:
         """A body, a geom or a site that is to be elsewhere on its part.
 
@@ -345,7 +345,6 @@ class Sides:
             b: Its id in the second.
             wanted: Where it is to be, on its rigid part.
             theirs: Where it is.
-            exact: Whether it gets the numbers of the first model.
         """
         far, turn = apart(wanted, theirs)
         values: list[tuple[str, Any, Any]] = []
@@ -354,9 +353,10 @@ class Sides:
         if turn > NEAR:
             values.append(("turned by [rad]", 0.0, wanted.angle(theirs)))
         names = f"{kind}_pos", f"{kind}_quat"
-        if exact:
-            return self.tell("place", kind, a, values, "m", copies(names, self.one, a, b))
-        on = self.two.body_parentid if kind == "body" else getattr(self.two, f"{kind}_bodyid")
+        on = self.right.body_parentid if kind == "body" else getattr(self.right, f"{kind}_bodyid")
         inner = self.solids[1].place(int(on[b])).inverse @ wanted
-        edits = ((names[0], (b,), inner.pos), (names[1], (b,), quat_of(inner.mat)))
+        edits = copies(names, self.left, a, b)
+        # The first model's own numbers, where they say that place: both move by the same bits.
+        if max(apart(inner, placed(*(value for _, _, value in edits)))) > _SAME_PLACE:
+            edits = ((names[0], (b,), inner.pos), (names[1], (b,), quat_of(inner.mat)))
         return self.tell("place", kind, a, values, "m", edits)

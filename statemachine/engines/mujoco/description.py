@@ -80,7 +80,7 @@ def _without_missing_meshes(path: Path, name: str) -> Robot | None:
                     shape = CollisionShape(
                         *("mesh", placed(geom.pos, geom.quat)),
                         name=geom.name,
-                        friction=tuple(map(float, geom.friction)),
+                        contact={"friction": tuple(map(float, geom.friction))},
                     )
                     lost.setdefault(geom.parent.name, []).append(shape)
                 spec.delete(geom)

@@ -34,20 +34,20 @@ _MOVES = {
 
 
 def differences(
-    one: Any, two: Any, pairs: Counterparts, *, world: bool = True
+    left: Any, right: Any, pairs: Counterparts, *, world: bool = True
 ) -> tuple[ModelDifference, ...]:
     """All that two compiled models differ in and that can change a motion.
 
     Args:
-        one: An mjModel.
-        two: Another.
+        left: An mjModel.
+        right: Another.
         pairs: What of one is what of the other.
         world: Whether gravity and the timestep are compared, too.
     """
-    sides = Sides(one, two, pairs)
+    sides = Sides(left, right, pairs)
     geoms = Geoms(sides)
     return (
-        *_options(one, two, world),
+        *_options(left, right, world),
         *weights(sides),
         *places(sides),
         *geoms.found(),
@@ -55,7 +55,7 @@ def differences(
         *equalities(sides),
         *drives(sides),
         *contact_pairs(sides),
-        *_whole(one, two),
+        *_whole(left, right),
     )
 
 
@@ -68,20 +68,20 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
     from ...backends._edits import put
 
     mujoco = require("mujoco")
-    made = copy.copy(raw)
+    model = copy.copy(raw)
     # After what is done to the geoms: what makes a pair as its geoms are then.
     edits = sorted(edits, key=lambda edit: edit[0] == AS_GEOMS)
     for name, index, value in edits:
-        for edit in as_geoms(made, *index) if name == AS_GEOMS else ((name, index, value),):
-            put(made, edit[0], edit[2], edit[1])
+        for edit in as_geoms(model, *index) if name == AS_GEOMS else ((name, index, value),):
+            put(model, edit[0], edit[2], edit[1])
     if any(name in _MOVES for name, _, _ in edits):
-        made.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
-    _frames(made, edits)
-    _masks(made)
-    made.flg_adhesion = made.flg_adhesion or made.geom_adhesion.any()
-    made.flg_surfacevel = made.flg_surfacevel or made.geom_surfacevel.any()
-    mujoco.mj_setConst(made, mujoco.MjData(made))
-    return made
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+    _frames(model, edits)
+    _masks(model)
+    model.flg_adhesion = model.flg_adhesion or model.geom_adhesion.any()
+    model.flg_surfacevel = model.flg_surfacevel or model.geom_surfacevel.any()
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
 
 
 def _read(raw: Any, edit: Edit) -> Any:
@@ -117,25 +117,25 @@ def _masks(raw: Any) -> None:
     raw.body_margin[:] = margin
 
 
-def _options(one: Any, two: Any, world: bool) -> Iterator[ModelDifference]:
+def _options(left: Any, right: Any, world: bool) -> Iterator[ModelDifference]:
     overrides = int(require("mujoco").mjtEnableBit.mjENBL_OVERRIDE)
-    overridden = (one.opt.enableflags | two.opt.enableflags) & overrides
+    overridden = (left.opt.enableflags | right.opt.enableflags) & overrides
     for subject, names in fields.OPTIONS.items():
         idle = (not world and subject in ("gravity", "timestep")) or (
             subject == "contact override" and not overridden
         )
-        both = [(name, getattr(one.opt, name), getattr(two.opt, name)) for name in names]
-        differ = [] if idle else [each for each in both if not same(*each[1:])]
+        both = [(name, getattr(left.opt, name), getattr(right.opt, name)) for name in names]
+        differ = [] if idle else [row for row in both if not same(*row[1:])]
         if differ:
             values = tuple((name, _told(name, a), _told(name, b)) for name, a, b in differ)
             edits = tuple((f"opt.{name}", (), copy.copy(a)) for name, a, _ in differ)
             unit = fields.OPTION_UNITS.get(subject, "")
             yield ModelDifference(subject, "option", "", values, unit, edits)
     for field, word, bit in _flag_bits():
-        switches = [_switch(raw, field, bit) for raw in (one, two)]
+        switches = [_switch(raw, field, bit) for raw in (left, right)]
         if switches[0] != switches[1]:
             values = ((f"flag {word}", *switches),)
-            edits = ((f"opt.{field}", (bit,), bool(getattr(one.opt, field) & bit)),)
+            edits = ((f"opt.{field}", (bit,), bool(getattr(left.opt, field) & bit)),)
             yield ModelDifference(word, "flag", "", values, edits=edits)
 
 
@@ -169,12 +169,12 @@ def _switch(raw: Any, field: str, bit: int) -> str:
     return "on" if raised == (field == "enableflags") else "off"
 
 
-def _whole(one: Any, two: Any) -> Iterator[ModelDifference]:
+def _whole(left: Any, right: Any) -> Iterator[ModelDifference]:
     """What is compared as a whole and brought to nothing: deformable bodies, plugins."""
     for subject, pattern in (("deformable bodies", "flex_"), ("plugins", "plugin")):
-        names = [n for n in dir(one) if n.startswith(pattern) and fields.known(n) == "whole"]
-        if not all(same(getattr(one, n), getattr(two, n)) for n in names):
-            counts = [int(getattr(raw, f"n{pattern.rstrip('_')}", 0)) for raw in (one, two)]
+        names = [n for n in dir(left) if n.startswith(pattern) and fields.known(n) == "whole"]
+        if not all(same(getattr(left, n), getattr(right, n)) for n in names):
+            counts = [int(getattr(raw, f"n{pattern.rstrip('_')}", 0)) for raw in (left, right)]
             why = "they are compared as a whole, and not brought over"
             yield ModelDifference(subject, "model", "", (("count", *counts),), refused=why)
 
@@ -204,75 +204,61 @@ _SPLIT: dict[str, Sequence[str]] = {
 _CALLED = {"body_inertia": "diaginertia"}
 # A difference that sets one of these is a thing of one piece: the rest means something else then.
 _KINDS = ("geom_type", "actuator_gaintype", "actuator_biastype", "actuator_dyntype", "body_iquat")
+_GAINS, _KP = ("actuator_gainprm", "actuator_biasprm"), ("gainprm[0]", "biasprm[1]")
 _TURNS = ("body_quat", "geom_quat", "site_quat")
 
 
-def entries(two: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
+def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
     """A difference by its single entries, or itself where it is of one piece.
 
     Args:
-        two: The compiled model that its edits are of.
+        right: The compiled model that its edits are of.
         difference: One of `differences`.
     """
     if difference.edits_one or difference.refused or difference.subject.startswith("extra "):
         return (difference,)
-    edits = [edit for edit in difference.edits if not same(edit[2], _read(two, edit))]
+    edits = [edit for edit in difference.edits if not same(edit[2], _read(right, edit))]
     if any(
-        name in _KINDS or name.endswith("limited") or any(isinstance(each, slice) for each in index)
+        name in _KINDS or name.endswith("limited") or any(isinstance(part, slice) for part in index)
         for name, index, _ in edits
     ):
         return (difference,)
-    found = tuple(
-        replace(
-            difference,
-            subject=f"{difference.subject} ({word})",
-            values=((word, one, other),),
+    # The gain of a servo stands in two places, which are one entry.
+    gains = [edit for edit in edits if edit[0] in _GAINS]
+    both = [[edit[2] for edit in gains], [_read(right, edit) for edit in gains]]
+    servo = len(gains) == 2 and all(_is_servo(*arrays) for arrays in both)
+    parts: dict[str, ModelDifference] = {}
+    for word, left, other, unit, edit in (row for part in edits for row in _by_entry(right, part)):
+        called = "kp" if servo and word in _KP else word
+        known = parts.get(called)
+        parts[called] = replace(
+            known or difference,
+            subject=f"{difference.subject} ({called})",
+            values=known.values if known else ((called, left, other),),
             unit=unit or difference.unit,
-            edits=those,
+            edits=(*(known.edits if known else ()), edit),
         )
-        for word, one, other, unit, those in _by_entry(two, edits)
-    )
-    return found if len(found) > 1 else (difference,)
+    return tuple(parts.values()) if len(parts) > 1 else (difference,)
 
 
-# What an entry is called, both values, its unit where that is another, and what brings it over.
-_Entry = tuple[str, Any, Any, str, tuple[Edit, ...]]
-
-
-def _by_entry(two: Any, edits: Sequence[Edit]) -> Iterator[_Entry]:
-    servo = [edit for edit in edits if edit[0] in ("actuator_gainprm", "actuator_biasprm")]
-    wanted, now = [edit[2] for edit in servo], [_read(two, edit) for edit in servo]
-    rest = list(edits)
-    if len(servo) == 2 and _is_servo(*wanted) and _is_servo(*now):
-        # The gain of a servo stands in two places.
-        (gain, index, _), (bias, _, _) = servo
-        kp, others = float(wanted[0][0]), wanted[1].tolist()
-        yield (
-            "kp",
-            kp,
-            float(now[0][0]),
-            "",
-            ((gain, (*index, 0), kp), (bias, (*index, 1), others[1])),
-        )
-        rest = [edit for edit in edits if edit not in servo]
-        rest += [(bias, (*index, k), others[k]) for k in range(2, len(others))]
-        rest = [edit for edit in rest if not same(edit[2], _read(two, edit))]
-    for edit in rest:
-        (name, index, value), old = edit, _read(two, edit)
-        word = _CALLED.get(name, name.partition("_")[2] or name).removeprefix("opt.")
-        names = _SPLIT.get(name)
-        if name in _TURNS:
-            angle = 2 * float(np.arccos(np.clip(abs(np.dot(value, old)), 0.0, 1.0)))
-            yield "turn", 0.0, angle, "rad", (edit,)
-        elif names is None or not np.ndim(value):
-            word += "".join(f"[{k}]" for k in index[1:2])
-            yield word, plain(value), plain(old), "", (edit,)
-        else:
-            for k in range(len(value)):
-                if not same(value[k], old[k]):
-                    called = names[0].format(word, k) if names is _NUMBERED else names[k]
-                    one, other = float(value[k]), float(old[k])
-                    yield called, one, other, "", ((name, (*index, k), one),)
+def _by_entry(right: Any, edit: Edit) -> Iterator[tuple[str, Any, Any, str, Edit]]:
+    """What an entry is called, both values, its unit if that is another, what brings it over."""
+    (name, index, value), old = edit, _read(right, edit)
+    kind, _, rest = name.partition("." if name.startswith("opt.") else "_")
+    word = _CALLED.get(name, rest or kind)
+    names = _SPLIT.get(name)
+    if name in _TURNS:
+        angle = 2 * float(np.arccos(np.clip(abs(np.dot(value, old)), 0.0, 1.0)))
+        yield "turn", 0.0, angle, "rad", edit
+    elif names is None or not np.ndim(value):
+        word += "".join(f"[{k}]" for k in index[1:2])
+        yield word, plain(value), plain(old), "", edit
+    else:
+        for k in range(len(value)):
+            if not same(value[k], old[k]):
+                called = names[0].format(word, k) if names is _NUMBERED else names[k]
+                left, other = float(value[k]), float(old[k])
+                yield called, left, other, "", (name, (*index, k), left)
 
 
 def _is_servo(gains: Any, biases: Any) -> bool:

@@ -54,13 +54,13 @@ def _description(client: int, bodies: Sequence[int], name: str) -> Robot:
     around: list[CollisionShape] = []
     links: list[Link] = []
     taken = {"world"}
-    for each in [_Body(client, body) for body in bodies]:
-        fixed = each.still and not each.infos
-        if each.still and (each.base == "world" or fixed):
-            shapes = each.link(-1, "world", "", HERE, None).shapes
-            around += [replace(shape, place=each.places[-1] @ shape.place) for shape in shapes]
-        if each.base == "world" or not fixed:  # else it is a floor that the backend adds
-            links += each.links(taken)
+    for loaded in [_Body(client, body) for body in bodies]:
+        fixed = loaded.still and not loaded.infos
+        if loaded.still and (loaded.base == "world" or fixed):
+            shapes = loaded.link(-1, "world", "", HERE, None).shapes
+            around += [replace(shape, place=loaded.places[-1] @ shape.place) for shape in shapes]
+        if loaded.base == "world" or not fixed:  # else it is a floor that the backend adds
+            links += loaded.links(taken)
     return Robot(
         name=name,
         reader=f"pybullet {engine_version('pybullet')}",
@@ -98,7 +98,7 @@ class _Body:
             i: pb.getDynamicsInfo(body, i, client) for i in range(-1, len(self.infos))
         }
         self.still = self._dynamics[-1][0] == 0
-        self._inner = {i: _pose(*told[3:5]) for i, told in self._dynamics.items()}
+        self._inner = {i: _pose(*dynamics[3:5]) for i, dynamics in self._dynamics.items()}
         centres = {-1: _pose(*pb.getBasePositionAndOrientation(body, client))}
         for i in range(len(self.infos)):
             # Of the centre of mass, which is told in double precision; the frame's own is not.
@@ -124,14 +124,14 @@ class _Body:
         self, index: int, name: str, parent: str, place: Placement, joint: RobotJoint | None
     ) -> Link:
         """One of its links, by its own frame."""
-        told, inner = self._dynamics[index], self._inner[index]
+        dynamics, inner = self._dynamics[index], self._inner[index]
         shapes = []
         for shape in pb.getCollisionShapeData(self._body, index, self._client):
             kind = _SHAPES.get(shape[2], f"kind {shape[2]}")
             at = inner @ _pose(*shape[5:7])
-            friction = (told[1], *told[7:5:-1])
-            shapes.append(CollisionShape(kind, at, _size(kind, shape[3]), friction=friction))
-        inertial = Inertial(told[0], np.zeros(3), np.diag(told[2])).seen_from(inner)
+            contact = {"friction": (dynamics[1], *dynamics[7:5:-1])}
+            shapes.append(CollisionShape(kind, at, _size(kind, shape[3]), contact=contact))
+        inertial = Inertial(dynamics[0], np.zeros(3), np.diag(dynamics[2])).seen_from(inner)
         return Link(name, parent, place, joint, inertial, tuple(shapes))
 
 
@@ -156,22 +156,22 @@ def _joint(info: Sequence[Any], inner: Placement) -> RobotJoint:
     )
 
 
-def _size(kind: str, told: Sequence[float]) -> tuple[float, ...]:
+def _size(kind: str, dimensions: Sequence[float]) -> tuple[float, ...]:
     """From what PyBullet tells of a shape: edges; length and radius."""
     if kind == "box":
-        return tuple(edge / 2 for edge in told)
+        return tuple(edge / 2 for edge in dimensions)
     if kind == "sphere":
-        return (told[0],)
-    return (told[1], told[0] / 2) if kind in ("cylinder", "capsule") else ()
+        return (dimensions[0],)
+    return (dimensions[1], dimensions[0] / 2) if kind in ("cylinder", "capsule") else ()
 
 
 def _settings() -> dict[str, Setting]:
     """Of a world that nobody has set anything in."""
     with fresh_world() as client:
-        told = pb.getPhysicsEngineParameters(client)
+        settings = pb.getPhysicsEngineParameters(client)
     return {
-        "timestep": told["fixedTimeStep"],
-        "gravity": tuple(told[f"gravityAcceleration{axis}"] for axis in "XYZ"),
-        "iterations": float(told["numSolverIterations"]),
-        "substeps": float(max(1, told["numSubSteps"])),
+        "timestep": settings["fixedTimeStep"],
+        "gravity": tuple(settings[f"gravityAcceleration{axis}"] for axis in "XYZ"),
+        "iterations": float(settings["numSolverIterations"]),
+        "substeps": float(max(1, settings["numSubSteps"])),
     }

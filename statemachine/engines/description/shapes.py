@@ -1,16 +1,18 @@
-"""Meshes (STL and OBJ, read here) and what they enclose; which shape is which."""
+"""Meshes (STL and OBJ, read here); which shape is which, and how two lie to each other."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import numpy as np
 
 from ...interface import Array
 from ...models import mesh_file
+from ...rotations import Placement, rotation
 from .records import CollisionShape
 
 _OTHER_KIND = 100.0  # [m] worse than any distance
@@ -100,32 +102,34 @@ def one_to_one(
 ) -> dict[int, int]:
     """Known pairs, and of the candidates, in turn, those whose ends are both left."""
     pairs = dict(known)
-    for one, two in candidates:
-        if one not in pairs and two not in pairs.values():
-            pairs[one] = two
+    for left, right in candidates:
+        if left not in pairs and right not in pairs.values():
+            pairs[left] = right
     return pairs
 
 
-def _misfit(one: CollisionShape, two: CollisionShape) -> float:
+def _misfit(left: CollisionShape, right: CollisionShape) -> float:
     """How unlike two shapes are: of one name least, of other kinds most."""
-    if one.name and one.name == two.name:
+    if left.name and left.name == right.name:
         return -1.0
-    ends = bounds_of(one), bounds_of(two)
+    ends = bounds_of(left), bounds_of(right)
     far = float(np.linalg.norm(ends[0] - ends[1])) if len(ends[0]) == len(ends[1]) else 0.0
-    if one.kind != two.kind:
+    if left.kind != right.kind:
         return far + _OTHER_KIND
-    return far + float(np.abs(np.subtract(sorted(one.size), sorted(two.size))).sum())
+    return far + float(np.abs(np.subtract(sorted(left.size), sorted(right.size))).sum())
 
 
 def with_capsules(shapes: Sequence[CollisionShape]) -> tuple[CollisionShape, ...]:
     """A cylinder with a sphere on each end is the capsule that the format has no word for."""
-    found = list(shapes)
+    solids = list(shapes)
     for cylinder in shapes:
-        ends = list(_ends(cylinder, found)) if cylinder.kind == "cylinder" else []
+        ends = list(_ends(cylinder, solids)) if cylinder.kind == "cylinder" else []
         if len(ends) == 2:
             capsule = replace(cylinder, kind="capsule")
-            found = [capsule if each is cylinder else each for each in found if each not in ends]
-    return tuple(found)
+            solids = [
+                capsule if shape is cylinder else shape for shape in solids if shape not in ends
+            ]
+    return tuple(solids)
 
 
 def _ends(cylinder: CollisionShape, shapes: Sequence[CollisionShape]) -> Iterator[CollisionShape]:
@@ -139,3 +143,37 @@ def _ends(cylinder: CollisionShape, shapes: Sequence[CollisionShape]) -> Iterato
             and abs(shape.size[0] - radius) <= 1e-6 * radius
             and np.linalg.norm(shape.place.pos - end) <= 1e-3 * radius
         ][:1]
+
+
+def laid_on(shape: CollisionShape, other: CollisionShape) -> CollisionShape:
+    """The other box with its axes called as this one's: one solid has six such names."""
+    if shape.kind != other.kind or shape.kind not in ("box", "ellipsoid"):
+        return other
+    choices = []
+    for order in permutations(range(3)):
+        mat = other.place.mat[:, order].copy()
+        mat[:, 2] = np.cross(mat[:, 0], mat[:, 1])  # right-handed; a box has no inside out
+        size = tuple(other.size[k] for k in order)
+        turned = replace(other, place=Placement(other.place.pos, mat), size=size)
+        most = float(np.linalg.norm(shape.size)) or 1.0
+        apart = float(np.linalg.norm(np.subtract(shape.size, size))) / most
+        choices.append((apart + angle_between(shape, turned), turned))
+    return min(choices, key=lambda choice: choice[0])[1]
+
+
+def angle_between(shape: CollisionShape, other: CollisionShape) -> float:
+    """Angle [rad] between two shapes of a kind, what their symmetry hides apart."""
+    a, b = shape.place.mat, other.place.mat
+    if shape.kind == "sphere":
+        return 0.0
+    if shape.kind in ("cylinder", "capsule", "plane"):
+        along = float(a[:, 2] @ b[:, 2])
+        across = float(np.linalg.norm(np.cross(a[:, 2], b[:, 2])))
+        return math.atan2(across, along if shape.kind == "plane" else abs(along))
+    halves = (0.0, math.pi) if shape.kind in ("box", "ellipsoid") else (0.0,)
+    sines = [
+        float(np.linalg.norm(a @ rotation(axis, half) - b)) / math.sqrt(8)
+        for axis in np.eye(3)
+        for half in halves
+    ]
+    return 2 * math.asin(min(1.0, *sines))
