@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..measures.text import grouped
 from ..page import (
     LETTERS,
     Block,
@@ -210,6 +209,8 @@ def _coded(text: str, style: str = "") -> RichText:
 
 def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:
     """Engines that printed the same, once: their names and the text."""
+    from ..measures.text import grouped  # its room loads NumPy
+
     engines = grouped((text, name) for name, text in by_engine.items())
     return [(names, text) for text, names in engines.items()]
 
