@@ -88,7 +88,7 @@ def chaos_floor(
     """The chaos floor of each quantity of a comparison.
 
     The band at a moment is the largest distance of a perturbed run from `one`, within 2.5 % of
-    the common time before and after it. It is no running maximum: a robot whose servos pull it
+    the common time before and after it. It is not a running maximum: a robot whose servos pull it
     back forgets where it started, and a gap that remains then is a difference although an impact
     in between was chaotic. And it is not of the moment alone: all perturbed runs part along the
     one direction that grows fastest, so that they cross `one` at the same time, and an impact

@@ -227,7 +227,7 @@ def _beyond(raw: Any, i: int, drive: Actuator) -> str:
     if passed <= 1e-5 * (high - low):
         return ""
     return (
-        f"the ctrlrange of {raw.actuator(i).name!r} passes the range of its joint by "
+        f"the ctrlrange of {raw.actuator(i).name!r} goes beyond the range of its joint by "
         f"{math.degrees(passed):.3g}°"
     )
 

@@ -65,7 +65,7 @@ _MUTANTS = (
     Mutant(
         "one-step-short",
         "step(…, n) takes n − 1 steps",
-        "nothing compares one call of n steps with n calls of one; the clock alone does not tell",
+        "nothing compares one call of n steps with n calls of one step; `time` does not show it",
     ),
     Mutant(
         "motor-left-on",
