@@ -44,7 +44,7 @@ class _Parser(argparse.ArgumentParser):
         return found, rest
 
     def error(self, message: str) -> NoReturn:
-        message = message.replace("'", "")
+        message = " ".join(message.replace("'", "").splitlines())  # as typed words may have
         wrong, _, rest = message.partition("invalid choice: ")
         if rest:
             given, _, choices = rest.partition(" (choose from ")

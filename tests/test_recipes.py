@@ -21,7 +21,7 @@ PLACES = {
     "statemachine/lessons/__init__.py, in LESSONS": "    for lesson in (",
     "statemachine/measures/quantities.py, in QUANTITIES": '        Quantity("force"',
     "statemachine/measures/quantities.py, in _SUFFIXES": "_SUFFIXES = (",
-    "statemachine/compare/series.py, in series": "            found += _joint(",
+    "statemachine/compare/series.py, in series": "            curves += _joint(",
     "statemachine/probes/conventions/__init__.py, in QUESTIONS": '    "timestep": ',
 }
 

@@ -29,13 +29,14 @@ GUARDED = {
     ("interface/turns.py", "register_at_fork"),
     ("processes/__init__.py", "sysconf"),
     ("silence.py", "register_at_fork"),
-    ("sweep/apart.py", "SIG_BLOCK"),
-    ("sweep/apart.py", "pthread_sigmask"),
     ("sweep/worker.py", "ITIMER_REAL"),
     ("sweep/worker.py", "SIGALRM"),
     ("sweep/worker.py", "setitimer"),
     ("worlds/_process.py", "POLLIN"),
     ("worlds/_process.py", "poll"),
+    ("processes/parallel.py", "SIG_BLOCK"),
+    ("processes/parallel.py", "SIG_SETMASK"),
+    ("processes/parallel.py", "pthread_sigmask"),
     ("processes/pipes.py", "register_at_fork"),
 }
 
