@@ -113,20 +113,32 @@ class _Ended(BaseException):
 
 
 @contextmanager
-def unwinding() -> Iterator[None]:
+def unwinding(at_once: bool = True) -> Iterator[Callable[[], None]]:
     """SIGTERM, SIGHUP and SIGINT let what is inside clean up, and then end the process as ever.
 
     A second one does not disturb the cleaning up. One that is ignored (nohup) stays so. Only in
     the main thread, where Python takes signals.
+
+    Args:
+        at_once: Whether a signal raises wherever it comes; else where the function that is given
+            is called, so that it never comes while the lock of a future is held.
     """
+    came: list[int] = []
+
+    def raise_if_ended() -> None:
+        if came:
+            raise KeyboardInterrupt if came[0] == signal.SIGINT else _Ended(came[0])
+
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield raise_if_ended
         return
 
     def end(number: int, _frame: FrameType | None) -> None:
-        for each in before:
-            signal.signal(each, signal.SIG_IGN)
-        raise KeyboardInterrupt if number == signal.SIGINT else _Ended(number)
+        for other in before:
+            signal.signal(other, signal.SIG_IGN)
+        came.append(number)
+        if at_once:
+            raise_if_ended()
 
     names = ("SIGTERM", "SIGHUP", "SIGINT")
     numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
@@ -139,7 +151,8 @@ def unwinding() -> Iterator[None]:
     try:
         for number in before:
             signal.signal(number, end)
-        yield
+        yield raise_if_ended
+        raise_if_ended()  # one that came last
     except _Ended as error:
         (ended,) = error.args
     finally:

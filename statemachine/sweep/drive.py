@@ -113,8 +113,12 @@ def run_sweep(
         kinds = Counter(known.values())
         writer = RowWriter(folder, ready.design.factors, ready.provenance())
         batches = _batches(ready, known, _workers(client) if client else jobs)
-        run = _run_on_dask(ready, batches, client) if client else run_apart(ready, batches, jobs)
-        with unwinding():
+        with unwinding(at_once=False) as raise_if_ended:
+            run = (
+                _run_on_dask(ready, batches, client, raise_if_ended)
+                if client
+                else run_apart(ready, batches, jobs, raise_if_ended)
+            )
             try:
                 with closing(run) as results:
                     for rows in results:
@@ -164,19 +168,30 @@ def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Itera
     return (batch for turn in turns for batch in turn if batch is not None)
 
 
-def run_apart(ready: PreparedSweep, batches: Iterable[Batch], jobs: int) -> Results:
-    """The rows of each batch, as they are ready, from processes of this machine."""
+def run_apart(
+    ready: PreparedSweep,
+    batches: Iterable[Batch],
+    jobs: int,
+    look: Callable[[], None] = lambda: None,
+) -> Results:
+    """The rows of each batch, as they are ready, from processes of this machine.
+
+    `look` is called between any two waits, and may raise.
+    """
     require_extra("joblib", "a sweep", "joblib", "sweep")
     with worker_processes(jobs) as submit:
         yield from _results(
             batches,
             jobs,
             lambda batch: submit(run_batch, ready, batch, True),
-            lambda batch: _cell_by_cell(ready, batch),
+            lambda batch: _cell_by_cell(ready, batch, look),
+            look,
         )
 
 
-def _run_on_dask(ready: PreparedSweep, batches: Iterable[Batch], client: Any) -> Results:
+def _run_on_dask(
+    ready: PreparedSweep, batches: Iterable[Batch], client: Any, look: Callable[[], None]
+) -> Results:
     """The same from the workers of Dask; what they do not survive is run here.
 
     Raises:
@@ -187,10 +202,14 @@ def _run_on_dask(ready: PreparedSweep, batches: Iterable[Batch], client: Any) ->
     def run_here(batch: Batch) -> list[Row]:
         if client.status != "running":
             raise BadInputError("the scheduler went away; what was done is kept")
-        return _cell_by_cell(ready, batch)
+        return _cell_by_cell(ready, batch, look)
 
     return _results(
-        batches, _workers(client), lambda batch: submit(run_batch, ready, batch, False), run_here
+        batches,
+        _workers(client),
+        lambda batch: submit(run_batch, ready, batch, False),
+        run_here,
+        look,
     )
 
 
@@ -199,6 +218,7 @@ def _results(
     workers: int,
     submit: Callable[[Batch], Future[list[Row]]],
     run_again: Callable[[Batch], list[Row]],
+    look: Callable[[], None],
 ) -> Results:
     """The rows of each batch, as they are ready; some always wait, so that no worker is idle."""
     coming, waiting = iter(batches), dict[Future[list[Row]], Batch]()
@@ -207,7 +227,9 @@ def _results(
             waiting[submit(batch)] = batch
         if not waiting:
             return
-        for future in wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done:
+        done = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done
+        look()
+        for future in done:
             batch = waiting.pop(future)
             try:
                 rows = future.result()
@@ -216,13 +238,16 @@ def _results(
             yield rows
 
 
-def _cell_by_cell(ready: PreparedSweep, batch: Batch) -> list[Row]:
+def _cell_by_cell(ready: PreparedSweep, batch: Batch, look: Callable[[], None]) -> list[Row]:
     """The rows of a batch that was lost with a process; a cell that ends another one fails."""
     rows: list[Row] = []
     with worker_processes(1) as submit:
         for cell in batch:
+            future = submit(run_batch, ready, [cell], True)
+            while not wait([future], timeout=0.2).done:
+                look()
             try:
-                rows += submit(run_batch, ready, [cell], True).result()
+                rows += future.result()
             except BrokenProcessPool:
                 error = WorkerEndedError("its process ended before it was done, twice")
                 rows.append(row_of(ready, cell, error))
