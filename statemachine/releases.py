@@ -119,8 +119,8 @@ def published(since: str) -> list[str]:
         raise EngineError(f"the releases of {DEFAULT} cannot be listed: {reason}")
     installed = engine_version(DEFAULT)
     newest_first = [version.strip() for version in line[1].split(",")]
-    if since not in newest_first:
-        raise BadInputError(f"the package index has no {DEFAULT}=={since}")
+    if since not in newest_first or since == installed:
+        raise BadInputError(f"the package index has no {DEFAULT}=={since} before {installed}")
     start = newest_first.index(installed) + 1 if installed in newest_first else 0
     older = newest_first[start : newest_first.index(since) + 1]
     return [*(f"{DEFAULT}=={version}" for version in reversed(older)), DEFAULT]

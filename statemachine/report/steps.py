@@ -27,7 +27,10 @@ SAME_BITS = "From the same state both sides take the same step, to the last bit"
 SAME_STEP = "From the same state both sides take the same step"
 PART = "The sides part in the stage “{stage}”, {when} (at {beyond} of {moments} moments): {where}"
 BEFORE = "What comes before it in a step is the same on both sides."
-OTHERS = "At other moments the first stage that differs is {stages}: that has another cause."
+OTHERS = (
+    "At other moments the first stage that differs is {stages}: earlier stages differ by too "
+    "little there, or it has a cause of its own."
+)
 CHANGED = "The motion changes between {pairs}"
 SAME = "The motion is the same on all of them, within its tolerances"
 
@@ -139,7 +142,7 @@ def one_step(
             result.spikes,
             {
                 "at, s": lambda spike: moment(spike.at),
-                "acceleration apart": lambda spike: quantity(spike.size, spike.unit),
+                "velocity update apart": lambda spike: quantity(spike.size, spike.unit),
                 "joint": lambda spike: spike.joint,
                 "first stage": lambda spike: spike.stage,
                 "where": lambda spike: spike.where,
