@@ -77,7 +77,7 @@ hooks: $(VENV)/test.stamp
 	@$(BIN)/pre-commit install --hook-type pre-commit --hook-type pre-push
 
 bench: $(VENV)/run.stamp
-	@$(BIN)/python -m benchmarks
+	@STATEMACHINE_ENGINES=$(VENV)/engines $(BIN)/python -m benchmarks
 
 fuzz: $(VENV)/test.stamp
 	@$(BIN)/python -m fuzz --seed $(SEED) --times $(TIMES)

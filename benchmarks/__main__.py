@@ -21,9 +21,10 @@ import numpy as np
 
 import statemachine as sm
 from benchmarks.interleave import NULL, Ratio, interleaved
-from statemachine import __version__
+from statemachine import __version__, releases
 from statemachine.compare.why import explain
 from statemachine.compare.why.causes import built
+from statemachine.lessons.in_turns import in_turns
 from statemachine.runs import recorder
 from statemachine.runs.drive import silent
 from statemachine.runs.scenarios import scenario
@@ -442,6 +443,26 @@ def why_in_forks(name: str, rounds: int) -> list[Ratio]:
     )
 
 
+def another_python(name: str, rounds: int) -> list[Ratio]:
+    """The installed release in a process of its own, against itself in this one.
+
+    The last lines are no ratios: what a call takes, with the tenth and the ninetieth percentile.
+    """
+    release = f"mujoco=={mujoco.__version__}"
+    releases.add(release)
+    here, there = sm.load(name), sm.load(name, backend=release)
+    ours, theirs = sm.make_data(here), sm.make_data(there)
+    served = f"in its process, {STEPS} steps a call, {name}"
+    calls = {served: partial(sm.step, there, theirs, STEPS)}
+    ratios = interleaved(partial(sm.step, here, ours, STEPS), calls, rounds)
+    for steps in (1, STEPS):
+        call = {"": partial(sm.step, there, theirs, steps)}
+        times = np.array(in_turns(call, 10 * rounds)[""]) * 1e6
+        low, median, high = np.percentile(times, [10, 50, 90])
+        ratios.append(Ratio(f"µs a call of {steps}, 10 to 90 %", median, low, high, len(times)))
+    return ratios
+
+
 # At most this, measured on a quiet machine; of several figures that of the names with this word.
 BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None, str]] = [
     (step, "so101", 1.04, ""),
@@ -459,6 +480,7 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None, str]] =
     (freshness, "so101", 1.02, "asked before"),
     (reading, "so101", None, ""),
     (recording, "so101", 1.10, ""),
+    (another_python, "so101", 1.15, "in its process"),
     (worlds_memory, "so101", 3.0, ""),
     (worlds_alone, "so101", 1.03, "worlds"),
     (worlds_alone, "so101/scene_box", 1.03, "worlds"),

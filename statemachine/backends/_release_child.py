@@ -16,6 +16,8 @@ FORCES = ("qacc", "qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint
 _KINDS = mujoco.mjtConstraint
 KINDS = {"disable": mujoco.mjtDisableBit, "enable": mujoco.mjtEnableBit}
 SPLIT = {"mjDSBL_PASSIVE": ("mjDSBL_SPRING", "mjDSBL_DAMPER")}  # flags that became two later
+_ALL = mujoco.mjtWarning
+ALARMS = (_ALL.mjWARN_BADQPOS, _ALL.mjWARN_BADQVEL, _ALL.mjWARN_BADQACC)
 PARTS = {
     "qfrc_contact": (
         _KINDS.mjCNSTR_CONTACT_FRICTIONLESS,
@@ -52,14 +54,29 @@ class Simulation:
         self.data.ctrl[:] = ctrl
 
     def advance(self, steps: int, fastest: float) -> int:
-        """Take engine steps up to one after which a coordinate is beyond its bound; how many."""
+        """Take engine steps up to one after which a coordinate is beyond its bound; how many.
+
+        All at once; if the last one is beyond, or the engine has warned, again one by one.
+        """
         model, data = self.model, self.data
         qpos, qvel = data.qpos, data.qvel  # views of the engine's memory
+        if steps > 1:
+            start, ctrl, warned = self.state(), data.ctrl.copy(), self.warned()
+            mujoco.mj_step(model, data, steps)
+            near = qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < fastest * fastest
+            if near and self.warned() == warned:
+                return steps
+            self.place(start)
+            self.command(ctrl)
         for k in range(1, steps + 1):
             mujoco.mj_step(model, data)
             if not (qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < fastest * fastest):
                 return k
         return steps
+
+    def warned(self) -> list:
+        """How often the engine found a number bad; old releases then begin anew without a word."""
+        return [self.data.warning[int(kind)].number for kind in ALARMS]
 
     def forward(self) -> None:
         """Derive of the present."""

@@ -75,6 +75,7 @@ class Server:
                 head = json.dumps({"verb": verb, "free": free, **job}).encode()
                 self._process.to.write(sizes.pack(len(head), len(blob)) + head + blob)
                 self._process.to.flush()
+                _child_server.await_message(self._process.out)
                 size, rest = sizes.unpack(self._process.out.read(sizes.size))
                 answer = json.loads(self._process.out.read(size))
                 values = np.frombuffer(self._process.out.read(rest))
