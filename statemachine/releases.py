@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from .installed import DEFAULT, engine_version
 
 _NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+(\.\w+)*)")
 _ADD = "not here: {}; to have it: statemachine engines add {}"
+_LARGE = 1e9  # [byte], more than any takes while it is made
 _EXAMPLE = f"{DEFAULT}==3.3.7"
 
 
@@ -135,8 +137,9 @@ def releases() -> Iterator[Release]:
     for place in sorted(folder().glob("*==*")):
         if place.name[0] == ".":  # is being made
             continue
-        settings = (place / "pyvenv.cfg").read_text(encoding="utf-8")
-        python = re.search(r"^version(?:_info)? *= *(\S+)", settings, re.MULTILINE)
+        settings = place / "pyvenv.cfg"
+        text = settings.read_text(encoding="utf-8") if settings.exists() else ""
+        python = re.search(r"^version(?:_info)? *= *(\S+)", text, re.MULTILINE)
         files = (file for file in place.rglob("*") if not file.is_symlink() and file.is_file())
         yield Release(place.name, python[1] if python else "", sum(f.stat().st_size for f in files))
 
@@ -178,8 +181,10 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         if done.stdout.strip() != version:
             said = (done.stdout + done.stderr).strip().splitlines() or ["it says nothing"]
             raise EngineError(f"{name} was installed and does not run: {said[-1]}")
-        if not (home / name).exists():  # else another process was faster
-            place.rename(home / name)
+        if not is_here(name):  # else another process was faster
+            shutil.rmtree(home / name, ignore_errors=True)  # one whose Python is gone
+            with suppress(OSError):  # another one is there now
+                place.rename(home / name)
 
 
 def _run(name: str, *command: str) -> None:
@@ -188,7 +193,9 @@ def _run(name: str, *command: str) -> None:
         lines = (done.stderr or done.stdout).strip().splitlines()
         errors = [line for line in lines if line.lower().startswith("error")] or lines[-1:]
         reason = errors[-1] if errors else f"exit code {done.returncode}"
-        raise EngineError(f"{name} cannot be installed: {reason}")
+        free = shutil.disk_usage(folder()).free
+        room = f"; {folder()} has room for {free / 1e6:.0f} MB" if free < _LARGE else ""
+        raise EngineError(f"{name} cannot be installed: {reason}{room}")
 
 
 def remove(name: str) -> None:

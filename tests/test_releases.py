@@ -5,10 +5,13 @@ from __future__ import annotations
 import gc
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -102,6 +105,61 @@ def test_what_is_half_made_is_never_found(nothing: Path, monkeypatch: pytest.Mon
     with pytest.raises(EngineError, match="the disk is full"):
         releases.add(OLD, say=lambda _line: None)
     assert not list(nothing.iterdir())
+
+
+# It makes an environment whose Python says that it has the engine.
+_UV = """#!/bin/sh
+{trouble}
+test "$1" = venv || exit 0
+for place; do :; done
+mkdir -p "$place/bin"
+printf '#!/bin/sh\necho 3.3.7\n' > "$place/bin/python"
+chmod +x "$place/bin/python"
+"""
+
+
+@pytest.fixture
+def adding(nothing: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Any]:
+    """Processes that add a release, where that meets some trouble."""
+    home = nothing / "home"
+    monkeypatch.setenv("STATEMACHINE_ENGINES", str(home))
+    monkeypatch.setenv("PATH", f"{nothing}{os.pathsep}{os.environ['PATH']}")
+
+    def start(trouble: str) -> subprocess.Popen[str]:
+        (nothing / "uv").write_text(_UV.format(trouble=trouble))
+        (nothing / "uv").chmod(0o755)
+        command = [sys.executable, "-m", "statemachine", "engines", "add", OLD]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        return subprocess.Popen(command, start_new_session=True, **pipes)
+
+    return start
+
+
+def test_a_disk_that_is_full_while_it_is_added(adding: Callable[[str], Any]) -> None:
+    with adding("echo 'error: No space left on device' >&2; exit 1") as process:
+        _, said = process.communicate()
+    assert process.returncode == BAD_INPUT
+    assert said.startswith(f"statemachine: {OLD} cannot be installed: error: No space left")
+    assert said.count("\n") == 1
+    assert not list(releases.folder().iterdir())
+
+
+def test_ctrl_c_while_it_is_added(adding: Callable[[str], Any]) -> None:
+    with adding("sleep 30") as process:
+        process.stdout.readline()
+        os.killpg(process.pid, signal.SIGINT)
+        out, said = process.communicate()
+    assert (process.returncode, out, said) == (130, "", "\n")
+    assert not list(releases.folder().iterdir())
+
+
+def test_two_that_add_it_at_once(adding: Callable[[str], Any]) -> None:
+    (releases.folder() / OLD / "bin").mkdir(parents=True)  # one whose Python was lost
+    both = [adding("sleep 0.3") for _ in range(2)]
+    ends = [process.communicate() for process in both]
+    assert [process.returncode for process in both] == [0, 0], ends
+    assert [place.name for place in releases.folder().iterdir()] == [OLD]
+    assert [release.name for release in releases.releases()] == [OLD]
 
 
 @pytest.mark.slow
@@ -214,6 +272,27 @@ class TestReleases:
         assert np.array_equal(other.qpos, whole[-1])
         sm.reset(model, data)
         sm.step(model, data)
+
+    def test_a_kill_at_any_moment_is_one_error(self) -> None:
+        """The next state goes on where the last call that ended was."""
+        model = sm.load("so101", backend=OLD)
+        rows, _ = run_of(model, 400, 20)
+        data = sm.make_data(model)
+        generator, ends = np.random.default_rng(0), list[str]()
+        for _ in range(15):
+            sm.reset(model, data)
+            data.ctrl[:] = HOLD
+            kill = Server.of(model._reading.engine)._process.kill
+            killer = threading.Timer(generator.uniform(0, 0.01), kill)
+            killer.start()
+            try:
+                for row in rows:
+                    sm.step(model, data, 20)
+                    assert np.array_equal(data.qpos, row)
+            except EngineError as error:
+                ends.append(str(error))
+            killer.join()
+        assert {re.sub(".*: ", "", end) for end in ends} == {"ended by SIGKILL"}
 
     def test_it_ends_with_its_parent(self) -> None:
         code = (
