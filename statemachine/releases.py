@@ -17,8 +17,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import BadInputError, EngineError, MissingEngineError
-from .installed import DEFAULT, engine_version
+from .errors import BadInputError, EngineError, MissingEngineError, check_name
+from .installed import DEFAULT, ENGINES, engine_version
 
 _NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+(\.\w+)*)")
 _ADD = "not here: {}; to have it: statemachine engines add {}"
@@ -50,14 +50,19 @@ def version_of(name: str) -> str:
     """The version that a release's name has.
 
     Raises:
-        BadInputError: It is no such name, or of an engine whose releases cannot be run.
+        BadInputError: It is no such name.
+        UnknownNameError: There is no such engine that runs.
     """
     match = _NAME.fullmatch(name)
     if match is None:
         raise BadInputError(f"{name!r} is no release of an engine: type {_EXAMPLE}")
-    if match["engine"] != DEFAULT:
-        raise BadInputError(f"releases of {match['engine']} cannot be run, those of {DEFAULT} can")
+    check_name("engine", match["engine"], [name for name, engine in ENGINES.items() if engine.runs])
     return match["version"]
+
+
+def engine_of(name: str) -> str:
+    """The engine that a release's name has."""
+    return name.partition("==")[0]
 
 
 def folder() -> Path:
@@ -156,7 +161,7 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         BadInputError: As `version_of`, or there is no such Python.
         EngineError: It cannot be installed, or does not run.
     """
-    version, home = version_of(name), folder()
+    engine, version, home = engine_of(name), version_of(name), folder()
     if is_here(name):
         say(f"{name} is here already")
         return
@@ -173,12 +178,14 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         _run(name, *venv, str(place))
         for numpy in ("numpy", "numpy<2"):  # old wheels were built against NumPy 1, and do not say
             say(f"installing {name} and {numpy}")
-            _run(name, *pip, "--quiet", name, numpy)
-            code = f"import numpy, {DEFAULT} as engine; print(engine.__version__)"
+            # What a world of PyBullet's is sent as has a compiled model in it.
+            compiler = [] if engine == DEFAULT else [f"{DEFAULT}=={engine_version(DEFAULT)}"]
+            _run(name, *pip, "--quiet", name, numpy, *compiler)
+            code = f"import importlib.metadata as m, numpy, {engine}; print(m.version('{engine}'))"
             done = subprocess.run([own, "-I", "-c", code], capture_output=True, text=True)  # noqa: PLW1510
             if done.returncode == 0:
                 break
-        if done.stdout.strip() != version:
+        if done.stdout.split()[-1:] != [version]:
             said = (done.stdout + done.stderr).strip().splitlines() or ["it says nothing"]
             raise EngineError(f"{name} was installed and does not run: {said[-1]}")
         if not is_here(name):  # else another process was faster

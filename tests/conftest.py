@@ -469,13 +469,16 @@ def without_pybullet(without: Callable[..., dict[str, str]]) -> dict[str, str]:
     return without("pybullet")
 
 
-# An old one, one that is too old for the arm, and the one that is installed.
-RELEASES = ("mujoco==3.3.7", "mujoco==3.0.1", f"mujoco=={engine_version('mujoco')}")
+# An old one, one that is too old for the arm, the one that is installed, and one of PyBullet.
+RELEASES = (
+    *("mujoco==3.3.7", "mujoco==3.0.1"),
+    *(f"mujoco=={engine_version('mujoco')}", "pybullet==3.2.6"),
+)
 
 
 @pytest.fixture
 def old_releases(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A user with three releases; they stay in the environment of the tests."""
+    """A user with these releases; they stay in the environment of the tests."""
     monkeypatch.setenv("STATEMACHINE_ENGINES", str(Path(sys.prefix, "engines")))
     for name in RELEASES:
         releases.add(name, say=lambda _line: None)

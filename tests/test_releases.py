@@ -23,11 +23,13 @@ import statemachine as sm
 from statemachine import conformance, releases
 from statemachine.backends.release_backend import ServedEngine, Server, served
 from statemachine.cli import main
+from statemachine.compare.models import read
 from statemachine.errors import (
     BadInputError,
     EngineError,
     MissingEngineError,
     ModelError,
+    UnknownNameError,
     UnsupportedError,
 )
 from statemachine.installed import engine_version
@@ -37,7 +39,7 @@ from statemachine.worlds import make_worlds, step
 from .conftest import RELEASES, registered
 from .small_models import LINKS_AND_BALL, model_of
 
-OLD, STRANGE, SAME = RELEASES
+OLD, STRANGE, SAME, BULLET = RELEASES
 HOLD = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]
 MISSING, BAD_INPUT, SAYS_NO = 3, 2, 1
 
@@ -73,7 +75,8 @@ def run_of(model: Any, nstep: int = 400, call: int = 1) -> Any:
     [
         (OLD, MissingEngineError, f"statemachine engines add {OLD}"),
         ("mujoco==new", BadInputError, "type mujoco==3.3.7"),
-        ("pybullet==3.2.5", BadInputError, "releases of pybullet cannot be run"),
+        ("pybullet==3.2.5", MissingEngineError, "statemachine engines add pybullet==3.2.5"),
+        ("pinocchio==3.0.0", UnknownNameError, "no engine named 'pinocchio'"),
     ],
 )
 @pytest.mark.usefixtures("nothing")
@@ -184,8 +187,22 @@ class TestReleases:
         assert np.array_equal(together, singly[call - 1 :: call])
         assert data.time == pytest.approx(3.5)
 
-    def test_the_contract_is_kept(self) -> None:
-        assert not [o for o in conformance.run(SAME) if o.result == "failed"]
+    @pytest.mark.parametrize("release", [SAME, BULLET])
+    def test_the_contract_is_kept(self, release: str) -> None:
+        assert not [o for o in conformance.run(release) if o.result == "failed"]
+
+    @pytest.mark.parametrize("options", [{}, {"latency": 0.01}, {"defaults": "engine"}])
+    def test_two_releases_of_pybullet_move_alike(self, options: dict[str, Any]) -> None:
+        """What their NumPy adds up in another order is all; in contact, too."""
+        models = [sm.load("so101/scene", backend=b, **options) for b in ("pybullet", BULLET)]
+        (rows, ours), (others, theirs) = (run_of(model, 300, 5) for model in models)
+        assert models[1].engine_version == "3.2.6"
+        assert np.abs(rows - others).max() < 1e-12
+        assert len(ours.contacts) == len(theirs.contacts)
+        assert np.abs(ours.contacts.force - theirs.contacts.force).sum() < 1e-9
+        assert np.allclose(ours.site_xmat, theirs.site_xmat, atol=1e-12)
+        with pytest.raises(UnsupportedError, match="cannot be read here"):
+            read("so101", BULLET)
 
     def test_until_3_4_a_clamped_servo_damps(self, capsys: pytest.CaptureFixture[str]) -> None:
         """The update of velocities took kv in where the force is clamped; Euler's never did."""
@@ -275,7 +292,7 @@ class TestReleases:
 
     def test_a_kill_at_any_moment_is_one_error(self) -> None:
         """The next state goes on where the last call that ended was."""
-        model = sm.load("so101", backend=OLD)
+        model: Any = sm.load("so101", backend=OLD)
         rows, _ = run_of(model, 400, 20)
         data = sm.make_data(model)
         generator, ends = np.random.default_rng(0), list[str]()

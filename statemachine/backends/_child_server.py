@@ -78,14 +78,14 @@ class Answerer:
         return {"world": self.keep(self.engine.Simulation(self.things[job["model"]]))}, {}
 
     def run(self, job, content):
-        """Place a state if one is given, take a command and steps; one more is kept in reserve."""
+        """Place a state if one is given, take a command and steps, and one more if it is asked."""
         world = self.things[job["world"]]
         if len(content) > job["nu"]:
             world.place(content[job["nu"] :])
         world.command(content[: job["nu"]])
         taken = world.advance(job["steps"], job["fastest"])
         states = {"before": world.state()}
-        if taken == job["steps"]:
+        if taken == job["steps"] and job["ahead"]:
             world.advance(1, np.inf)
             states["after"] = world.state()
         return {"taken": taken}, states

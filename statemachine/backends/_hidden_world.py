@@ -184,22 +184,27 @@ class LookAhead:
 
     def at(self, moment: Moment) -> dict[str, Any]:
         """Contacts, forces and poses of a moment, all that the engine tells."""
-        values = dict[str, Any]()
-
-        def read(name: str) -> Any:
-            if name in POSES and name not in values:
-                values.update(world.kinematics(moment.qpos, name))
-            if name not in values:
-                values.update(world.derive(name, moment, read))
-            return values[name]
-
         with HiddenWorld.lock:
             self.world = world = self._open() if self.world is None else self.world.renewed()
             world.look(moment)
-            for name in ("contacts", *DERIVED):
-                if name not in world.untold:
-                    read(name)
-        return values
+            return derived_by(world, moment)
+
+
+def derived_by(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
+    """Contacts, forces and poses of a moment that a world's last step started from, or `look`."""
+    values = dict[str, Any]()
+
+    def read(name: str) -> Any:
+        if name in POSES and name not in values:
+            values.update(world.kinematics(moment.qpos, name))
+        if name not in values:
+            values.update(world.derive(name, moment, read))
+        return values[name]
+
+    for name in ("contacts", *DERIVED):
+        if name not in world.untold:
+            read(name)
+    return values
 
 
 def bounded(qpos: Array, qvel: Array, fastest: float) -> bool:

@@ -1,17 +1,23 @@
-"""An engine that runs in a Python of its own, and the pipes to its process; see `_child_server`."""
+"""An engine in a Python of its own, its process, and worlds there; see `_child_server`."""
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import threading
-from typing import Any, NamedTuple
+import weakref
+from collections.abc import Callable
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from ..interface import Array
+from ..errors import EngineError
+from ..interface import DERIVED, Array, Contacts
+from ..interface.checks import HUGE
 from ..processes.pipes import PipedChild
 from . import _child_server
+from ._hidden_world import HiddenWorld, Memory, Moment, Read
 
 _FILE = _child_server.__file__
 
@@ -34,6 +40,10 @@ class ServedEngine(NamedTuple):
 
 class LostError(Exception):
     """The process of an engine has ended."""
+
+
+class AnswerError(Exception):
+    """What is asked of an engine in its process raised an error there."""
 
 
 class Server:
@@ -65,7 +75,7 @@ class Server:
 
         Raises:
             LostError: It has ended.
-            ValueError: It raised an error, with its text.
+            AnswerError: It raised an error, with its text.
         """
         blob = b"".join(array.tobytes() for array in content)
         sizes = _child_server.SIZES
@@ -87,9 +97,126 @@ class Server:
             self._process.kill()
             raise
         if "error" in answer:
-            raise ValueError(answer["error"])
+            raise AnswerError(answer["error"])
         arrays, start = dict[str, Array](), 0
         for name, shape in answer["arrays"]:
             stop = start + int(np.prod(shape))
             arrays[name], start = values[start:stop].reshape(shape).copy(), stop
         return answer, arrays
+
+
+class ServedWorld(HiddenWorld):
+    """A world in the process of an engine; the engine's own object is there."""
+
+    errors, raw = (LostError, AnswerError), None
+
+    def __init__(
+        self,
+        engine: ServedEngine,
+        opened: Callable[[Server], tuple[int, dict[str, Any]]],
+        qpos0: Array,
+        sizes: tuple[int, int],
+        timestep: float,
+        ahead: bool,
+    ) -> None:
+        """Open it.
+
+        Args:
+            engine: Whose process it is in.
+            opened: Loads the model there; its number, and what is said of it.
+            qpos0: (nq,) positions of the default state.
+            sizes: nv and nu.
+            timestep: Of an engine step [s].
+            ahead: Whether the steps of a call have one command, so that one exchange takes all.
+        """
+        self.engine, self._engine, self._opened, self._ahead = engine.title, engine, opened, ahead
+        self.timestep, self.qpos0 = timestep, qpos0
+        self._ctrl, self._fastest = np.zeros(sizes[1]), HUGE
+        self._derived: dict[str, Array] | None = None
+        self._begin()
+        lengths = [len(qpos0), sizes[0], *(length for _, length in self.memory_layout)]
+        self._cuts = np.cumsum(lengths)[:-1]
+        self._state, self._reserve = np.zeros(sum(lengths)), None
+
+    def _begin(self) -> None:
+        """Be in the process of the engine, which begins anew where it has ended."""
+        self._server, self._placed = Server.of(self._engine), True
+        try:
+            model, said = self._opened(self._server)
+            self._world = self._server.ask("make", model=model)[0]["world"]
+        except (LostError, AnswerError) as error:
+            raise EngineError(f"{self.engine} cannot make a world: {error}") from error
+        self.memory_layout = tuple((name, int(length)) for name, length in said["memory"])
+        self.untold = frozenset(said.get("untold", ()))
+        # No call: it may be collected in the midst of another.
+        self._end = weakref.finalize(self, _forget, self._server, model, self._world)
+
+    def _ask(self, verb: str, *content: Array, **job: Any) -> tuple[Any, dict[str, Array]]:
+        return self._server.ask(verb, *content, world=self._world, nu=len(self._ctrl), **job)
+
+    def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
+        self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
+        self._reserve = None
+
+    def command(self, ctrl: Array) -> None:
+        self._ctrl = ctrl
+        if self._reserve is not None:  # it was taken under another command
+            self._placed, self._reserve = True, None
+
+    def _run(self, steps: int) -> int:
+        if not self._server.lives:
+            self._begin()
+        placed = [self._state] if self._placed else []
+        job = {"steps": steps, "fastest": self._fastest, "ahead": self._ahead or not steps}
+        answer, states = self._ask("run", self._ctrl, *placed, **job)
+        self._placed, self._derived, self._state = False, None, states["before"]
+        self._reserve = states.get("after")
+        return answer["taken"]
+
+    def advance(self, steps: int, fastest: float) -> int:
+        self._fastest = fastest
+        return self._run(steps)
+
+    def step(self) -> None:
+        if self._reserve is None:
+            self._run(0)
+        self._state, self._reserve = cast("Array", self._reserve), None
+
+    def read(self) -> tuple[Array, Array]:
+        qpos, qvel, *_ = np.split(self._state, self._cuts)
+        return qpos.copy(), qvel.copy()
+
+    @property
+    def memory(self) -> Memory:
+        return tuple(part.copy() for part in np.split(self._state, self._cuts)[2:])
+
+    def look(self, moment: Moment) -> None:
+        if not self._server.lives:
+            self._begin()
+        state = np.concatenate([moment.qpos, moment.qvel, *moment.memory])
+        _, self._derived = self._ask("look", moment.ctrl, state)
+        self._placed = True
+
+    def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
+        if self._derived is None:
+            _, self._derived = self._ask("look")
+        arrays = dict(self._derived)
+        values: dict[str, Any] = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
+        if "contacts" not in self.untold:
+            geom = arrays.pop("geom").astype(np.int64)
+            values["contacts"] = Contacts(geom=geom, **arrays)
+        return values
+
+    def close(self) -> None:
+        self._end()
+
+
+def _forget(server: Server, *numbers: int) -> None:
+    server.forgotten.extend(numbers)
+
+
+def sent(opener: bytes, server: Server) -> tuple[int, dict[str, Any]]:
+    """A pickled opener of worlds, told to a process that has this package."""
+    text = base64.b64encode(opener).decode()
+    said, _ = server.ask("load", file="", text=text, fields=[])
+    return said["model"], said

@@ -8,8 +8,9 @@ when fresh, values that a write leaves alone. The capability record says where.
 from __future__ import annotations
 
 import os
+import pickle
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
@@ -29,6 +30,7 @@ from ..interface import (
 from ..interface.checks import HUGE
 from ..interface.options import checked_options
 from ..measures.text import few
+from ..releases import version_of
 from . import _bullet_urdf as urdf
 from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import Act, DrivenWorld
@@ -36,6 +38,8 @@ from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored, softness
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._hidden_data import HiddenModel
+from ._hidden_world import HiddenWorld
+from ._served import ServedEngine, ServedWorld, sent
 from .compiled import (
     check_numbers,
     compile_file,
@@ -134,6 +138,8 @@ def load(
     path: str | os.PathLike[str],
     defaults: Literal["model", "engine"] = "model",
     options: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    there: ServedEngine | None = None,
 ) -> PybulletModel:
     """Compile an MJCF, URDF or MJB file, and write it as URDF for PyBullet.
 
@@ -143,6 +149,7 @@ def load(
         defaults: "engine" is what `loadURDF` gives: velocity motors in the joints,
             damping 0.04, friction 0.5, inertias of the collision shapes, no gravity until
             it is set, 1/240 s a step. ctrl is then what POSITION_CONTROL aims at.
+        there: Another release of the engine, in whose process worlds are; None for the installed.
 
     Raises:
         ModelError: It cannot be compiled, or PyBullet cannot read what was written.
@@ -168,8 +175,11 @@ def load(
         raw = with_room(raw)
     plan = Plan(raw)
     check(plan, "pybullet")
-    model = PybulletModel(plan, Path(path), substeps, defaults, checked.get("max_qvel"))
-    World(plan, model._kind).close()  # what PyBullet cannot read shows now
+    model = PybulletModel(
+        plan, Path(path), substeps, defaults, checked.get("max_qvel"), there=there
+    )
+    # What PyBullet cannot read shows now.
+    (model._open_world() if there else World(plan, model._kind)).close()
     if defaults == "model":
         _tell(plan, ignored(plan), stacklevel=4)
     return model._started_as(model, checked)
@@ -198,6 +208,7 @@ class PybulletModel(HiddenModel):
     acts: tuple[Act, ...]
     _kind: Literal["stepped", "engine"]
     _asked: Array | None  # max_qvel, where it was set
+    _there: ServedEngine | None
 
     def __init__(
         self,
@@ -207,14 +218,22 @@ class PybulletModel(HiddenModel):
         defaults: Literal["model", "engine"],
         max_qvel: Array | None = None,
         acts: tuple[Act, ...] = (),
+        there: ServedEngine | None = None,
     ) -> None:
         as_it_comes, raw = defaults == "engine", plan.raw
         bound = fastest(raw) if max_qvel is None else max_qvel
         kind: Literal["stepped", "engine"] = "engine" if as_it_comes else "stepped"
+        about = facts(raw)
+        opener: Callable[[], HiddenWorld] = partial(DrivenWorld, plan, kind, acts)
+        if there:
+            sizes, ahead = (int(raw.nv), int(raw.nu)), not about["actuator_delay"].any()
+            load_there = partial(sent, pickle.dumps(opener))
+            timestep = float(raw.opt.timestep)
+            opener = partial(ServedWorld, there, load_there, raw.qpos0, sizes, timestep, ahead)
         super().__init__(
-            partial(DrivenWorld, plan, kind, acts),
-            backend="pybullet",
-            engine_version=engine_version("pybullet"),
+            opener,
+            backend=there.name if there else "pybullet",
+            engine_version=version_of(there.name) if there else engine_version("pybullet"),
             path=path,
             raw={
                 raw.body(b).name or f"body {b}": plan.described(b, kind)[0]
@@ -224,12 +243,13 @@ class PybulletModel(HiddenModel):
             max_qvel=bound,
             timestep=float(raw.opt.timestep) * substeps,
             substeps=substeps,
-            **{**facts(raw), **({"_clamps": False} if as_it_comes else {})},
+            **{**about, **({"_clamps": False} if as_it_comes else {})},
             plan=plan,
             defaults=defaults,
             acts=acts,
             _kind=kind,
             _asked=max_qvel,
+            _there=there,
         )
 
     @property
@@ -259,4 +279,6 @@ class PybulletModel(HiddenModel):
     def _of(self, raw: mujoco.MjModel, substeps: int, asked: Array | None) -> PybulletModel:
         plan = Plan(raw)
         check(plan, "pybullet")
-        return PybulletModel(plan, self.path, substeps, self.defaults, asked, self.acts)
+        return PybulletModel(
+            plan, self.path, substeps, self.defaults, asked, self.acts, self._there
+        )

@@ -1,4 +1,4 @@
-"""An engine in a Python of its own behind the contract: another release of MuJoCo, or any other.
+"""An engine in a Python of its own behind the contract: another release of one, or any other.
 
 Its process compiles the file itself. Here the same file is compiled by the release that is
 installed, and takes over every number that the process reads in it: so a Model shows what the
@@ -10,24 +10,22 @@ from __future__ import annotations
 import copy
 import hashlib
 import os
-import weakref
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple
 
 import mujoco
 import numpy as np
 
 from ..errors import EngineError, ModelError, UnsupportedError
-from ..interface import DERIVED, Array, Capabilities, Contacts
-from ..interface.checks import HUGE
-from ..releases import is_release, python_of, version_of
+from ..installed import DEFAULT, require
+from ..interface import Array, Capabilities
+from ..releases import engine_of, is_release, python_of, version_of
 from . import _release_child as child
 from ._edits import held, put
 from ._hidden_data import HiddenModel
-from ._hidden_world import HiddenWorld, Memory, Moment, Read
-from ._served import LostError, ServedEngine, Server
+from ._served import AnswerError, LostError, ServedEngine, ServedWorld, Server
 from .binary import is_binary
 from .compiled import check_numbers, facts, fastest, spec_with_packages
 from .mujoco_backend import MujocoModel
@@ -45,20 +43,27 @@ _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mj
 
 def load(
     path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model", *, release: str
-) -> ServedModel:
-    """Compile a file in both releases.
+) -> HiddenModel:
+    """Compile a file in both releases; a release of PyBullet's gets what the installed one gets.
 
     Args:
         path: An MJCF or URDF file.
-        defaults: As of the installed MuJoCo.
+        defaults: As of the installed engine.
         release: As "mujoco==3.3.7".
 
     Raises:
-        MissingEngineError: That release has no environment here.
+        MissingEngineError: That release has no environment here, or its engine is not installed.
         ModelError: One of the two cannot read the file, or they read different parts in it.
     """
-    title, python = f"MuJoCo {version_of(release)}", str(python_of(release))
-    return served(ServedEngine(release, python, child.__file__, title))(path, defaults)
+    python, version = str(python_of(release)), version_of(release)
+    if engine_of(release) == DEFAULT:
+        there = ServedEngine(release, python, child.__file__, f"MuJoCo {version}")
+        return served(there)(path, defaults)
+    require("pybullet")
+    from .pybullet_backend import load as load_bullet
+
+    file = str(Path(__file__).with_name("_bullet_release_child.py"))
+    return load_bullet(path, defaults, there=ServedEngine(release, python, file, release))
 
 
 def served(
@@ -92,8 +97,6 @@ class FileReading(NamedTuple):
         version: Of the engine.
         model: In the installed release's terms.
         shared: Names of the fields that both have.
-        memory: Name and length of each array that the engine remembers from step to step.
-        untold: Names of what is derived that it does not tell.
         digest: Of what was read, by which a file that changed since then is seen.
     """
 
@@ -101,8 +104,6 @@ class FileReading(NamedTuple):
     version: str
     model: MujocoModel
     shared: frozenset[str]
-    memory: tuple[tuple[str, int], ...]
-    untold: frozenset[str]
     digest: str
 
 
@@ -115,7 +116,7 @@ def _compiled(engine: ServedEngine, path: Path, installed: MujocoModel) -> FileR
     server, raw, title = Server.of(engine), copy.copy(installed.raw), engine.title
     try:
         answer, fields, digest = _loaded(server, path, raw)
-    except ValueError as error:
+    except AnswerError as error:
         raise ModelError(f"{title} cannot read {path}: {error}") from error
     except LostError as error:
         anew = f"; to make it anew: statemachine engines remove {engine.name}, then add"
@@ -146,8 +147,6 @@ def _compiled(engine: ServedEngine, path: Path, installed: MujocoModel) -> FileR
         answer["version"],
         MujocoModel(raw, path, installed.substeps),
         frozenset(shared),
-        tuple((name, int(length)) for name, length in answer["memory"]),
-        frozenset(answer.get("untold", ())),
         digest,
     )
 
@@ -164,13 +163,15 @@ def _loaded(
     return answer, fields, hashlib.sha256(read).hexdigest()
 
 
-def _opened(server: Server, reading: FileReading, edits: Mapping[str, Any]) -> tuple[int, int]:
-    """A world of a file with some fields edited: the numbers of its model and of itself."""
+def _opened(
+    reading: FileReading, edits: Mapping[str, Any], server: Server
+) -> tuple[int, dict[str, Any]]:
+    """A file with some fields edited: the number of its model there, and what is said of it."""
     path = reading.model.path
-    answer, _, digest = _loaded(server, path, reading.model.raw)
-    number = answer["model"]
+    said, _, digest = _loaded(server, path, reading.model.raw)
+    number = said["model"]
     if digest != reading.digest:
-        raise ValueError(f"{path} is another file than when it was loaded")
+        raise AnswerError(f"{path} is another file than when it was loaded")
     if edits:
         arrays = {name: value for name, value in edits.items() if name not in _FLAGS}
         answer, _ = server.ask(
@@ -182,7 +183,7 @@ def _opened(server: Server, reading: FileReading, edits: Mapping[str, Any]) -> t
         )
         server.forgotten.append(number)
         number = answer["model"]
-    return number, server.ask("make", model=number)[0]["world"]
+    return number, said
 
 
 def _fields(raw: mujoco.MjModel) -> Iterator[str]:
@@ -235,7 +236,15 @@ class ServedModel(HiddenModel):
         engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner
         edits = _edits(reading, engine.raw)
         super().__init__(
-            partial(ServedWorld, reading, edits, float(inner.raw.opt.timestep)),
+            partial(
+                ServedWorld,
+                reading.engine,
+                partial(_opened, reading, edits),
+                inner.raw.qpos0.copy(),
+                (inner.nv, inner.nu),
+                float(inner.raw.opt.timestep),
+                not inner.actuator_delay.any(),
+            ),
             backend=reading.engine.name,
             engine_version=reading.version,
             raw=inner.raw,
@@ -261,94 +270,3 @@ class ServedModel(HiddenModel):
 
     def _replace(self, options: dict[str, Any]) -> ServedModel:
         return ServedModel(self._reading, self._own, self._inner._replace(options))
-
-
-class ServedWorld(HiddenWorld):
-    """A world in the process of an engine; the engine's own object is there."""
-
-    errors, raw = (LostError,), None
-
-    def __init__(self, reading: FileReading, edits: Mapping[str, Any], timestep: float) -> None:
-        """Open it; `timestep` is that of an engine step [s]."""
-        raw = reading.model.raw
-        self.engine, self.timestep = reading.engine.title, timestep
-        self._reading, self._edits, self.qpos0 = reading, edits, np.array(raw.qpos0)
-        self.memory_layout, self.untold = reading.memory, reading.untold
-        lengths = [raw.nq, raw.nv, *(length for _, length in reading.memory)]
-        self._cuts = np.cumsum(lengths)[:-1]
-        self._ctrl, self._fastest = np.zeros(raw.nu), HUGE
-        self._state, self._reserve = np.zeros(sum(lengths)), None
-        self._derived: dict[str, Array] | None = None
-        self._begin()
-
-    def _begin(self) -> None:
-        """Be in the process of the engine, which begins anew where it has ended."""
-        self._server, self._placed = Server.of(self._reading.engine), True
-        try:
-            self._model, self._world = _opened(self._server, self._reading, self._edits)
-        except (LostError, ValueError) as error:
-            raise EngineError(f"{self.engine} cannot make a world: {error}") from error
-        # No call: it may be collected in the midst of another.
-        self._end = weakref.finalize(self, _forget, self._server, self._model, self._world)
-
-    def _ask(self, verb: str, *content: Array, **job: Any) -> tuple[Any, dict[str, Array]]:
-        return self._server.ask(verb, *content, world=self._world, nu=len(self._ctrl), **job)
-
-    def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
-        self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
-        self._reserve = None
-
-    def command(self, ctrl: Array) -> None:
-        self._ctrl = ctrl
-        if self._reserve is not None:  # it was taken under another command
-            self._placed, self._reserve = True, None
-
-    def _run(self, steps: int) -> int:
-        if not self._server.lives:
-            self._begin()
-        placed = [self._state] if self._placed else []
-        answer, states = self._ask("run", self._ctrl, *placed, steps=steps, fastest=self._fastest)
-        self._placed, self._derived, self._state = False, None, states["before"]
-        self._reserve = states.get("after")
-        return answer["taken"]
-
-    def advance(self, steps: int, fastest: float) -> int:
-        self._fastest = fastest
-        return self._run(steps)
-
-    def step(self) -> None:
-        if self._reserve is None:
-            self._run(0)
-        self._state, self._reserve = cast("Array", self._reserve), None
-
-    def read(self) -> tuple[Array, Array]:
-        qpos, qvel, *_ = np.split(self._state, self._cuts)
-        return qpos.copy(), qvel.copy()
-
-    @property
-    def memory(self) -> Memory:
-        return tuple(part.copy() for part in np.split(self._state, self._cuts)[2:])
-
-    def look(self, moment: Moment) -> None:
-        if not self._server.lives:
-            self._begin()
-        state = np.concatenate([moment.qpos, moment.qvel, *moment.memory])
-        _, self._derived = self._ask("look", moment.ctrl, state)
-        self._placed = True
-
-    def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
-        if self._derived is None:
-            _, self._derived = self._ask("look")
-        arrays = dict(self._derived)
-        values: dict[str, Any] = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
-        if "contacts" not in self.untold:
-            geom = arrays.pop("geom").astype(np.int64)
-            values["contacts"] = Contacts(geom=geom, **arrays)
-        return values
-
-    def close(self) -> None:
-        self._end()
-
-
-def _forget(server: Server, *numbers: int) -> None:
-    server.forgotten.extend(numbers)

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ... import __version__
-from ...backends import backend_engine, backend_names, load
+from ...backends import backend_names, check_backend, load
 from ...engines import room, rooms_with
 from ...engines.description import urdf
 from ...engines.description.match import renamed
@@ -30,7 +30,7 @@ from ...errors import StateMachineError, UnsupportedError, unknown_name
 from ...installed import DEFAULT
 from ...models import SUFFIXES, resolve
 from ...probes import conventions
-from ...releases import is_release
+from ...releases import engine_of, is_release
 from .compiled import compiled, enter_rest
 from .diff import Posed, diff
 from .ledger import AgreedFigures, Difference, Ledger
@@ -151,13 +151,14 @@ def read(
         if path.suffix.lower() == ".urdf":
             return urdf.read(path)
         return room(DEFAULT).read_file(path, name)
-    if is_release(engine):
+    release = is_release(engine)
+    if release and engine_of(engine) == DEFAULT:
         loaded = load(path, backend=engine, defaults="engine")
         described = room(DEFAULT).describe(loaded.compiled, name)
         return replace(described, reader=engine.replace("==", " "), format="engine")
-    backend_engine(engine)
-    own = room(engine)
-    if not own.can("read"):
+    check_backend("engine", engine)
+    own = room(engine_of(engine))
+    if release or not own.can("read"):
         known = ", ".join(rooms_with("read"))
         raise UnsupportedError(
             f"what {engine} makes of a file cannot be read here; known: {known}",
@@ -199,7 +200,7 @@ def compare(
     formats, skipped = [robot.format for robot in robots], list[str]()
     compilers = [engine or DEFAULT for engine in engines]
     differences, matched = {}, None
-    if all(name == DEFAULT or is_release(name) for name in compilers) and formats != ["URDF"] * 2:
+    if all(engine_of(name) == DEFAULT for name in compilers) and formats != ["URDF"] * 2:
         try:
             models = [
                 load(resolve(m, menagerie), backend=name, defaults="engine")
