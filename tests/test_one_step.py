@@ -11,11 +11,13 @@ import statemachine as sm
 from statemachine.compare import StepComparison, one_step, rerun_of
 from statemachine.compare.one_step import RELATIVE
 from statemachine.compare.stages import STAGES
+from statemachine.compare.why import explain
 from statemachine.errors import BadInputError
 from statemachine.report.steps import one_step as page
 from statemachine.runs.rerun import Rerun
 from statemachine.runs.scenarios import scenario
 
+from .conftest import assert_in, refused
 from .small_models import LINKS_AND_BALL, model_of
 
 CHANGES = {
@@ -48,12 +50,16 @@ def first(found: StepComparison) -> str:
     return found.first.stage if found.first else ""
 
 
+def verdict(found: StepComparison) -> Any:
+    return page(found, ("one", "two"), "hold").blocks[-1]
+
+
 def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> None:
     found = stepped(tmp_path, LINKS_AND_BALL)
     assert [gap.stage for gap in found.stages] == list(STAGES)
     assert {gap.worst for gap in found.stages} == {0.0}
     assert {gap.null for gap in found.stages} == {0.0}
-    assert found.first is None
+    assert_in(verdict(found).text, "the same step", "last bit")
     assert not found.spikes
     assert all(gap.told for gap in found.stages)
 
@@ -97,9 +103,17 @@ def test_a_later_stage_leads_where_no_earlier_one_differs(tmp_path: Path) -> Non
     assert touching == stages["contact force"].beyond > 0
     assert touching + apart == found.moments
     assert stages["velocity update"].leads == 0
-    headline = page(found, ("one", "two"), "hold").headline
-    assert headline
-    assert f"is other constraints ({apart}): earlier stages differ" in headline.end
+    assert f"At other moments it is other constraints ({apart}): earlier" in verdict(found).text
+
+
+def test_the_verdict_names_no_cause_that_why_contradicts() -> None:
+    """A link 0.5 % heavier shows first in a step, and damping of three halves moves the arm."""
+    hold, one = scenario("hold"), sm.load("so101")
+    two = one.replace(damping=1.5 * one.dof_damping, mass=1.005 * one.body_mass)
+    assert explain(one, two, hold, jobs=1).shares[0].name.startswith("damping")
+    found = one_step(rerun_of(hold, one), two, moments=50)
+    assert first(found) == "mass matrix"
+    assert_in(verdict(found).text, "force: passive, ", "--why")
 
 
 def test_joints_in_another_order_are_matched(tmp_path: Path) -> None:
@@ -124,13 +138,13 @@ def test_moments_are_spread_over_the_run(tmp_path: Path) -> None:
     found = stepped(tmp_path, LINKS_AND_BALL, moments=20)
     assert (found.moments, found.every) == (20, 5)
     assert found.until == pytest.approx(0.475)
-    with pytest.raises(BadInputError, match="at least one moment"):
-        stepped(tmp_path, LINKS_AND_BALL, moments=0)
+    refused(
+        (BadInputError, "one moment", lambda: stepped(tmp_path, LINKS_AND_BALL, moments=0)),
+    )
 
 
 def test_models_without_a_common_joint_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match="no joint in common"):
-        stepped(tmp_path, "<mujoco/>")
+    refused((BadInputError, "no joint in common", lambda: stepped(tmp_path, "<mujoco/>")))
 
 
 @pytest.mark.usefixtures("bullet")

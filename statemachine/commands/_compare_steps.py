@@ -16,7 +16,7 @@ OPTIONS: tuple[Row, ...] = (
     (
         "--one-step",
         "",
-        "one step on each side from each state of the left one: the stage that parts first",
+        "one step on each side from each state of the left one: the first stage that differs",
     ),
     (
         "--converge",

@@ -28,7 +28,7 @@ ARRAYS = {
     ACCELERATION: ("qacc",),
 }
 STAGES = (KINEMATICS, MASS, "bias", "actuator", "passive", FOUND, *list(ARRAYS)[3:], AFTER)
-_FORCES = ("bias", "actuator", "passive", FORCE, "other constraints")
+FORCES = ("bias", "actuator", "passive", FORCE, "other constraints")
 _WORDS = {"qfrc_friction": "dry friction", "qfrc_limit": "limit", "qfrc_equality": "equality"}
 _UNITS = ("m", "rad", "kg·m²", "kg·m", "kg", "N·m", "N", "rad/s²", "m/s²")
 _LEAST = 1e-3  # of the largest: a size that is less is not usual
@@ -276,12 +276,12 @@ def measures(
     by_unit = [measure for column, sides in columns for measure in _by_unit(column, *sides)]
     # What is nothing but rounding, as the contact force of a run in which nothing touches,
     # is held against the other forces, and accelerations against what forces give.
-    least = {unit: _largest_scale(by_unit, _FORCES, unit) for unit in ("N·m", "N")}
+    least = {unit: _largest_scale(by_unit, FORCES, unit) for unit in ("N·m", "N")}
     for unit, force, mass in (("rad/s²", "N·m", "kg·m²"), ("m/s²", "N", "kg")):
         largest = _largest_scale(by_unit, (MASS,), mass)
         least[unit] = least[force] / largest if largest else 0.0
     for measure in by_unit:
-        if measure.stage in (*_FORCES, ACCELERATION, AFTER):
+        if measure.stage in (*FORCES, ACCELERATION, AFTER):
             measure.scale = max(measure.scale, _LEAST * least[measure.unit])
         measure.tolerance = relative * measure.scale
     return by_unit

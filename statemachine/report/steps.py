@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from ..compare import Comparison, QuantityLimit, StepComparison, TimestepConvergence
 from ..compare.one_step import StageGap
+from ..compare.stages import FORCES
 from ..measures.text import NONE, figure, listed, milliseconds, quantity, sentence, short_time
-from ..page import Headline, Items, Page, Table, Text
+from ..page import Headline, Items, Page, Table
 from . import template
 from .finding import leading, moment, name_of
 from .template import if_true
@@ -23,25 +24,16 @@ TOUCH = {
     True: "Before the first touch, at {touch}, there is no gap.",
     False: "Before the first touch, at {touch}, there is nothing but discretisation.",
 }
-SAME_BITS = "From the same state both sides take the same step, to the last bit"
-SAME_STEP = "From the same state both sides take the same step"
-PART = "The sides part in the stage “{stage}”, {when} (at {beyond} of {moments} moments): {where}"
-BEFORE = "What comes before it in a step is the same on both sides."
-OTHERS = (
-    "At other moments the first stage that differs is {stages}: earlier stages differ by too "
-    "little there, or it has a cause of its own."
-)
 CHANGED = "The motion changes between {pairs}"
 SAME = "The motion is the same on all of them, within its tolerances"
 
 
-def convergence(result: TimestepConvergence, experiment: str, said: Sequence[str] = ()) -> Page:
+def convergence(result: TimestepConvergence, experiment: str) -> Page:
     """What vanishes with the timestep, and what does not.
 
     Args:
         result: What was found.
         experiment: What was run.
-        said: Lines to say before anything else.
     """
     at = "" if result.touch is None else short_time(result.touch)
     title = f"The gap with finer steps, before the first touch at {at}"
@@ -53,7 +45,6 @@ def convergence(result: TimestepConvergence, experiment: str, said: Sequence[str
         left=result.labels[0],
         right=result.labels[1],
         until=result.until,
-        said=[Text(line) for line in said],
         steps=" and ".join(steps),
         before=_limits(result.before, title) if at else None,
         whole=_limits(result.whole, "The gap with finer steps, over the whole run"),
@@ -108,30 +99,32 @@ def _own(limits: Sequence[QuantityLimit], side: str) -> str | None:
     return most and f"{quantity(getattr(most, side)[0], most.unit)} ({name_of(most.name)})"
 
 
-def one_step(
-    result: StepComparison, labels: tuple[str, str], experiment: str, said: Sequence[str] = ()
-) -> Page:
+def one_step(result: StepComparison, labels: tuple[str, str], experiment: str) -> Page:
     """What each stage of a step gives on both sides: what parts first, and where.
 
     Args:
         result: What was found.
         labels: What the sides are called.
         experiment: What was run.
-        said: Lines to say before anything else.
     """
     compared = [gap for gap in result.stages if gap.told and gap.unit]
     null = max(compared, key=lambda gap: gap.null / (gap.tolerance or 1e-300))
     notes = [f"{gap.stage} is not compared: {gap.reason}." for gap in result.stages if not gap.told]
     notes += [sentence(line) for line in result.notes]
+    first = result.first
+    differ = [gap for gap in result.stages if gap.beyond]
+    forces = {  # the largest of each unit
+        gap.unit: f"{gap.stage}, {quantity(gap.worst, gap.unit)} at {moment(gap.at)} s, {gap.where}"
+        for gap in sorted(differ, key=lambda gap: gap.worst)
+        if gap.stage in FORCES
+    }
     return template.page(
         "one_step",
-        _of_the_step(result),
         experiment=experiment,
         left=labels[0],
         right=labels[1],
         moments=result.moments,
         until=result.until,
-        said=[Text(line) for line in said],
         every=result.every,
         primed=result.primed or "nothing",
         stages=_stages(result),
@@ -151,6 +144,15 @@ def one_step(
             words={"joint", "first stage", "where"},
         ),
         notes=Items(notes),
+        same=None if first else True,
+        exact=if_true(all(gap.worst == 0 for gap in result.stages)),
+        differs=False if first else None,
+        first=first and first.stage,
+        since=first and moment(first.first),
+        beyond=first and first.beyond,
+        where=first and first.where,
+        others=listed([f"{g.stage} ({g.leads})" for g in differ if g.leads and g != first]) or None,
+        forces="; ".join(forces.values()) or None,
     )
 
 
@@ -179,20 +181,6 @@ def _stage_cells(gap: StageGap) -> tuple[str, ...]:
         quantity(gap.null, gap.unit),
         quantity(gap.tolerance, gap.unit),
     )
-
-
-def _of_the_step(result: StepComparison) -> Headline:
-    first = result.first
-    if first is None:
-        same = all(gap.worst == 0 for gap in result.stages)
-        return Headline(SAME_BITS if same else SAME_STEP)
-    when = "from the start" if first.first == 0 else f"from {short_time(first.first or 0.0)} on"
-    lead = PART.format(
-        stage=first.stage, when=when, beyond=first.beyond, moments=result.moments, where=first.where
-    )
-    others = [f"{gap.stage} ({gap.leads})" for gap in result.stages if gap.leads and gap != first]
-    end = f"{BEFORE} {OTHERS.format(stages=listed(others))}" if others else BEFORE
-    return Headline(lead, end=end, holds=False)
 
 
 def versions(comparisons: Sequence[Comparison], experiment: str) -> Page:
