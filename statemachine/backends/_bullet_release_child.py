@@ -20,8 +20,8 @@ sys.path.append(str(Path(__file__).parents[2]))
 from statemachine.backends._hidden_world import Moment, derived_by
 
 
-class Simulation:
-    """A world."""
+class SentWorld:
+    """A world that was sent."""
 
     def __init__(self, model) -> None:
         self.world = model.pop()
@@ -65,6 +65,9 @@ class Simulation:
         values = derived_by(self.world, self.start)
         contacts = vars(values.pop("contacts"))
         return {name: values[name] for name in values.keys() - self.world.untold} | contacts
+
+
+Simulation = SentWorld
 
 
 def load(file, text, names):
