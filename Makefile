@@ -113,7 +113,7 @@ DIR ?= models
 robots: $(VENV)/run.stamp
 	@$(BIN)/statemachine robots $(DIR)
 
-# make traces       record on PyBullet anew what the package brings for where it has no wheel
+# make traces       record anew what the package brings of engines that may not be here
 traces: $(VENV)/run.stamp
 	@$(BIN)/python models/so101/make_traces.py
 

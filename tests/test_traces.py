@@ -22,6 +22,10 @@ from statemachine.errors import (
     TraceError,
     UnknownNameError,
 )
+from statemachine.lessons import LESSONS
+from statemachine.lessons.hold import OLDER
+from statemachine.lessons.session import take
+from statemachine.releases import is_release
 from statemachine.runs import (
     COLUMNS,
     CONTACTS,
@@ -407,7 +411,7 @@ def test_what_a_trace_cannot_do_is_refused(box: Trace, tmp_path: Path) -> None:
 
 def test_each_scenario_was_recorded_with_both_defaults() -> None:
     expected = {f"{name}.pybullet{end}" for name in SCENARIOS for end in ("", ".engine")}
-    assert set(shipped_names()) == expected
+    assert set(shipped_names()) == {*expected, f"hold.{OLDER}"}
     trace = shipped("hold", "pybullet", "engine")
     assert trace.header.recorded
     assert trace.header.defaults == "engine"
@@ -420,6 +424,7 @@ def test_each_scenario_was_recorded_with_both_defaults() -> None:
     [
         name if name.startswith("droop") else pytest.param(name, marks=pytest.mark.slow)
         for name in shipped_names()
+        if not is_release(name)
     ],
 )
 @pytest.mark.usefixtures("bullet")
@@ -430,6 +435,27 @@ def test_a_recorded_trace_is_what_the_engine_does_here(
     if (sys.platform, platform.machine()) != ("linux", "x86_64"):
         pytest.skip("recorded on Linux x86-64: another compiler gives other bits")
     monkeypatch.syspath_prepend(ROOT / "models" / "so101")
+    _is_as_recorded(name)
+
+
+@pytest.mark.slow
+@pytest.mark.network
+@pytest.mark.usefixtures("old_releases")
+def test_the_recorded_run_of_an_older_release_is_what_it_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "models" / "so101")
+    _is_as_recorded(f"hold.{OLDER}")
+    model = sm.load("so101/scene")
+    here = take(LESSONS["hold"], model, "mujoco", {}).result.older
+    monkeypatch.setenv("STATEMACHINE_ENGINES", "nowhere")
+    assert here == dataclasses.replace(
+        take(LESSONS["hold"], model, "mujoco", {}).result.older, recorded=False
+    )
+    assert np.degrees(here.gap) == pytest.approx(6.12, abs=0.01)
+
+
+def _is_as_recorded(name: str) -> None:
     import make_traces  # pyright: ignore[reportMissingImports]
 
     assert set(make_traces.RUNS) == set(shipped_names())

@@ -1,36 +1,39 @@
-"""Record on PyBullet every scenario of `statemachine compare`: `make traces`.
+"""Record what the package brings of engines that may not be here: `make traces`.
 
-Where PyBullet has no wheel its side of a comparison comes from these files, which are
-part of the package. A test records them anew and compares.
+Where PyBullet has no wheel its side of a comparison comes from these files, for every scenario of
+`statemachine compare`; of an older release of MuJoCo `lesson hold` tells. A test records them anew
+and compares.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import statemachine as sm
+from statemachine.lessons.hold import OLDER
 from statemachine.runs import Trace, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
 
 FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "runs" / "recorded"
 
 
-# Name of the file: the scenario, and how PyBullet is loaded.
-RUNS: dict[str, tuple[str, Literal["model", "engine"]]] = {
-    f"{name}.pybullet{suffix}": (name, defaults)
+# Name of the file: the scenario, the backend, and how it is loaded.
+RUNS: dict[str, tuple[str, str, Any]] = {
+    f"{name}.pybullet{suffix}": (name, "pybullet", defaults)
     for name in SCENARIOS
     for suffix, defaults in (("", "model"), (".engine", "engine"))
 }
+RUNS[f"hold.{OLDER}"] = "hold", OLDER, "model"
 
 
 def recorded(run: str) -> Trace:
     """A trace by the name of its file, recorded now."""
-    name, defaults = RUNS[run]
+    name, backend, defaults = RUNS[run]
     scenario = SCENARIOS[name]
-    model = sm.load(scenario.model, backend="pybullet", defaults=defaults)
-    typed = f"statemachine trace record {name} --backend pybullet"
+    model = sm.load(scenario.model, backend=backend, defaults=defaults)
+    typed = f"statemachine trace record {name} --backend {backend}"
     typed += " --defaults engine" if defaults == "engine" else ""
     trace = record_scenario(scenario, model, defaults=defaults, command=typed)
     header = dataclasses.replace(trace.header, single=True)

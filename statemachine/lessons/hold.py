@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..backends import load
 from ..errors import DivergedError, UnsupportedError
+from ..installed import DEFAULT
 from ..interface import Array, Data, Ints, JointType, Model, forward, make_data, reset, step
 from ..measures import largest, together
 from ..measures.text import position, short_time
 from ..page import Table, Traces
+from ..releases import is_here, version_of
+from ..runs import record_scenario, shipped
 from ..runs.commands import hold_ctrl, is_servo, start_keyframe
 from ..runs.drive import Progress, steps_in
-from ..runs.provenance import provenance
+from ..runs.provenance import model_digest, provenance
 from ..runs.robot import command, touching, trees_of_actuators
+from ..runs.scenarios import SCENARIOS
 from ._robot import check_servos, start_line
 from .session import CodeRun, LessonResult, stepping_loop
 from .template import differences, largest_gap, where
@@ -25,6 +30,8 @@ _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
 _SHOWN = 12  # numbers of qpos that fit in a line
 _THERE = np.radians(0.1)  # rad, or m
+_STEPS = (1e-3, 1.0)  # [°] between the answers about another release
+OLDER = "mujoco==3.3.7"  # its servos damp where their force is at its limit, too
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -46,6 +53,25 @@ data = sm.make_data(model)
 """
 
 
+@dataclass(frozen=True)
+class OlderRelease:
+    """The same run on a release that is older than the installed one.
+
+    Attributes:
+        version: Of that release.
+        gap: The largest distance between the same joint on the two [rad].
+        joint: Which.
+        at: When [s].
+        recorded: Whether it is the recorded run that comes with the package.
+    """
+
+    version: str
+    gap: float
+    joint: str
+    at: float
+    recorded: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Hold(LessonResult):
     """The response to one command from the start, of the k joints that position servos drive.
@@ -63,6 +89,7 @@ class Hold(LessonResult):
             nothing did, or the backend cannot leave contacts out.
         joints: Names of the joints; slides: which of them are slides.
         keyframe: Where the run starts, None for the default state.
+        older: The same run on an older release; None for another run than the course's.
     """
 
     target: Array
@@ -78,6 +105,7 @@ class Hold(LessonResult):
     joints: tuple[str, ...]
     slides: tuple[bool, ...]
     keyframe: str | None
+    older: OlderRelease | None
 
     @property
     def error(self) -> Array:
@@ -117,8 +145,26 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
         joints=tuple(model.joint_names[joint] or f"joint {joint}" for joint in joints),
         slides=tuple((model.jnt_type[joints] == JointType.SLIDE).tolist()),
         keyframe=start_keyframe(model),
+        older=_on_older_release(model, ctrl, np.array(course.qpos), model.joint_names),
         provenance=provenance(model),
     )
+
+
+def _on_older_release(
+    model: Model, ctrl: Array, qpos: Array, joints: Sequence[str]
+) -> OlderRelease | None:
+    """The run (n, nq) of the course on another release of its engine; joints: names, of qpos."""
+    known, here = shipped("hold", OLDER), is_here(OLDER)
+    same_file = known.header.provenance.model_sha256 == model_digest(model.path)
+    if not (same_file and model.backend == DEFAULT and known.qpos.shape == qpos.shape):
+        return None
+    if not np.array_equal(known.ctrl[-1], ctrl):
+        return None
+    if here:
+        known = record_scenario(SCENARIOS["hold"], load(model.path, OLDER))
+    gap, place = largest(np.abs(known.qpos - qpos).ravel())
+    moment, joint = divmod(place, qpos.shape[1])
+    return OlderRelease(version_of(OLDER), gap, joints[joint], float(known.time[moment]), not here)
 
 
 def _freely(model: Model, ctrl: Array, steps: int, places: Ints) -> Array | None:
@@ -139,7 +185,7 @@ def slots(result: Hold) -> dict[str, Any]:
     gaps, free = np.abs(result.qpos[-1] - result.goal), result.without_contacts
     away, worst = int((gaps > _THERE).sum()), largest(gaps)[1]
     speed, fastest = largest(np.abs(result.speed))
-    free_gaps = gaps if free is None else np.abs(free - result.goal)
+    free_gaps, older = gaps if free is None else np.abs(free - result.goal), result.older
     return {
         "right": 0 if away == 0 else 2 if away == len(gaps) else 1,
         "within": position(_THERE, result.slides[worst]),
@@ -155,6 +201,11 @@ def slots(result: Hold) -> dict[str, Any]:
         "contact_steps": f"{result.contact_steps} of {len(result.time) - 1} steps",
         "free": free is not None,
         "free_worst": _farthest(result, free_gaps),
+        "older": older,
+        "installed": result.provenance.versions[result.provenance.backend],
+        "older_right": sum(older.gap > np.radians(limit) for limit in _STEPS) if older else 0,
+        "older_recorded": older and older.recorded,
+        "older_gap": position(older.gap, False) if older else "",
     }
 
 
