@@ -16,23 +16,23 @@ only, and imports nothing of this package. Its argument is a file that knows the
   `forward`, by name, and of the contacts geom, dist, pos, frame, force and torque;
 - `edit(model, edits, flags)`, if it can change a model: another one, with other values in fields.
 
-A message and its answer are two lengths, a header in JSON, and bytes; it ends with its input.
+A message and its answer are pickled: what is said, and arrays as shapes and bytes, since an older
+NumPy cannot read the arrays of a later one. The process ends with its input.
 """
 
 from __future__ import annotations
 
-import json
 import os
+import pickle
 import runpy
 import select
-import struct
 import sys
 import time
 from types import SimpleNamespace
 
 import numpy as np
 
-SIZES = struct.Struct("<QQ")
+_PROTOCOL = 4  # of Python 3.9, and earlier
 SPIN = 50e-6  # [s]
 
 
@@ -46,6 +46,23 @@ def await_message(pipe):
     until = time.perf_counter() + SPIN
     while time.perf_counter() < until and not select.select([pipe], [], [], 0)[0]:
         os.sched_yield()
+
+
+def send(pipe, said, arrays) -> None:
+    """Send a message: what is said, and arrays of numbers by name."""
+    numbers = {name: np.asarray(array, float) for name, array in arrays.items()}
+    packed = {name: (array.shape, array.tobytes()) for name, array in numbers.items()}
+    pickle.dump((said, packed), pipe, _PROTOCOL)
+    pipe.flush()
+
+
+def receive(pipe):
+    """The next message; EOFError where there is none any more."""
+    await_message(pipe)
+    said, packed = pickle.load(pipe)
+    return said, {
+        name: np.frombuffer(b).reshape(shape).copy() for name, (shape, b) in packed.items()
+    }
 
 
 class Answerer:
@@ -65,24 +82,21 @@ class Answerer:
         model, said, fields = self.engine.load(job["file"], job["text"], job["fields"])
         return {"model": self.keep(model), **said}, fields
 
-    def edit(self, job, content):
+    def edit(self, job, arrays):
         """A copy of a model with other values in some fields."""
-        edits, start = {}, 0
-        for name, size in job["edits"]:
-            edits[name], start = content[start : start + size], start + size
-        model = self.engine.edit(self.things[job["model"]], edits, job["flags"])
+        model = self.engine.edit(self.things[job["model"]], arrays, job["flags"])
         return {"model": self.keep(model)}, {}
 
     def make(self, job, _):
         """A world of a model."""
         return {"world": self.keep(self.engine.Simulation(self.things[job["model"]]))}, {}
 
-    def run(self, job, content):
+    def run(self, job, arrays):
         """Place a state if one is given, take a command and steps, and one more if it is asked."""
         world = self.things[job["world"]]
-        if len(content) > job["nu"]:
-            world.place(content[job["nu"] :])
-        world.command(content[: job["nu"]])
+        if "state" in arrays:
+            world.place(arrays["state"])
+        world.command(arrays["ctrl"])
         taken = world.advance(job["steps"], job["fastest"])
         states = {"before": world.state()}
         if taken == job["steps"] and job["ahead"]:
@@ -90,12 +104,12 @@ class Answerer:
             states["after"] = world.state()
         return {"taken": taken}, states
 
-    def look(self, job, content):
+    def look(self, job, arrays):
         """What is derived: of a state and a command if they are given, else of the last step."""
         world = self.things[job["world"]]
-        if len(content):
-            world.place(content[job["nu"] :])
-            world.command(content[: job["nu"]])
+        if arrays:
+            world.place(arrays["state"])
+            world.command(arrays["ctrl"])
             world.forward()
         return {}, world.derived()
 
@@ -106,26 +120,17 @@ def main() -> None:
     os.dup2(2, 1)  # what an engine prints is no answer
     server = Answerer(SimpleNamespace(**runpy.run_path(sys.argv[1])))
     while True:
-        await_message(source)
-        lengths = source.read(SIZES.size)
-        if len(lengths) < SIZES.size:
+        try:
+            job, arrays = receive(source)
+        except EOFError:
             return
-        size, rest = SIZES.unpack(lengths)
-        job = json.loads(source.read(size))
-        content = np.frombuffer(source.read(rest))
         for number in job["free"]:  # models and worlds that nobody needs any more
             server.things.pop(number, None)
         try:
-            answer, arrays = getattr(server, job["verb"])(job, content)
+            answer = getattr(server, job["verb"])(job, arrays)
         except Exception as error:
-            reason = " ".join(str(error).split()) or type(error).__name__
-            answer, arrays = {"error": reason, "kind": type(error).__name__}, {}
-        arrays = {name: np.asarray(array, float) for name, array in arrays.items()}
-        answer = {**answer, "arrays": [(name, a.shape) for name, a in arrays.items()]}
-        blob = b"".join(array.tobytes() for array in arrays.values())
-        head = json.dumps(answer).encode()
-        out.write(SIZES.pack(len(head), len(blob)) + head + blob)
-        out.flush()
+            answer = {"error": " ".join(str(error).split()) or type(error).__name__}, {}
+        send(out, *answer)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..interface import Array, Ints
 from ._delays import SHORTER, commands_kept, with_room
+from ._release_child import held
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -173,12 +174,6 @@ def put(raw: mujoco.MjModel, name: str, value: Any, index: tuple[Any, ...] = ())
         setattr(holder, field, now | index[0] if value else now & ~index[0])
     else:
         setattr(holder, field, value)
-
-
-def held(raw: mujoco.MjModel, name: str) -> tuple[Any, str]:
-    """Whose attribute an array or option of a compiled model is, and its name there."""
-    holder, _, field = name.rpartition(".")
-    return (getattr(raw, holder) if holder else raw), field
 
 
 def step_length(timestep: float, substeps: int, options: Mapping[str, Any]) -> float:

@@ -1,6 +1,7 @@
 """A release of MuJoCo, as `_child_server` asks it, in the Python of that release's environment.
 
-It needs NumPy and MuJoCo only, on Python 3.9 or later, and imports nothing of this package.
+It needs NumPy and MuJoCo only, on Python 3.9 or later, and imports nothing of this package. What is
+the same in every release the other modules take from here.
 """
 
 from __future__ import annotations
@@ -86,12 +87,7 @@ class Simulation:
         """Every derived array, by name, then those of the contacts."""
         model, data = self.model, self.data
         arrays = {name: getattr(data, name) for name in POSES + FORCES}
-        for part, kinds in PARTS.items():
-            arrays[part] = np.zeros(model.nv)
-            if data.nefc:
-                rows = np.isin(data.efc_type, [int(kind) for kind in kinds])
-                force = np.where(rows, data.efc_force, 0.0)
-                mujoco.mj_mulJacTVec(model, data, arrays[part], force)
+        arrays.update({part: constraint_part(model, data, part) for part in PARTS})
         force = np.zeros((data.ncon, 6))
         for k in range(data.ncon):
             mujoco.mj_contactForce(model, data, k, force[k])
@@ -102,6 +98,15 @@ class Simulation:
         arrays["frame"] = np.array([c.frame for c in contacts], float).reshape(-1, 3, 3)
         arrays["force"], arrays["torque"] = force[:, :3], force[:, 3:]
         return arrays
+
+
+def constraint_part(model, data, part):
+    """The forces (nv,) of the rows of constraints that make up one of `PARTS`."""
+    total = np.zeros(model.nv)
+    if data.nefc:
+        rows = np.isin(data.efc_type, [int(kind) for kind in PARTS[part]])
+        mujoco.mj_mulJacTVec(model, data, total, np.where(rows, data.efc_force, 0.0))
+    return total
 
 
 def load(file, text, names):
@@ -132,7 +137,7 @@ def edit(model, edits, flags):
         if isinstance(now, np.ndarray):
             now[...] = value.reshape(now.shape)
         else:
-            setattr(holder, field, type(now)(value[0]))
+            setattr(holder, field, type(now)(value))
     for name, wanted in flags.items():
         holder, field = held(model, name)
         kinds = KINDS[field[: -len("flags")]].__members__

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import base64
-import json
 import os
+import pickle
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -69,7 +70,7 @@ class Server:
             return cls._all[key]
 
     def ask(
-        self, verb: str, *content: Array, **job: Any
+        self, verb: str, arrays: Mapping[str, Array] = MappingProxyType({}), **job: Any
     ) -> tuple[dict[str, Any], dict[str, Array]]:
         """Let it do something; its answer, and arrays by name.
 
@@ -77,19 +78,12 @@ class Server:
             LostError: It has ended.
             AnswerError: It raised an error, with its text.
         """
-        blob = b"".join(array.tobytes() for array in content)
-        sizes = _child_server.SIZES
         try:
             with self._turn:
                 free, self.forgotten = self.forgotten, []
-                head = json.dumps({"verb": verb, "free": free, **job}).encode()
-                self._process.to.write(sizes.pack(len(head), len(blob)) + head + blob)
-                self._process.to.flush()
-                _child_server.await_message(self._process.out)
-                size, rest = sizes.unpack(self._process.out.read(sizes.size))
-                answer = json.loads(self._process.out.read(size))
-                values = np.frombuffer(self._process.out.read(rest))
-        except (OSError, ValueError, _child_server.struct.error) as error:
+                _child_server.send(self._process.to, {"verb": verb, "free": free, **job}, arrays)
+                answer, values = _child_server.receive(self._process.out)
+        except (OSError, ValueError, EOFError, pickle.UnpicklingError) as error:
             self.lives, ended = False, self._process.how_it_ended()
             raise LostError(f"its process is gone: {ended or error}") from error
         except BaseException:  # Ctrl-C: what it still says would be taken for another answer
@@ -98,11 +92,7 @@ class Server:
             raise
         if "error" in answer:
             raise AnswerError(answer["error"])
-        arrays, start = dict[str, Array](), 0
-        for name, shape in answer["arrays"]:
-            stop = start + int(np.prod(shape))
-            arrays[name], start = values[start:stop].reshape(shape).copy(), stop
-        return answer, arrays
+        return answer, values
 
 
 class ServedWorld(HiddenWorld):
@@ -151,9 +141,6 @@ class ServedWorld(HiddenWorld):
         # No call: it may be collected in the midst of another.
         self._end = weakref.finalize(self, _forget, self._server, model, self._world)
 
-    def _ask(self, verb: str, *content: Array, **job: Any) -> tuple[Any, dict[str, Array]]:
-        return self._server.ask(verb, *content, world=self._world, nu=len(self._ctrl), **job)
-
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
         self._reserve = None
@@ -166,9 +153,15 @@ class ServedWorld(HiddenWorld):
     def _run(self, steps: int) -> int:
         if not self._server.lives:
             self._begin()
-        placed = [self._state] if self._placed else []
-        job = {"steps": steps, "fastest": self._fastest, "ahead": self._ahead or not steps}
-        answer, states = self._ask("run", self._ctrl, *placed, **job)
+        placed = {"state": self._state} if self._placed else {}
+        answer, states = self._server.ask(
+            "run",
+            {"ctrl": self._ctrl, **placed},
+            world=self._world,
+            steps=steps,
+            fastest=self._fastest,
+            ahead=self._ahead or not steps,
+        )
         self._placed, self._derived, self._state = False, None, states["before"]
         self._reserve = states.get("after")
         return answer["taken"]
@@ -194,12 +187,13 @@ class ServedWorld(HiddenWorld):
         if not self._server.lives:
             self._begin()
         state = np.concatenate([moment.qpos, moment.qvel, *moment.memory])
-        _, self._derived = self._ask("look", moment.ctrl, state)
+        given = {"ctrl": moment.ctrl, "state": state}
+        _, self._derived = self._server.ask("look", given, world=self._world)
         self._placed = True
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
         if self._derived is None:
-            _, self._derived = self._ask("look")
+            _, self._derived = self._server.ask("look", world=self._world)
         arrays = dict(self._derived)
         values: dict[str, Any] = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
         if "contacts" not in self.untold:

@@ -32,6 +32,7 @@ from ._delays import hold, saved
 from ._edits import CONSTANTS_FOLLOW, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on
 from ._mujoco_record import INTEGRATORS, capabilities
+from ._release_child import constraint_part
 from .binary import write_binary
 from .compiled import (
     check_numbers,
@@ -44,17 +45,6 @@ from .compiled import (
 )
 
 _DISABLE = mujoco.mjtDisableBit
-_CONSTRAINT = mujoco.mjtConstraint
-_PARTS = {
-    "qfrc_contact": (
-        _CONSTRAINT.mjCNSTR_CONTACT_FRICTIONLESS,
-        _CONSTRAINT.mjCNSTR_CONTACT_PYRAMIDAL,
-        _CONSTRAINT.mjCNSTR_CONTACT_ELLIPTIC,
-    ),
-    "qfrc_friction": (_CONSTRAINT.mjCNSTR_FRICTION_DOF, _CONSTRAINT.mjCNSTR_FRICTION_TENDON),
-    "qfrc_limit": (_CONSTRAINT.mjCNSTR_LIMIT_JOINT, _CONSTRAINT.mjCNSTR_LIMIT_TENDON),
-    "qfrc_equality": (_CONSTRAINT.mjCNSTR_EQUALITY,),
-}
 # Every single component of the integration state, in the engine's own order.
 _COMPONENTS = {
     name.removeprefix("mjSTATE_").lower(): bit
@@ -238,17 +228,11 @@ class MujocoData(Data):
         )
 
     def _derive(self, name: str) -> Array:
-        view = self._views.get(name)
-        return self._constraint_part(name) if view is None else view
-
-    def _constraint_part(self, part: str) -> Array:
-        model, data = self._home.raw, self.raw
-        total = np.zeros(model.nv)
-        if data.nefc:
-            rows = np.isin(data.efc_type, [int(kind) for kind in _PARTS[part]])
-            mujoco.mj_mulJacTVec(model, data, total, np.where(rows, data.efc_force, 0.0))
-        total.setflags(write=False)
-        return total
+        array = self._views.get(name)
+        if array is None:
+            array = constraint_part(self._home.raw, self.raw, name)
+            array.setflags(write=False)
+        return array
 
     def _recompute(self) -> None:
         mujoco.mj_forward(self._home.raw, self.raw)

@@ -23,7 +23,7 @@ from ..installed import DEFAULT, require
 from ..interface import Array, Capabilities
 from ..releases import engine_of, is_release, python_of, version_of
 from . import _release_child as child
-from ._edits import held, put
+from ._edits import put
 from ._hidden_data import HiddenModel
 from ._served import AnswerError, LostError, ServedEngine, ServedWorld, Server
 from .binary import is_binary
@@ -140,7 +140,7 @@ def _compiled(engine: ServedEngine, path: Path, installed: MujocoModel) -> FileR
     for name, set_there in flags.items():
         kinds = _FLAGS[name].__members__
         names = [own for flag in set_there for own in child.SPLIT.get(flag, (flag,))]
-        setattr(*held(raw, name), sum(int(kinds[own]) for own in names if own in kinds))
+        setattr(*child.held(raw, name), sum(int(kinds[own]) for own in names if own in kinds))
     check_numbers(raw, f"{path} in {title}")
     return FileReading(
         engine,
@@ -174,13 +174,8 @@ def _opened(
         raise AnswerError(f"{path} is another file than when it was loaded")
     if edits:
         arrays = {name: value for name, value in edits.items() if name not in _FLAGS}
-        answer, _ = server.ask(
-            "edit",
-            *(np.asarray(value, float).ravel() for value in arrays.values()),
-            model=number,
-            edits=[(name, np.size(value)) for name, value in arrays.items()],
-            flags={name: value for name, value in edits.items() if name in _FLAGS},
-        )
+        flags = {name: value for name, value in edits.items() if name in _FLAGS}
+        answer, _ = server.ask("edit", arrays, model=number, flags=flags)
         server.forgotten.append(number)
         number = answer["model"]
     return number, said
@@ -197,7 +192,7 @@ def _fields(raw: mujoco.MjModel) -> Iterator[str]:
 
 
 def _field(raw: mujoco.MjModel, name: str) -> Any:
-    return getattr(*held(raw, name))
+    return getattr(*child.held(raw, name))
 
 
 def _edits(reading: FileReading, raw: mujoco.MjModel) -> dict[str, Any]:
