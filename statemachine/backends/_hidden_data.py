@@ -268,9 +268,6 @@ class HiddenData(Data):
 
     __slots__ = ("_layout", "_machine")
 
-    _machine: Machine
-    _layout: tuple[str, tuple[tuple[str, int], ...]]
-
     def __init__(self, model: HiddenModel) -> None:
         self._machine = machine = Machine(model)
         sizes = {"time": 1, "qpos": model.nq, "qvel": model.nv, "ctrl": model.nu}

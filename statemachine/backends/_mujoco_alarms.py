@@ -40,7 +40,6 @@ _TEXTS: deque[str] = deque(maxlen=256)
 # the process. So it is chained, in Python, only to the handler of somebody else.
 _KEEP = _TEXTS.append
 _LOCK = threading.RLock()  # a finalizer may run within
-_chain: Handler = _KEEP
 _users = 0
 
 
@@ -57,16 +56,12 @@ class _Both:
 
 def listen() -> bool:
     """Put our handler in front of whatever handler there is; whether it was there already."""
-    global _chain  # noqa: PLW0603  (MuJoCo's handler is the process's, too)
     with _LOCK:
-        other = mujoco.get_mju_user_warning()
-        known = other is _KEEP or isinstance(other, _Both)
-        if not known:
-            _chain = _KEEP if other is None else _Both(other)
-            mujoco.set_mju_user_warning(_chain)
-        else:
-            _chain = other
-        return known
+        handler = mujoco.get_mju_user_warning()
+        ours = handler is _KEEP or isinstance(handler, _Both)
+        if not ours:
+            mujoco.set_mju_user_warning(_KEEP if handler is None else _Both(handler))
+        return ours
 
 
 def listen_for(user: object) -> None:
@@ -83,8 +78,9 @@ def _end() -> None:
     global _users  # noqa: PLW0603
     with _LOCK:
         _users -= 1
-        if not _users and mujoco.get_mju_user_warning() is _chain:
-            mujoco.set_mju_user_warning(_chain.other if isinstance(_chain, _Both) else None)
+        handler = mujoco.get_mju_user_warning()
+        if not _users and (handler is _KEEP or isinstance(handler, _Both)):
+            mujoco.set_mju_user_warning(getattr(handler, "other", None))
 
 
 def pass_on(texts: list[str], stacklevel: int) -> None:
@@ -110,21 +106,15 @@ class AlarmError(Exception):
 
 def ended(model: Model, alarm: AlarmError, who: str) -> BadInputError | DivergedError:
     """The error for what is useless from now on: a Data or a world, as `who` names it."""
-    quantity, index, time = alarm.quantity, alarm.index, alarm.time
-    entry = alarm.entry(model)
-    now = f"{who} now takes only reset and set_state"
-    if quantity == "ctrl":
-        return BadInputError(
-            f"{entry} was no number at time {time:g} s: MuJoCo stepped as if ctrl were zero. {now}",
-            quantity=quantity,
-            index=index,
-            time=time,
-        )
-    return DivergedError(
-        f"{entry} became NaN, infinite or huge at time {time:g} s. {now}",
-        quantity=quantity,
-        index=index,
-        time=time,
+    kind, happened = DivergedError, f"became NaN, infinite or huge at time {alarm.time:g} s"
+    if alarm.quantity == "ctrl":
+        kind, happened = BadInputError, f"was no number at time {alarm.time:g} s"
+        happened += ": MuJoCo stepped as if ctrl were zero"
+    return kind(
+        f"{alarm.entry(model)} {happened}. {who} now takes only reset and set_state",
+        quantity=alarm.quantity,
+        index=alarm.index,
+        time=alarm.time,
     )
 
 

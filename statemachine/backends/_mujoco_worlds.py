@@ -44,11 +44,7 @@ class MujocoWorlds(Worlds):
     """Rows of a Batch. Inputs and derived arrays are views of its memory."""
 
     _batch: Any  # Batch; None once closed
-    _base: Model
-    _varied: bool
     _history: Any  # (n, nhistory), or None
-    _kept: Any  # (n, nactuator) commands that each world keeps; None where all keep as many
-    _layout: Callable[[int], tuple[str, tuple[tuple[str, int], ...]]]  # see `__init__`
     _warned: Any  # (n, kinds, 2) the engine's counters: last index, number
     _told: Any  # what they were when they were last looked at
 
@@ -89,6 +85,7 @@ class MujocoWorlds(Worlds):
             raise unsupported(model, "worlds", " ".join(str(error).split())) from error
         self._batch, self._base = batch, base
         self._varied = bool(varied[0])
+        # (n, nactuator) commands that each world keeps; None where all keep as many.
         history = varied[0].get("actuator_history")
         self._kept = None if history is None else history[:, :, 0]
         self._layout = cache(layout)

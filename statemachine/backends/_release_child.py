@@ -88,16 +88,23 @@ class Simulation:
         model, data = self.model, self.data
         arrays = {name: getattr(data, name) for name in POSES + FORCES}
         arrays.update({part: constraint_part(model, data, part) for part in PARTS})
-        force = np.zeros((data.ncon, 6))
-        for k in range(data.ncon):
-            mujoco.mj_contactForce(model, data, k, force[k])
-        contacts = [data.contact[k] for k in range(data.ncon)]
-        arrays["geom"] = np.array([(c.geom1, c.geom2) for c in contacts], float).reshape(-1, 2)
-        arrays["dist"] = np.array([c.dist for c in contacts], float)
-        arrays["pos"] = np.array([c.pos for c in contacts], float).reshape(-1, 3)
-        arrays["frame"] = np.array([c.frame for c in contacts], float).reshape(-1, 3, 3)
-        arrays["force"], arrays["torque"] = force[:, :3], force[:, 3:]
+        arrays.update(contact_arrays(model, data))
         return arrays
+
+
+def contact_arrays(model, data):
+    """Arrays of the contacts, by name; the forces are along the axes of each."""
+    listed, force = data.contact, np.zeros((data.ncon, 6))
+    for k in range(data.ncon):
+        mujoco.mj_contactForce(model, data, k, force[k])
+    return {
+        "geom": np.array(listed.geom, dtype=np.int64).reshape(-1, 2),
+        "dist": np.array(listed.dist),
+        "pos": np.array(listed.pos).reshape(-1, 3),
+        "frame": np.array(listed.frame).reshape(-1, 3, 3),
+        "force": force[:, :3],
+        "torque": force[:, 3:],
+    }
 
 
 def constraint_part(model, data, part):

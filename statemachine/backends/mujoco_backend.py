@@ -32,7 +32,7 @@ from ._delays import hold, saved
 from ._edits import CONSTANTS_FOLLOW, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on
 from ._mujoco_record import INTEGRATORS, capabilities
-from ._release_child import constraint_part
+from ._release_child import constraint_part, contact_arrays
 from .binary import write_binary
 from .compiled import (
     check_numbers,
@@ -182,8 +182,6 @@ class MujocoData(Data):
 
     _raw: mujoco.MjData | None
     _alarms: Any  # Alarms; None once closed
-    _views: dict[str, Array]
-    _layout: tuple[str, tuple[tuple[str, int], ...]]
 
     def __init__(self, model: MujocoModel) -> None:
         raw = mujoco.MjData(model.raw)
@@ -214,18 +212,7 @@ class MujocoData(Data):
         return self.raw.time
 
     def _find_contacts(self) -> Contacts:
-        found, count = self.raw.contact, self.raw.ncon
-        force = np.zeros((count, 6))
-        for i in range(count):
-            mujoco.mj_contactForce(self._home.raw, self.raw, i, force[i])
-        return Contacts(
-            geom=np.array(found.geom, dtype=np.int64).reshape(count, 2),
-            dist=np.array(found.dist),
-            pos=np.array(found.pos).reshape(count, 3),
-            frame=np.array(found.frame).reshape(count, 3, 3),
-            force=force[:, :3],
-            torque=force[:, 3:],
-        )
+        return Contacts(**contact_arrays(self._home.raw, self.raw))
 
     def _derive(self, name: str) -> Array:
         array = self._views.get(name)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
+
+from ..measures.text import numbers
 
 # A pendulum with a tip, straight out along x; and what it must do, by its equation of motion.
 
@@ -65,13 +66,9 @@ MARKS = np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0)])
 CENTRE = np.array([0.3, -0.2, 0.1])  # of mass, in the body's frame [m]
 
 
-def _numbers(values: Any) -> str:
-    return " ".join(f"{value:g}" for value in values)
-
-
 MARKED_MJCF = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><freejoint/>
-<inertial pos="{_numbers(CENTRE)}" mass="1" diaginertia="1 1 1"/>
-{"".join(f'<site pos="{_numbers(mark)}"/>' for mark in MARKS)}
+<inertial pos="{numbers(CENTRE)}" mass="1" diaginertia="1 1 1"/>
+{"".join(f'<site pos="{numbers(mark)}"/>' for mark in MARKS)}
 </body></worldbody></mujoco>"""
 
 _MARKED_INERTIAL = (
@@ -81,12 +78,12 @@ _MARKED_INERTIAL = (
 # A mark is a link of next to no mass: of a centre of mass PyBullet tells the place in double.
 MARKED_URDF = (
     '<robot name="marked"><link name="body">'
-    + _MARKED_INERTIAL.format(at=_numbers(CENTRE), mass=1)
+    + _MARKED_INERTIAL.format(at=numbers(CENTRE), mass=1)
     + "</link>"
     + "".join(
         f'<link name="mark{k}">{_MARKED_INERTIAL.format(at="0 0 0", mass=1e-12)}</link>'
         f'<joint name="to{k}" type="fixed"><parent link="body"/><child link="mark{k}"/>'
-        f'<origin xyz="{_numbers(mark)}"/></joint>'
+        f'<origin xyz="{numbers(mark)}"/></joint>'
         for k, mark in enumerate(MARKS)
     )
     + "</robot>"

@@ -10,7 +10,7 @@ by computing what the derived values would be now in another Data. `watch` count
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from typing import Any, cast
@@ -235,42 +235,45 @@ def freshness(model: Model, data: Data) -> Freshness:
     )
 
 
-def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> Iterator[str]:
+def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> list[str]:
+    """What has to be added to the rows: each sentence with what it holds under."""
     behaviours = model.capabilities.behaviours
-    stale = [row.name for row in rows if not row.now]
+    stale = {row.name for row in rows if not row.now}
     untold = [name for name in DERIVED if name not in {row.name for row in rows}]
-    if untold:
-        yield f"This backend does not tell: {', '.join(untold)}."
-    if not stale:
-        yield "All are of now."
-        return
-    yield from _how(model, age, not set(POSES).isdisjoint(stale))
-    if age.written:
-        yield f"Written since: {', '.join(age.written)}."
-    if behaviours["stale after a step"].support == "unsupported":
-        yield f"After a step: {behaviours['stale after a step'].note}."
-    if touching and not model.capabilities.exact_restore and not _REMEMBERED.isdisjoint(stale):
-        yield (
-            "In contacts, and the forces and accelerations of what touches, not all of the "
-            f"difference need be age: {behaviours['exact restore'].note}."
-        )
-    yield "sm.forward(model, data) makes all of them of now."
-
-
-def _how(model: Model, age: Age, poses: bool) -> Iterator[str]:
-    """How the moment was found, or what stood in the way."""
-    if age.retraced:
-        exact = f"to {age.within:.1e} m" if age.within else "to the bit"
-        yield (
+    after_a_step, restore = behaviours["stale after a step"], behaviours["exact restore"]
+    retraced, unknown = bool(age.retraced), not age.never and age.steps is None
+    sentences = [
+        (untold, f"This backend does not tell: {', '.join(untold)}."),
+        (not stale, "All are of now."),
+        (
+            stale and retraced,
             f"Found by going back: qpos − h·qvel, h = {milliseconds(engine_step(model))}, gives "
-            f"the poses of {few(age.retraced)}, {exact}."
-        )
-        if age.unmatched:
-            yield (
-                f"{few(age.unmatched)} match neither moment: qpos or qvel was written since, or "
-                "the engine integrates otherwise."
-            )
-    elif not age.never and age.steps is None:
-        if poses:
-            yield "Going back one step, to qpos − h·qvel, does not lead to these poses."
-        yield "Writes are not recorded, unless sm.watch_freshness(model, data) does."
+            f"the poses of {few(age.retraced)}, "
+            f"{f'to {age.within:.1e} m' if age.within else 'to the bit'}.",
+        ),
+        (
+            stale and retraced and age.unmatched,
+            f"{few(age.unmatched)} match neither moment: qpos or qvel was written since, or "
+            "the engine integrates otherwise.",
+        ),
+        (
+            unknown and stale & set(POSES),
+            "Going back one step, to qpos − h·qvel, does not lead to these poses.",
+        ),
+        (
+            stale and unknown,
+            "Writes are not recorded, unless sm.watch_freshness(model, data) does.",
+        ),
+        (stale and age.written, f"Written since: {', '.join(age.written)}."),
+        (
+            stale and after_a_step.support == "unsupported",
+            f"After a step: {after_a_step.note}.",
+        ),
+        (
+            touching and not model.capabilities.exact_restore and stale & _REMEMBERED,
+            "In contacts, and the forces and accelerations of what touches, not all of the "
+            f"difference need be age: {restore.note}.",
+        ),
+        (stale, "sm.forward(model, data) makes all of them of now."),
+    ]
+    return [text for holds, text in sentences if holds]

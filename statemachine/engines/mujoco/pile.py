@@ -56,13 +56,9 @@ _FIELDS = {
 }
 
 
-def _put(scene: MujocoPile, copies: tuple[Array, Array]) -> None:
-    scene.data.qpos[:], scene.data.qvel[:] = copies
-
-
-def _components(part: str) -> Save:
-    """Those of a mask of mjtState."""
-    spec = int(getattr(mj.mjtState, part))
+def _components(*parts: str) -> Save:
+    """Those of masks of mjtState."""
+    spec = sum(int(getattr(mj.mjtState, f"mjSTATE_{part}")) for part in parts)
     return copied(
         lambda scene: saved(scene.data, spec),
         lambda scene, state: mj.mj_setState(scene.model, scene.data, state, spec),
@@ -78,11 +74,9 @@ class MujocoPile(Pile):
     }
     resets: ClassVar = {"mj_resetData": lambda scene: mj.mj_resetData(scene.model, scene.data)}
     ways_to_save: ClassVar = {
-        "qpos and qvel copied": copied(
-            lambda scene: (np.array(scene.data.qpos), np.array(scene.data.qvel)), _put
-        ),
-        "mjSTATE_FULLPHYSICS": _components("mjSTATE_FULLPHYSICS"),
-        "mjSTATE_INTEGRATION": _components("mjSTATE_INTEGRATION"),
+        "qpos and qvel copied": _components("QPOS", "QVEL"),
+        "mjSTATE_FULLPHYSICS": _components("FULLPHYSICS"),
+        "mjSTATE_INTEGRATION": _components("INTEGRATION"),
     }
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ users drive them, by POSITION_CONTROL; the backend's servo has no part in this.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 
@@ -49,8 +49,8 @@ class Client:
     def __init__(self, world: World, owner: World | Data) -> None:
         """Of a world; the owner gives it back."""
         self.world, self.client, self.close = world, world.client, owner.close
-        self.joints = [(body, index) for body, index, _ in world.joints()]
-        self.bases = [tree.body for tree in world.trees if tree.free]
+        self.joints: Sequence[tuple[int, int]] = [joint[:2] for joint in world.joints()]
+        self.bases: Sequence[int] = [tree.body for tree in world.trees if tree.free]
         self.solids = [(body, link) for body, link, _ in world.solids()]
         self.time = 0.0
         self.targets: Array | None = None
@@ -229,17 +229,16 @@ class PybulletDriver(Driver):
                     )
                     pb.calculateMassMatrix(tree.body, places, physicsClientId=machine.client)
 
-        def save(machine: Client) -> None:
-            state = pb.saveState(machine.client)
-            pb.removeState(state, physicsClientId=machine.client)
-
         return (
             Disturbance("getLinkState, forward kinematics", links),
             Disturbance(
                 "getContactPoints", lambda m: pb.getContactPoints(physicsClientId=m.client)
             ),
             Disturbance("inverse dynamics, mass matrix", dynamics),
-            Disturbance("saveState", save),
+            Disturbance(
+                "saveState",
+                lambda m: pb.removeState(pb.saveState(m.client), physicsClientId=m.client),
+            ),
             Disturbance(
                 "performCollisionDetection",
                 lambda m: pb.performCollisionDetection(m.client),

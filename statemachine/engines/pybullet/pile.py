@@ -6,7 +6,7 @@ next step show in what the next step does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import ClassVar
 
@@ -122,13 +122,13 @@ class BulletPile(Pile):
         """Put the bodies into an empty world; what else is set there stays."""
         self.client = client
         put_floor(client)
-        self.bases = tuple(
+        self.bases: Sequence[int] = tuple(
             put(client, pb.GEOM_BOX, place, turn.tolist(), halfExtents=(HALF, HALF, HALF))
             for place, turn in zip(PLACES, _TURNS, strict=True)
         )
         self.box = self.bases[0]  # the lowest, at which quantities are looked at
         self.arm = load(client, PENDULUM_URDF, fixed=True)
-        self.joints = [(self.arm, 0)]
+        self.joints: Sequence[tuple[int, int]] = [(self.arm, 0)]
         pb.resetBasePositionAndOrientation(self.arm, (2, 0, 2), (0, 0, 0, 1), client)
 
     @classmethod

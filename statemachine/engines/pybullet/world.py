@@ -16,12 +16,9 @@ from ...silence import silence
 class HasClient(Protocol):
     """A world: its number, the numbers of its free bodies, and its joints, body by index."""
 
-    @property
-    def client(self) -> int: ...
-    @property
-    def bases(self) -> Sequence[int]: ...
-    @property
-    def joints(self) -> Sequence[tuple[int, int]]: ...
+    client: int
+    bases: Sequence[int]
+    joints: Sequence[tuple[int, int]]
 
 
 Restore = Callable[[HasClient], None]  # puts what was saved into a world

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...engines.measured import LetGo, Measurement, OneStep, Sliding
 from ...engines.samples import RATE, limp
+from ...measures.text import numbers
 from .answers import UNDECIDED, EngineAnswer, closest, question
 
 _SAME = 1e-6  # m/s², s, m/s
@@ -22,7 +23,7 @@ _SAME = 1e-6  # m/s², s, m/s
 def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Iterator[EngineAnswer]:
     """The gravity (3,) [m/s²] that a body feels, unless the engine tells of another."""
     stated, measured = gravity
-    felt, said = (" ".join(f"{g:g}" for g in np.round(v, 2) + 0.0) for v in (measured, stated))
+    felt, said = (numbers(np.round(v, 2) + 0.0) for v in (measured, stated))
     words = felt if np.allclose(stated, measured, atol=_SAME) else f"told {said}, felt {felt}"
     yield EngineAnswer(words, (Measurement("falls with", tuple(map(float, measured)), "m/s²"),))
 
