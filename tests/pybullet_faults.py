@@ -26,7 +26,6 @@ def _parts() -> Any:
     """The modules of the backend, which need the engine to be imported."""
     from statemachine.backends import (
         _bullet_driven,
-        _bullet_ghost,
         _bullet_law,
         _bullet_plan,
         _bullet_world,
@@ -37,7 +36,7 @@ def _parts() -> Any:
 
     class Parts:
         data, hidden, driven = _hidden_data, _hidden_world, _bullet_driven
-        plan, ghost = _bullet_plan, _bullet_ghost
+        plan, ghost = _bullet_plan, _bullet_driven
         law, world = _bullet_law, _bullet_world
         backend, pb = pybullet_backend, _bullet_world.pb
 

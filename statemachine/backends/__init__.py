@@ -161,12 +161,11 @@ def load(
         ) from error
     if is_release(backend):
         loader = partial(loader, release=backend)
-    if not options:
-        loaded = loader(path, defaults=defaults)
-    elif "options" in inspect.signature(loader).parameters:
-        loaded = loader(path, defaults=defaults, options=options)
-    else:
-        loaded = loader(path, defaults=defaults).replace(**options)
+    takes_options = "options" in inspect.signature(loader).parameters
+    early = {"options": options} if options and takes_options else {}
+    loaded = loader(path, defaults=defaults, **early)
+    if options and not takes_options:
+        loaded = loaded.replace(**options)
     if pairs := few(overlaps_at_start(loaded)):
         text = f"{path.name}: shapes are inside each other at the start: {pairs}"
         warnings.warn(text, EngineWarning, stacklevel=2)

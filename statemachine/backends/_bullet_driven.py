@@ -1,29 +1,32 @@
 """A stepped world of PyBullet's with what drives its joints: what is PyBullet's own of a Data.
 
-`Law` drives them by the model's own law, `Motors` as PyBullet's users do.
+`Law` drives them by the model's own law, `Motors` as PyBullet's users do. The Data of one Model
+share a `Ghost`, whose kinematics have no state.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, Literal
 
 import mujoco
 import numpy as np
 
-from ..interface import DERIVED, POSES, Array, Contacts
-from ..rotations import matrix_from_quat
+from ..interface import DERIVED, POSES, Array
+from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
 from . import _dense as dense
 from ._bullet_client import pb
-from ._bullet_ghost import free_dynamics, ghost_of
+from ._bullet_contacts import contacts_of
 from ._bullet_law import Law, in_force
 from ._bullet_plan import Plan
 from ._bullet_world import Tree, World
 from ._hidden_world import HiddenWorld, Memory, Moment, Read, bounded
+from .compiled import gravity
 
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, by PyBullet as it comes
-_GEOM = mujoco.mjtGeom
+_INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
 Act = Callable[[World], None]  # sets something in a world that was opened
 
 
@@ -145,9 +148,10 @@ class DrivenWorld(HiddenWorld):
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
         """Contacts, which the step found before it moved; or accelerations and forces."""
+        world, raw = self.raw, self._plan.raw
         if name == "contacts":
-            return {name: contacts_of(self._plan.raw, self.raw, read)}
-        raw = self._plan.raw
+            points = world.contact_points()
+            return {name: contacts_of(raw, points, world.geoms_of_links, world.geom_turns, read)}
         values = {name: np.zeros(raw.nv) for name in DERIVED if name not in POSES}
         for arm in self._arms:
             for part, array in arm.forces().items():
@@ -220,81 +224,120 @@ class Motors:
             )
 
 
-def contacts_of(raw: mujoco.MjModel, world: World, read: Read) -> Contacts:
-    """The contacts that a world found at the beginning of its last step.
+def ghost_of(plan: Plan) -> Ghost:
+    """The ghost of a plan: one for all Data of all Models that have the plan."""
+    with HiddenWorld.lock:  # for two threads that make the first Data at once
+        if plan.ghost is None:
+            plan.ghost = Ghost(plan)
+        return plan.ghost
 
-    PyBullet knows which links touch. A link may have several geoms: the one whose
-    surface is nearest to the point is taken.
 
-    Args:
-        raw: The compiled model.
-        world: The world; points that are apart and carry no force are left out.
-        read: Gives xpos and xquat of that moment by name; asked only where a link has several
-            geoms.
+class Ghost(World):
+    """The true robot in a client that is never stepped: kinematics and dynamics of its joints."""
+
+    def __init__(self, plan: Plan) -> None:
+        super().__init__(plan, "ghost")
+        self._known: dict[bool, list[tuple[Array, Array]]] = {}  # of the sites, and of the bodies
+        self._known_at, self._rest = b"?", np.zeros(plan.raw.nv)
+
+    @cached_property
+    def still(self) -> tuple[Array, Array, Array, Array]:
+        """xpos, xquat, site_xpos and site_xmat of what never moves."""
+        data = mujoco.MjData(self._raw)
+        mujoco.mj_kinematics(self._raw, data)
+        return data.xpos, data.xquat, data.site_xpos, data.site_xmat
+
+    def poses(self, qpos: Array, name: str) -> dict[str, Array]:
+        """Poses of bodies, or of sites, by the engine's own forward kinematics.
+
+        Centres of mass and their axes are what PyBullet reports in double precision; a
+        site is the centre of mass of a link of its own, where the tree has room for one.
+
+        Args:
+            qpos: (nq,) where the joints are.
+            name: Of `POSES`; only what it needs is computed.
+        """
+        if name in ("site_xpos", "site_xmat"):
+            return {name: self._sites(qpos, name)}
+        raw = self._raw
+        xpos, xquat = (array.copy() for array in self.still[:2])
+        for tree, (where, turned) in zip(self.trees, self._states(qpos), strict=True):
+            bodies = list(tree.links)
+            xquat[bodies] = times(wxyz_from_xyzw(turned), raw.body_iquat[bodies] * _INVERSE)
+            turns = matrix_from_quat(xquat[bodies])
+            xpos[bodies] = where - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies])
+        for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
+            body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
+            quat = qpos[start + 3 : start + 7]
+            xpos[body], xquat[body] = qpos[start : start + 3], quat / math.hypot(*quat)
+        return {"xpos": xpos, "xquat": xquat}
+
+    def _sites(self, qpos: Array, name: str) -> Array:
+        """site_xpos or site_xmat."""
+        raw, values = self._raw, self.still[POSES.index(name)].copy()
+        placed = name == "site_xpos"
+        for tree, (where, turned) in zip(self.trees, self._states(qpos, True), strict=True):
+            values[list(tree.tips)] = (
+                where if placed else matrix_from_quat(wxyz_from_xyzw(turned)).reshape(-1, 9)
+            )
+        sites = self._carried_sites
+        if len(sites):
+            bodies, poses = raw.site_bodyid[sites], self.poses(qpos, "xpos")
+            turns = matrix_from_quat(poses["xquat"][bodies])
+            if placed:
+                offset = np.einsum("bij,bj->bi", turns, raw.site_pos[sites])
+                values[sites] = poses["xpos"][bodies] + offset
+            else:
+                own = matrix_from_quat(raw.site_quat[sites])
+                values[sites] = np.einsum("bij,bjk->bik", turns, own).reshape(-1, 9)
+        return values
+
+    @cached_property
+    def _carried_sites(self) -> Any:
+        """Sites that move and have no link: of free bodies, and of trees without room for it."""
+        linked = [site for tree in self.trees for site in tree.tips]
+        moving = self._raw.body_weldid[self._raw.site_bodyid] > 0
+        return np.flatnonzero(moving & ~np.isin(np.arange(self._raw.nsite), linked))
+
+    def _states(self, qpos: Array, sites: bool = False) -> list[tuple[Array, Array]]:
+        """Of each tree of joints its bodies or sites: centres of mass, and axes (x, y, z, w)."""
+        at = qpos.tobytes()
+        with HiddenWorld.lock:
+            if self._known_at != at:
+                self._known, self._known_at = {}, at
+            if sites not in self._known:
+                self.put(qpos, self._rest)
+                self._known[sites] = [
+                    self._centres(tree.body, [*(tree.tips if sites else tree.links).values()])
+                    for tree in self.trees
+                ]
+            return self._known[sites]
+
+    def _centres(self, body: int, links: list[int]) -> tuple[Array, Array]:
+        """Centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of some links."""
+        if not links:
+            return np.empty((0, 3)), np.empty((0, 4))
+        states = pb.getLinkStates(
+            body, links, computeForwardKinematics=1, physicsClientId=self.client
+        )
+        return np.array([state[0] for state in states]), np.array([state[1] for state in states])
+
+
+def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:
+    """Mass matrix (6, 6) and bias (6,) of a free body, in MuJoCo's coordinates.
+
+    Newton's and Euler's equations about the centre of mass, whose velocity is J·qvel.
     """
-    geoms = world.geoms_of_links
-    turns: dict[int, Array] = {}  # by body, into its own axes
-
-    def geom_at(body: int, link: int, point: Array) -> int:
-        b, candidates = geoms[body, link]
-        if len(candidates) == 1:
-            return candidates[0]
-        if b not in turns:
-            turns[b] = matrix_from_quat(read("xquat")[b]).T.copy()
-        local = dense.times(turns[b], point - read("xpos")[b])
-        return min(candidates, key=lambda g: abs(_distance(raw, g, world.geom_turns[g], local)))
-
-    found: list[tuple[Any, ...]] = []
-    for point in world.contact_points():
-        _, body_a, body_b, link_a, link_b, on_a, on_b, normal, dist, push = point[:10]
-        if dist > 0 and not push:
-            continue
-        on_a, on_b, normal = np.array(on_a), np.array(on_b), np.array(normal)
-        pair = geom_at(body_b, link_b, on_b), geom_at(body_a, link_a, on_a)
-        # The normal goes from B to A; friction is what A feels.
-        force = push * normal
-        for size, direction in (point[10:12], point[12:14]):
-            force = force + size * np.array(direction)
-        if pair[0] > pair[1]:
-            pair, normal, force = pair[::-1], -normal, -force
-        frame = _axes(normal)
-        found.append((pair, dist, (on_a + on_b) / 2, frame, dense.times(frame, force)))
-    count = len(found)
-    columns = list(zip(*found, strict=True)) or [()] * 5
-    return Contacts(
-        geom=np.array(columns[0], dtype=np.int64).reshape(count, 2),
-        dist=np.array(columns[1], dtype=np.float64),
-        pos=np.array(columns[2], dtype=np.float64).reshape(count, 3),
-        frame=np.array(columns[3], dtype=np.float64).reshape(count, 3, 3),
-        force=np.array(columns[4], dtype=np.float64).reshape(count, 3),
-        torque=np.zeros((count, 3)),
-    )
-
-
-def _axes(normal: Array) -> Array:
-    """Contact axes (3, 3) as rows, the first the normal."""
-    aside = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
-    first = aside - normal * dense.dot(normal, aside)
-    first /= math.hypot(*first)
-    return np.array([normal, first, np.cross(normal, first)])
-
-
-def _distance(raw: mujoco.MjModel, geom: int, turn: Array, point: Array) -> float:
-    """Signed distance of a point, in the body's frame, from the surface of its geom [m].
-
-    Args:
-        raw: The compiled model.
-        geom: Of the body.
-        turn: (3, 3) from the body's axes into the geom's.
-        point: (3,) [m].
-    """
-    local = dense.times(turn, point - raw.geom_pos[geom])
-    size, kind, box = raw.geom_size[geom], int(raw.geom_type[geom]), raw.geom_aabb[geom]
-    if kind in (int(_GEOM.mjGEOM_SPHERE), int(_GEOM.mjGEOM_CAPSULE)):
-        # From the middle, or the middle line; a sphere has no second size.
-        return float(math.hypot(*local[:2], max(abs(local[2]) - size[1], 0.0)) - size[0])
-    if kind == int(_GEOM.mjGEOM_CYLINDER):
-        beyond = np.array([np.hypot(local[0], local[1]) - size[0], abs(local[2]) - size[1]])
-    else:  # a mesh by the box around it
-        beyond = np.abs(local - box[:3]) - box[3:]
-    return float(math.hypot(*np.maximum(beyond, 0)) + min(beyond.max(), 0.0))
+    mass, centre = float(raw.body_mass[body]), raw.body_ipos[body]
+    axes = matrix_from_quat(raw.body_iquat[body])
+    inertia = np.einsum("ij,j,kj->ik", axes, raw.body_inertia[body], axes)
+    spin = qvel[3:]
+    cross = np.cross(np.eye(3), centre)  # cross @ w = w × centre … of rows
+    turning = dense.product(turn, np.asarray(cross.T, dtype=np.float64))
+    jacobian = np.hstack([np.eye(3), turning])
+    total = mass * dense.product(jacobian.T, jacobian)
+    total[3:, 3:] += inertia
+    whirl = dense.times(turn, np.asarray(np.cross(spin, np.cross(spin, centre)), dtype=np.float64))
+    bias = dense.times(jacobian.T, mass * (whirl - gravity(raw)))
+    bias[3:] += np.cross(spin, dense.times(inertia, spin))
+    return total, bias

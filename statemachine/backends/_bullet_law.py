@@ -86,12 +86,12 @@ class Law:
         damped[:, len(dofs) : -1] = np.diag(self._rub_b)
         self._linear = np.vstack([passive, damped, feedback])
         still = [_impedance(curve, 0.0) for curve in _curves(solimp)]
-        self._rub_r = np.array([_softness(*each) for each in zip(still, weight, strict=True)])
+        self._rub_r = np.array([_softness(*pair) for pair in zip(still, weight, strict=True)])
         self._rub_weight = weight + self._rub_r
         # Rows of joints with friction: sign, softness, -b, least and most.
         self._rubs = rubs = np.flatnonzero(self._frictionloss)
         columns = [self._rub_r, -self._rub_b, self._least_rub, self._frictionloss]
-        self._rub_rows = np.array([np.ones(len(rubs)), *(each[rubs] for each in columns)])
+        self._rub_rows = np.array([np.ones(len(rubs)), *(column[rubs] for column in columns)])
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
         # A limit acts from its margin on, and as if it were there.
@@ -130,9 +130,9 @@ class Law:
 
     def _with_slope(self, free: Array) -> Array:
         """Both inertias, with the slope of the actuators that are not at their limit."""
-        found = self._inertia.copy()
-        found[1] += np.diag(dense.times(self._slope, free))
-        return found
+        inertias = self._inertia.copy()
+        inertias[1] += np.diag(dense.times(self._slope, free))
+        return inertias
 
     def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
         """Start from a state; contact and friction (n,) are those of the step before it."""

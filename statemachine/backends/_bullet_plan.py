@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..interface import Array
 from . import _bullet_urdf as urdf
-from ._bullet_surfaces import Surfaces
+from ._bullet_contacts import Surfaces
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 # Of the armature, as inertia of the stepped arm: 0.003 of the SO-101's 0.028 kg m², with
@@ -47,7 +47,7 @@ class Plan:
         raw: The compiled model.
         surfaces: What can touch what; nothing where contacts are off.
         names: What everything is called in a URDF.
-        ghost: See `_bullet_ghost`; None until it is needed.
+        ghost: See `_bullet_driven`; None until it is needed.
         described: Gives the text and the files of a tree of bodies; see `_describe`.
     """
 
@@ -82,8 +82,8 @@ class Plan:
         raw = self.raw
         solids = (solid.body for solid in self.surfaces.solids)
         moving = [b for b in solids if raw.body_weldid[b] and not floats(raw, raw.body_rootid[b])]
-        whole = 1 / raw.body_subtreemass[raw.body_rootid[moving]]
-        weights = np.maximum(raw.body_invweight0[moving, 0], whole)
+        tree_weights = 1 / raw.body_subtreemass[raw.body_rootid[moving]]
+        weights = np.maximum(raw.body_invweight0[moving, 0], tree_weights)
         return float(_YIELDS * raw.opt.timestep * np.median(weights)) if moving else 0.0
 
     @cached_property
@@ -144,18 +144,18 @@ def _padding(raw: mujoco.MjModel) -> Array:
         mujoco.mj_kinematics(raw, data)
         mujoco.mj_comPos(raw, data)
         mujoco.mj_crb(raw, data)
-        whole = np.zeros((raw.nv, raw.nv))
-        mujoco.mj_fullM(raw, data, whole)
-        bare = whole - np.diag(raw.dof_armature)
+        mass = np.zeros((raw.nv, raw.nv))
+        mujoco.mj_fullM(raw, data, mass)
+        bare = mass - np.diag(raw.dof_armature)
         # In halves, until this pose bears it too.
-        while _worst(whole, bare + _padding_at(raw, data, share)) > _BEARABLE:
+        while _worst(mass, bare + _padding_at(raw, data, share)) > _BEARABLE:
             share = share / 2
     return share
 
 
-def _worst(whole: Array, padded: Array) -> float:
+def _worst(mass: Array, padded: Array) -> float:
     """The largest eigenvalue of whole⁻¹·padded."""
-    return float(np.linalg.eigvals(np.linalg.solve(whole, padded)).real.max())
+    return float(np.linalg.eigvals(np.linalg.solve(mass, padded)).real.max())
 
 
 def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array:
@@ -225,12 +225,12 @@ def _mesh_hull(raw: mujoco.MjModel, mesh: int) -> tuple[Array, Faces]:
     # Vertices, triangles, two tables of vertices, one of edges, and the triangles by vertex.
     graph = raw.mesh_graph[raw.mesh_graphadr[mesh] :]
     corners, triangles = int(graph[0]), int(graph[1])
-    kept = graph[2 + corners : 2 + 2 * corners]
+    numbers = graph[2 + corners : 2 + 2 * corners]
     end = 2 + 3 * corners + 6 * triangles
     faces = graph[end - 3 * triangles : end].reshape(-1, 3)
     places = np.zeros(count, dtype=int)
-    places[kept] = np.arange(corners)
-    return vertices[kept], places[faces]
+    places[numbers] = np.arange(corners)
+    return vertices[numbers], places[faces]
 
 
 @cache

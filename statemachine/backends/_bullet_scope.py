@@ -11,9 +11,9 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
 from ..measures.text import few
+from ._bullet_contacts import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_law import in_force
 from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, floats, roughness
-from ._bullet_surfaces import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_urdf import parts, roots, tree
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
@@ -40,27 +40,29 @@ def check(plan: Plan, backend: str) -> None:
         backend: For the message.
     """
     raw = plan.raw
-    found = _of_the_whole(raw)
+    problems = _of_the_whole(raw)
     rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw)]
     if not raw.opt.disableflags & NO_CONTACT:
         rows += _of_geoms(raw)
-    found += [
+    problems += [
         (feature, f"{kind} {_name(raw, kind, k)} {says}")
         for kind, feature, which, says in rows
         for k in np.flatnonzero(which).tolist()
     ]
     if pairs := few(plan.surfaces.mixed):
-        found.append(("contact masks within a body", f"of {pairs} some geoms meet and some do not"))
-    if not found:
+        problems.append(
+            ("contact masks within a body", f"of {pairs} some geoms meet and some do not")
+        )
+    if not problems:
         return
-    feature, reason = found[0]
-    listed = "; ".join(f"{what}: {why}" for what, why in found)
+    feature, reason = problems[0]
+    listed = "; ".join(f"{what}: {why}" for what, why in problems)
     raise UnsupportedError(
         f"backend {backend!r} does not support what this model has: {listed}",
         backend=backend,
         feature=feature,
         reason=reason,
-        features=tuple(dict.fromkeys(what for what, _ in found)),
+        features=tuple(dict.fromkeys(what for what, _ in problems)),
     )
 
 
@@ -74,10 +76,10 @@ def _of_the_whole(raw: mujoco.MjModel) -> list[tuple[str, str]]:
         "plugin": raw.nplugin,
         "gravity compensation": raw.ngravcomp,
     }
-    found = [(feature, f"the model has {count}") for feature, count in counts.items() if count]
+    problems = [(feature, f"the model has {count}") for feature, count in counts.items() if count]
     if raw.opt.density or raw.opt.viscosity:
-        found.append(("fluid", "density or viscosity is not zero"))
-    return found
+        problems.append(("fluid", "density or viscosity is not zero"))
+    return problems
 
 
 # A kind of element, what it may have, which ones have it (a mask), and how that is said.
@@ -157,31 +159,31 @@ def ignored(plan: Plan) -> list[str]:
         int(mujoco.mjtIntegrator.mjINT_RK4): "RK4 acts as Euler",
         int(mujoco.mjtIntegrator.mjINT_DISCRETE): "discrete acts as implicitfast",
     }.get(int(raw.opt.integrator))
-    found = [f"the integrator {integrator}"] if integrator else []
+    sentences = [f"the integrator {integrator}"] if integrator else []
     settings = {
         "noslip_iterations": raw.opt.noslip_iterations,
         "the override of contact parameters": raw.opt.enableflags & int(override),
         "sleep": raw.opt.enableflags & int(sleep),
     }
-    found += [f"{what} has no effect" for what, there in settings.items() if there]
+    sentences += [f"{what} has no effect" for what, there in settings.items() if there]
     if raw.jnt_springyield.any():
-        found.append(f"springyield has no effect ({_list(raw, 'joint', raw.jnt_springyield)})")
+        sentences.append(f"springyield has no effect ({_list(raw, 'joint', raw.jnt_springyield)})")
     if not raw.opt.disableflags & NO_CONTACT:
         touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
         margins = raw.geom_margin * touching
         if margins.any():
             largest = int(margins.argmax())
-            found.append(
+            sentences.append(
                 f"contacts begin at a distance of 0, not at the margin of "
                 f"{int(np.count_nonzero(margins))} geoms (the largest: "
                 f"{1e3 * margins[largest]:.3g} mm, {_name(raw, 'geom', largest)})"
             )
-        found += _hull_differences(plan)
+        sentences += _hull_differences(plan)
         belts = np.sqrt((raw.geom_surfacevel[:, :3] ** 2).sum(axis=1)) * touching
         if belts.any():
-            found.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
-        found += _bounces(plan)
-    return found
+            sentences.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
+        sentences += _bounces(plan)
+    return sentences
 
 
 def _bounces(plan: Plan) -> list[str]:
@@ -192,13 +194,13 @@ def _bounces(plan: Plan) -> list[str]:
     ratios = np.clip(damping_ratios(raw, pairs), 0.0, 1 - 1e-9)
     most = int(ratios.argmin())
     ratio = float(ratios[most])
-    kept = math.exp(-math.pi * ratio / math.sqrt(1 - ratio**2))  # of its speed, a damped spring
-    if kept < _BOUNCE:
+    left = math.exp(-math.pi * ratio / math.sqrt(1 - ratio**2))  # of its speed, a damped spring
+    if left < _BOUNCE:
         return []
     names = " and ".join(str(_name(raw, "geom", geom)) for geom in pairs[most])
     return [
         f"contacts do not bounce: solref has no effect ({names} would keep about "
-        f"{100 * kept:.0f} % of their speed)"
+        f"{100 * left:.0f} % of their speed)"
     ]
 
 
@@ -213,12 +215,12 @@ def softness(plan: Plan) -> str:
 
 def _hull_differences(plan: Plan) -> list[str]:
     """Where a hull is not its shape: ellipsoids, and what is thinner than the engine's margin."""
-    raw, found = plan.raw, []
+    raw, sentences = plan.raw, []
     eggs = [geom for geom in plan.hulls if int(raw.geom_type[geom]) == ELLIPSOID]
     if eggs:
         largest = max(eggs, key=lambda geom: raw.geom_size[geom].max())
         size = 1e3 * roughness(raw.geom_size[largest])
-        found.append(
+        sentences.append(
             f"ellipsoids touch as hulls, which are up to {size:.2g} mm off "
             f"({_name(raw, 'geom', largest)})"
         )
@@ -226,11 +228,11 @@ def _hull_differences(plan: Plan) -> list[str]:
     thin = [geom for geom in excess if excess[geom] > 1e-6]
     if thin:
         worst = max(thin, key=lambda geom: excess[geom])
-        found.append(
+        sentences.append(
             f"{len(thin)} hulls are too thin to be made smaller by the engine's margin: up to "
             f"{1e3 * excess[worst]:.2g} mm too large ({_name(raw, 'geom', worst)})"
         )
-    return found
+    return sentences
 
 
 def _list(raw: mujoco.MjModel, kind: str, values: Array) -> str:

@@ -29,8 +29,8 @@ from ._bullet_client import (
     times,
     turned,
 )
+from ._bullet_contacts import Solid
 from ._bullet_plan import Plan, floats
-from ._bullet_surfaces import Solid
 from .compiled import gravity
 
 _PUSHES = 0.03  # of an overlap that a contact undoes in a step; the engine's own is 0.08

@@ -18,13 +18,13 @@ def bodies_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:
 
     They may not within one rigid piece, nor as parent and child, nor where they are excluded.
     """
-    one, two = int(raw.body_weldid[a]), int(raw.body_weldid[b])
-    if one == two or ((min(a, b) << 16) + max(a, b)) in raw.exclude_signature:
+    left, right = int(raw.body_weldid[a]), int(raw.body_weldid[b])
+    if left == right or ((min(a, b) << 16) + max(a, b)) in raw.exclude_signature:
         return False
     if raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
         return True
-    up: Any = raw.body_weldid[raw.body_parentid[[one, two]]]
-    return not ((up[0] == two and two) or (up[1] == one and one))
+    up: Any = raw.body_weldid[raw.body_parentid[[left, right]]]
+    return not ((up[0] == right and right) or (up[1] == left and left))
 
 
 def masks_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import struct
 from functools import cache
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -47,104 +48,99 @@ def commands_kept(m: mujoco.MjModel, delay: Array, timestep: Array | float) -> I
         BadInputError: The memory that is free cannot hold so many.
     """
     steps = np.asarray(timestep)[..., None]
-    kept = np.maximum(_needed(delay, steps), m.actuator_history[:, 0])
-    sizes = 8.0 * (kept * (1 + m.actuator_ctrlnum)).sum(axis=-1)  # bytes
+    counts = np.maximum(_needed(delay, steps), m.actuator_history[:, 0])
+    sizes = 8.0 * (counts * (1 + m.actuator_ctrlnum)).sum(axis=-1)  # bytes
     if sizes.max() > _LARGE:
         limit = min(_MOST, free_memory() or _MOST)
         if sizes.max() > limit:
             worst = np.unravel_index(sizes.argmax(), sizes.shape)
-            longest = float(np.broadcast_to(delay, kept.shape)[worst].max()) / SHORTER
+            longest = float(np.broadcast_to(delay, counts.shape)[worst].max()) / SHORTER
             length = float(np.broadcast_to(timestep, sizes.shape)[worst])
             raise BadInputError(
                 f"a latency of {longest:.4g} s is too long for engine steps of {length:.4g} s: "
-                f"the {kept[worst].max():.3g} commands that are on their way take "
+                f"the {counts[worst].max():.3g} commands that are on their way take "
                 f"{sizes[worst] / 1e9:.3g} GB in a Data, which may take {limit / 1e9:.3g} GB here"
             )
-    return kept.astype(np.int64)
+    return counts.astype(np.int64)
 
 
-def with_room(m: mujoco.MjModel, kept: Ints | None = None) -> mujoco.MjModel:
+def with_room(m: mujoco.MjModel, counts: Ints | None = None) -> mujoco.MjModel:
     """The same model, with a buffer for the delay of every actuator; itself if it has them.
 
     Args:
         m: The compiled model, with its timestep and delays.
-        kept: Commands to keep, (nactuator,); by default `commands_kept` of its own delays.
+        counts: Commands to keep, (nactuator,); by default `commands_kept` of its own delays.
 
     Raises:
         BadInputError: As in `commands_kept`.
     """
-    if kept is None:
-        kept = commands_kept(m, m.actuator_delay, m.opt.timestep)
-    short, starts = _appended(m, kept)
+    if counts is None:
+        counts = commands_kept(m, m.actuator_delay, m.opt.timestep)
+    short, starts = _appended(m, counts)
     if not len(short):
         return m
     roomy = _of_size(m, int(starts[-1]))
-    roomy.actuator_history[short, 0] = kept[short]
+    roomy.actuator_history[short, 0] = counts[short]
     roomy.actuator_historyadr[short] = starts[:-1]
     return roomy
 
 
-def with_room_of(m: mujoco.MjModel, before: mujoco.MjModel, kept: Ints) -> mujoco.MjModel:
+def with_room_of(m: mujoco.MjModel, before: mujoco.MjModel, counts: Ints) -> mujoco.MjModel:
     """What `with_room` would make of one of many worlds that share larger buffers.
 
     Args:
         m: The compiled model of the world, in the buffers that all share.
         before: The compiled model before it got room for all.
-        kept: Commands that this world keeps, (nactuator,).
+        counts: Commands that this world keeps, (nactuator,).
     """
     own = _of_size(m, before.nhistory)
     own.actuator_history[:] = before.actuator_history
     own.actuator_historyadr[:] = before.actuator_historyadr
-    return with_room(own, kept)
+    return with_room(own, counts)
 
 
-def places_of(before: mujoco.MjModel, shared: mujoco.MjModel, kept: Ints) -> Ints:
+def places_of(before: mujoco.MjModel, shared: mujoco.MjModel, counts: Ints) -> Ints:
     """Where the buffers of a Data of one world's model are in those that many worlds share.
 
     Args:
         before: The compiled model before it got room.
         shared: With room for all worlds.
-        kept: Commands that this world keeps, (nactuator,).
+        counts: Commands that this world keeps, (nactuator,).
 
     Returns:
         (nhistory of that Data,), places in (nhistory of `shared`,).
     """
-    short, starts = _appended(before, kept)
+    short, starts = _appended(before, counts)
     first = before.actuator_historyadr.copy()
     first[short] = starts[:-1]
     places = np.arange(starts[-1])
-    for a in np.flatnonzero(kept):
-        size = 2 + int(kept[a]) * (1 + int(before.actuator_ctrlnum[a]))
+    for a in np.flatnonzero(counts):
+        size = 2 + int(counts[a]) * (1 + int(before.actuator_ctrlnum[a]))
         start = int(shared.actuator_historyadr[a])
         places[first[a] : first[a] + size] = np.arange(start, start + size)
     return places
 
 
-def hold(m: mujoco.MjModel, history: Array, ctrl: Array, kept: Ints | None = None) -> None:
+def hold(m: mujoco.MjModel, history: Array, ctrl: Array, counts: Ints | None = None) -> None:
     """Let the commands before the start have been that of the start.
 
     Args:
         m: The compiled model.
         history: (..., nhistory), the buffers of MjData after a reset; written to.
         ctrl: (..., nu).
-        kept: (n, nactuator) commands that each of n worlds keeps, where they differ.
+        counts: (n, nactuator) commands that each of n worlds keeps, where they differ.
     """
-    if kept is not None:
-        for alike in np.unique(kept, axis=0):
-            which = (kept == alike).all(axis=1)
-            rows = history[which]
-            _hold(m, rows, ctrl[which], alike)
-            history[which] = rows
-    else:
-        _hold(m, history, ctrl, m.actuator_history[:, 0])
-
-
-def _hold(m: mujoco.MjModel, history: Array, ctrl: Array, kept: Ints) -> None:
-    for a in np.flatnonzero(kept):
-        own, number = int(m.actuator_ctrlnum[a]), int(m.actuator_ctrladr[a])
-        first = int(m.actuator_historyadr[a]) + 2 + int(kept[a])
-        commands = np.tile(ctrl[..., number : number + own], int(kept[a]))
-        history[..., first : first + commands.shape[-1]] = commands
+    groups: list[tuple[Any, Any]] = [(m.actuator_history[:, 0], ...)]
+    if counts is not None:
+        groups = [(alike, (counts == alike).all(axis=1)) for alike in np.unique(counts, axis=0)]
+    for stored, which in groups:
+        rows = history[which]
+        for a in np.flatnonzero(stored):
+            own, number = int(m.actuator_ctrlnum[a]), int(m.actuator_ctrladr[a])
+            first = int(m.actuator_historyadr[a]) + 2 + int(stored[a])
+            commands = np.tile(ctrl[which][..., number : number + own], int(stored[a]))
+            rows[..., first : first + commands.shape[-1]] = commands
+        history[which] = rows
 
 
 def _needed(delay: Array, timestep: Array | float) -> Array:
@@ -153,11 +149,11 @@ def _needed(delay: Array, timestep: Array | float) -> Array:
         return np.ceil(delay / timestep - 1e-9)
 
 
-def _appended(m: mujoco.MjModel, kept: Ints) -> tuple[Ints, Ints]:
+def _appended(m: mujoco.MjModel, counts: Ints) -> tuple[Ints, Ints]:
     """Actuators that need a larger buffer, and where each starts; last, where they all end."""
-    short = np.flatnonzero(kept > m.actuator_history[:, 0])
+    short = np.flatnonzero(counts > m.actuator_history[:, 0])
     # Two numbers of the buffer's own, and a time and a command for each that is kept.
-    sizes = 2 + kept[short] * (1 + m.actuator_ctrlnum[short])
+    sizes = 2 + counts[short] * (1 + m.actuator_ctrlnum[short])
     return short, m.nhistory + np.cumsum([0, *sizes])
 
 
@@ -190,7 +186,7 @@ def _history_offset() -> int:
     few, more = (mujoco.MjModel.from_xml_string(_SMALL.format(count)) for count in (1, 2))
     at = int(np.flatnonzero(saved(few) != saved(more))[0])
     for model in (few, more):
-        found = struct.unpack("<q", saved(model)[at : at + 8].tobytes())[0]
-        if found != model.nhistory:
+        size = struct.unpack("<q", saved(model)[at : at + 8].tobytes())[0]
+        if size != model.nhistory:
             raise NotImplementedError("this MuJoCo saves its models in another way")
     return at

@@ -26,9 +26,9 @@ def times(matrix: Array, vector: Array) -> Array:
 
 def product(left: Array, right: Array) -> Array:
     """The product (n, k) of matrices (n, m) and (m, k)."""
-    found = np.empty((len(left), right.shape[1]))
-    mujoco.mju_mulMatMat(found, left, right)
-    return found
+    result = np.empty((len(left), right.shape[1]))
+    mujoco.mju_mulMatMat(result, left, right)
+    return result
 
 
 def dot(left: Array, right: Array) -> float:
@@ -50,11 +50,11 @@ def solved(factor: Array, right: Array) -> Array:
 
 def inverse_rows(factor: Array, rows: NDArray[np.intp]) -> Array:
     """Rows (k,) of the inverse, (k, n), of the matrix that was factored."""
-    found = np.zeros((len(rows), len(factor)))
-    found[np.arange(len(rows)), rows] = 1.0
-    for row in found:
+    inverse = np.zeros((len(rows), len(factor)))
+    inverse[np.arange(len(rows)), rows] = 1.0
+    for row in inverse:
         solved(factor, row)
-    return found
+    return inverse
 
 
 def pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Array) -> Array:

@@ -56,7 +56,7 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
         Arrays by their names in MjModel, and as "opt.gravity" in MjOption; with that axis in
         front where an option has it. Constants that follow from them are not among them.
     """
-    found: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     flags = np.asarray(raw.opt.disableflags)
     for name, value in options.items():
         for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
@@ -65,28 +65,28 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
             flag = int(_SWITCHES[name])
             flags = (flags & ~flag) | np.where(value, 0, flag)
         elif name in _ARRAYS:
-            found[_ARRAYS[name]] = value
+            arrays[_ARRAYS[name]] = value
         if name == "mass":
             own = raw.body_mass > 0
             factor = np.where(own, value / np.where(own, raw.body_mass, 1.0), 1.0)
-            found["body_inertia"] = factor[..., None] * raw.body_inertia
+            arrays["body_inertia"] = factor[..., None] * raw.body_inertia
         elif name == "friction":
-            found["geom_friction"] = friction = _rows(raw.geom_friction, value)
+            arrays["geom_friction"] = friction = _rows(raw.geom_friction, value)
             friction[..., 0] = value
         elif name == "latency":
             owner, _ = servos(raw)
-            found["actuator_delay"] = delay = np.zeros((*value.shape[:-1], raw.nactuator))
+            arrays["actuator_delay"] = delay = np.zeros((*value.shape[:-1], raw.nactuator))
             delay[..., owner] = SHORTER * value
         elif name in ("kp", "kv"):
             owner, servo = servos(raw)
-            bias = found.setdefault("actuator_biasprm", _rows(raw.actuator_biasprm, value))
+            bias = arrays.setdefault("actuator_biasprm", _rows(raw.actuator_biasprm, value))
             bias[..., owner[servo], 1 if name == "kp" else 2] = -value[..., servo]
             if name == "kp":
-                found["actuator_gainprm"] = gain = _rows(raw.actuator_gainprm, value)
+                arrays["actuator_gainprm"] = gain = _rows(raw.actuator_gainprm, value)
                 gain[..., owner[servo], 0] = value[..., servo]
     if flags.ndim or int(flags) != raw.opt.disableflags:
-        found["opt.disableflags"] = flags
-    return found
+        arrays["opt.disableflags"] = flags
+    return arrays
 
 
 def varied(
@@ -102,21 +102,21 @@ def varied(
     Returns:
         The compiled model, with room for the longest latency; (n, ...) arrays, as `changes`.
     """
-    found = changes(raw, options)
-    found |= {
+    arrays = changes(raw, options)
+    arrays |= {
         f"opt.{name}": options[name] for name in ("timestep", "integrator") if name in options
     }
-    for name in [name for name, value in found.items() if not np.ndim(value)]:
-        put(raw, name, found.pop(name))
-    delay = found.get("actuator_delay", raw.actuator_delay)
-    timestep = np.asarray(found.get("opt.timestep", raw.opt.timestep))
-    kept = commands_kept(raw, delay, timestep)
-    most = np.atleast_2d(kept).max(axis=0)
-    if (kept != most).any():
-        history = np.repeat(raw.actuator_history[None], len(kept), axis=0)
-        history[..., 0] = kept
-        found["actuator_history"] = history
-    return with_room(raw, most), found
+    for name in [name for name, value in arrays.items() if not np.ndim(value)]:
+        put(raw, name, arrays.pop(name))
+    delay = arrays.get("actuator_delay", raw.actuator_delay)
+    timestep = np.asarray(arrays.get("opt.timestep", raw.opt.timestep))
+    counts = commands_kept(raw, delay, timestep)
+    most = np.atleast_2d(counts).max(axis=0)
+    if (counts != most).any():
+        history = np.repeat(raw.actuator_history[None], len(counts), axis=0)
+        history[..., 0] = counts
+        arrays["actuator_history"] = history
+    return with_room(raw, most), arrays
 
 
 def _rows(array: Array, value: Any) -> Array:
@@ -187,7 +187,7 @@ def step_length(timestep: float, substeps: int, options: Mapping[str, Any]) -> f
     Raises:
         BadInputError: So many substeps leave nothing of a timestep.
     """
-    whole = options.get("timestep", timestep)
-    if whole / substeps <= 0:
-        raise BadInputError(f"a timestep of {whole} s cannot have {substeps} substeps")
-    return whole / substeps
+    length = options.get("timestep", timestep)
+    if length / substeps <= 0:
+        raise BadInputError(f"a timestep of {length} s cannot have {substeps} substeps")
+    return length / substeps

@@ -146,7 +146,7 @@ class Machine:
         elif self._astray:
             self._place(self._memory)
         self._used, start = True, world.memory
-        kept = self.moment, self.derived
+        derived_before = self.moment, self.derived
         try:
             time, given, before, memory = self.time, self.given, self._left[:2], start
             if steps > 1:
@@ -173,7 +173,7 @@ class Machine:
         except BaseException:
             # The engine is elsewhere now; the arrays are not, nor is what else is known.
             self._astray, self._lives, self._memory = True, False, start
-            self.moment, self.derived = kept
+            self.moment, self.derived = derived_before
             raise
 
     def _ahead(self, time: float, given: Array, count: int) -> tuple[float, Array]:

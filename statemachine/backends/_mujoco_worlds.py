@@ -92,8 +92,8 @@ class MujocoWorlds(Worlds):
         self._history = batch.bind("history") if raw.nhistory else None
         self._warned, self._told = batch.warning, batch.warning.copy()
         # A copy of what a step changes in a row, to run a world again from there.
-        whole = resets_itself(raw) or any(mujoco.mj_stateSize(raw, int(part)) for part in _LATE)
-        end = batch.nstate if whole else batch._component(_STATE.mjSTATE_CTRL)[0]
+        all_of_it = resets_itself(raw) or any(mujoco.mj_stateSize(raw, int(part)) for part in _LATE)
+        end = batch.nstate if all_of_it else batch._component(_STATE.mjSTATE_CTRL)[0]
         self._changing = batch.state[:, :end]
         self._before = np.empty_like(self._changing)
         super().__init__(model, *size, derived, arrays)
@@ -106,14 +106,14 @@ class MujocoWorlds(Worlds):
         """Raise EngineError where the rows of so many worlds do not fit into memory."""
         data = mujoco.MjData(raw)
         state = mujoco.mj_stateSize(raw, int(_STATE.mjSTATE_INTEGRATION))
-        each = 16.0 * state + sum(getattr(data, name).nbytes for name in derived)  # with a copy
-        each += sum(array.nbytes for array in varied.values()) / n
+        size = 16.0 * state + sum(getattr(data, name).nbytes for name in derived)  # with a copy
+        size += sum(array.nbytes for array in varied.values()) / n
         if raw.opt.enableflags & _SLEEP:
-            each += data.nbuffer
+            size += data.nbuffer
         late = 16 * raw.nhistory
-        kept = raw.actuator_history[:, 0].max(initial=0)
-        of_which = f"most of it for the {kept} commands that its latency keeps on their way"
-        check_memory(n, each, of_which=of_which if late > each / 2 else "")
+        commands = raw.actuator_history[:, 0].max(initial=0)
+        of_which = f"most of it for the {commands} commands that its latency keeps on their way"
+        check_memory(n, size, of_which=of_which if late > size / 2 else "")
 
     def _model_of(self, world: int) -> Model:
         if not self._varied:
@@ -223,8 +223,8 @@ class MujocoWorlds(Worlds):
             self._batch.reset(ids, -1 if key is None else key, _NO_STAGE)
             if self._history is not None and self._base._holds_start:  # as of a Data
                 history = self._history[ids]
-                kept = None if self._kept is None else self._kept[ids]
-                hold(self._base.raw, history, self.ctrl[ids], kept)
+                counts = None if self._kept is None else self._kept[ids]
+                hold(self._base.raw, history, self.ctrl[ids], counts)
                 self._history[ids] = history
             self._told[ids] = self._warned[ids]
         listen()

@@ -148,11 +148,11 @@ def edit(model, edits, flags):
     for name, wanted in flags.items():
         holder, field = held(model, name)
         kinds = KINDS[field[: -len("flags")]].__members__
-        whole = {old for old, new in SPLIT.items() if old in kinds and set(new) <= set(wanted)}
-        unknown = [f for f in wanted if f not in kinds and not any(f in SPLIT[o] for o in whole)]
+        merged = {old for old, new in SPLIT.items() if old in kinds and set(new) <= set(wanted)}
+        unknown = [f for f in wanted if f not in kinds and not any(f in SPLIT[o] for o in merged)]
         if unknown:
             raise ValueError("it has no flag " + ", ".join(unknown))
-        setattr(holder, field, sum(int(kinds[f]) for f in kinds if f in whole.union(wanted)))
+        setattr(holder, field, sum(int(kinds[f]) for f in kinds if f in merged.union(wanted)))
     return model
 
 

@@ -85,10 +85,10 @@ def _digests() -> Path:
 def _private(folder: Path) -> bool:
     """Whether nobody else can have put something there."""
     try:
-        found = folder.lstat()
+        info = folder.lstat()
     except OSError:
         return False
     if os.name == "nt":  # what is in the user's own profile is the user's
-        return stat.S_ISDIR(found.st_mode)
-    own = found.st_uid == os.getuid() and folder.is_absolute()
-    return own and stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o077
+        return stat.S_ISDIR(info.st_mode)
+    own = info.st_uid == os.getuid() and folder.is_absolute()
+    return own and stat.S_ISDIR(info.st_mode) and not info.st_mode & 0o077

@@ -166,13 +166,13 @@ def spec_with_packages(path: Path) -> mujoco.MjSpec | None:
     if not _PACKAGE.search(text):
         return None
 
-    def found(match: re.Match[str]) -> str:
+    def in_its_package(match: re.Match[str]) -> str:
         file = mesh_file(unescape(match[0], {"&quot;": '"', "&apos;": "'"}), path.parent)
         if file is None:
             return match[0]
         return escape(str(file.resolve()), {'"': "&quot;", "'": "&apos;"})
 
-    spec = mujoco.MjSpec.from_string(_PACKAGE.sub(found, text))
+    spec = mujoco.MjSpec.from_string(_PACKAGE.sub(in_its_package, text))
     spec.modelfiledir = str(path.parent.resolve())
     return spec
 

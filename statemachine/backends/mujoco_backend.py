@@ -324,6 +324,6 @@ def _layout(model: MujocoModel, nhistory: int) -> tuple[str, tuple[tuple[str, in
         name: int(mujoco.mj_stateSize(model.raw, int(bit))) for name, bit in _COMPONENTS.items()
     }
     sizes["history"] = nhistory
-    kept = ("time", *INPUTS)  # even where they are empty
-    layout = tuple((name, size) for name, size in sizes.items() if size or name in kept)
+    always = ("time", *INPUTS)  # even where they are empty
+    layout = tuple((name, size) for name, size in sizes.items() if size or name in always)
     return model._with_fingerprint(layout)

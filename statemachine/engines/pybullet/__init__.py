@@ -67,7 +67,7 @@ class PybulletEngine(RawEngine):
         NaN for free bodies, of which the engine does not tell it, and between trees.
         """
         from ...backends._bullet_client import pb
-        from ...backends._bullet_ghost import ghost_of
+        from ...backends._bullet_driven import ghost_of
 
         # What is stepped carries the armature in links of its own: the ghost is the true arm.
         own = cast("backend.PybulletModel", model)

@@ -16,9 +16,9 @@ from typing import Any, cast
 import numpy as np
 
 from ...backends._bullet_client import pb
+from ...backends._bullet_contacts import Surfaces
 from ...backends._bullet_driven import Act
 from ...backends._bullet_plan import Plan
-from ...backends._bullet_surfaces import Surfaces
 from ...backends._bullet_world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model

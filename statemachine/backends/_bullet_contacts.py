@@ -1,19 +1,24 @@
-"""What can touch what, and with how much friction: MuJoCo's rules in PyBullet's terms.
+"""Contacts: MuJoCo's rules of what touches what, and how, in PyBullet's terms; and what touched.
 
 MuJoCo decides by pairs of geoms, and takes the larger friction or that of the geom with
-priority. PyBullet decides by pairs of links, and multiplies what each link has.
+priority. PyBullet decides by pairs of links, and multiplies what each link has. It tells of
+contacts by links, too.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from ..interface import Array
+from ..interface import Array, Contacts
+from ..rotations import matrix_from_quat
+from . import _dense as dense
 from ._contact_rules import bodies_meet, masks_meet, mixed
 
 PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
@@ -51,13 +56,13 @@ class Surfaces:
         self.meeting: list[tuple[int, int]] = []
         self.mixed: list[str] = []
         wanted = []  # friction (3,) of each pair that meets
-        for (i, one), (j, two) in combinations(enumerate(self.solids), 2):
+        for (i, left), (j, right) in combinations(enumerate(self.solids), 2):
             meeting = [
-                (a, b) for a in one.geoms for b in two.geoms if masks_meet(raw, a, b)
-            ] * bodies_meet(raw, one.body, two.body)
+                (a, b) for a in left.geoms for b in right.geoms if masks_meet(raw, a, b)
+            ] * bodies_meet(raw, left.body, right.body)
             self.pairs[i, j] = bool(meeting)
             self.meeting += meeting
-            if meeting and len(meeting) < len(one.geoms) * len(two.geoms):
+            if meeting and len(meeting) < len(left.geoms) * len(right.geoms):
                 self.mixed.append(self._label(i, j))
             if meeting:
                 frictions = np.array([_friction(raw, a, b) for a, b in meeting])
@@ -96,20 +101,20 @@ class Surfaces:
         self.spin, self.roll = (self._turning(wanted, k) for k in (1, 2))
         self.differences = []
         for i, j, (slide, spin, roll) in wanted:
-            found = (
+            kinds = (
                 ("friction", slide, min(self.slide[i] * self.slide[j], _MOST)),
                 ("spinning friction", spin, self._combined(self.spin, i, j)),
                 ("rolling friction", roll, self._combined(self.roll, i, j)),
             )
             self.differences += [
                 f"{what} of {self._label(i, j)} is {ours:.3g}, not {theirs:.3g}"
-                for what, theirs, ours in found
+                for what, theirs, ours in kinds
                 if abs(ours - theirs) > _CLOSE * max(theirs, 1e-6)
             ]
 
-    def _combined(self, each: Array, i: int, j: int) -> float:
+    def _combined(self, turning: Array, i: int, j: int) -> float:
         """What PyBullet makes of the spinning or rolling friction of two."""
-        return float(each[i] * self.slide[j] + each[j] * self.slide[i])
+        return float(turning[i] * self.slide[j] + turning[j] * self.slide[i])
 
     def _turning(self, wanted: list[tuple[int, int, Array]], which: int) -> Array:
         matrix = np.zeros((len(wanted), len(self.solids)))
@@ -118,19 +123,19 @@ class Surfaces:
         right = np.array([friction[which] for _, _, friction in wanted])
         if not right.any():
             return np.zeros(len(self.solids))
-        found = np.linalg.lstsq(matrix, right, rcond=None)[0]
-        return np.maximum(np.round(found, 12), 0.0)
+        frictions = np.linalg.lstsq(matrix, right, rcond=None)[0]
+        return np.maximum(np.round(frictions, 12), 0.0)
 
 
 def _solids(raw: mujoco.MjModel) -> list[Solid]:
     touching = [g for g in range(raw.ngeom) if raw.geom_contype[g] or raw.geom_conaffinity[g]]
     planes = [g for g in touching if raw.geom_type[g] == PLANE]
-    found = [Solid(0, (g,), True) for g in planes]
+    solids = [Solid(0, (g,), True) for g in planes]
     for body in range(raw.nbody):
         geoms = tuple(g for g in touching if raw.geom_bodyid[g] == body and g not in planes)
         if geoms:
-            found.append(Solid(body, geoms, False))
-    return found
+            solids.append(Solid(body, geoms, False))
+    return solids
 
 
 def _friction(raw: mujoco.MjModel, a: int, b: int) -> Array:
@@ -144,3 +149,91 @@ def damping_ratios(raw: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
     first, second = np.array([mixed(raw, a, b)[2] for a, b in pairs]).T
     # Negated, they are stiffness and damping.
     return np.where(first <= 0, -second / (2 * np.sqrt(np.maximum(-first, 1e-15))), second)
+
+
+def contacts_of(
+    raw: mujoco.MjModel,
+    points: Iterable[Any],
+    geoms: Mapping[tuple[int, int], tuple[int, tuple[int, ...]]],
+    turns_of_geoms: Mapping[int, Array],
+    read: Callable[[str], Any],
+) -> Contacts:
+    """The contacts that a world found at the beginning of its last step.
+
+    PyBullet knows which links touch. A link may have several geoms: the one whose
+    surface is nearest to the point is taken.
+
+    Args:
+        raw: The compiled model.
+        points: As getContactPoints tells them; those that are apart and carry no force are left
+            out.
+        geoms: By PyBullet's body and link, MuJoCo's body and its geoms that touch.
+        turns_of_geoms: By geom, the matrix (3, 3) from its body's axes into its own.
+        read: Gives xpos and xquat of that moment by name; asked only where a link has several
+            geoms.
+    """
+    turns: dict[int, Array] = {}  # by body, into its own axes
+
+    def geom_at(body: int, link: int, point: Array) -> int:
+        b, candidates = geoms[body, link]
+        if len(candidates) == 1:
+            return candidates[0]
+        if b not in turns:
+            turns[b] = matrix_from_quat(read("xquat")[b]).T.copy()
+        local = dense.times(turns[b], point - read("xpos")[b])
+        return min(candidates, key=lambda g: abs(_distance(raw, g, turns_of_geoms[g], local)))
+
+    rows: list[tuple[Any, ...]] = []
+    for point in points:
+        _, body_a, body_b, link_a, link_b, on_a, on_b, normal, dist, push = point[:10]
+        if dist > 0 and not push:
+            continue
+        on_a, on_b, normal = np.array(on_a), np.array(on_b), np.array(normal)
+        pair = geom_at(body_b, link_b, on_b), geom_at(body_a, link_a, on_a)
+        # The normal goes from B to A; friction is what A feels.
+        force = push * normal
+        for size, direction in (point[10:12], point[12:14]):
+            force = force + size * np.array(direction)
+        if pair[0] > pair[1]:
+            pair, normal, force = pair[::-1], -normal, -force
+        frame = _axes(normal)
+        rows.append((pair, dist, (on_a + on_b) / 2, frame, dense.times(frame, force)))
+    count = len(rows)
+    columns = list(zip(*rows, strict=True)) or [()] * 5
+    return Contacts(
+        geom=np.array(columns[0], dtype=np.int64).reshape(count, 2),
+        dist=np.array(columns[1], dtype=np.float64),
+        pos=np.array(columns[2], dtype=np.float64).reshape(count, 3),
+        frame=np.array(columns[3], dtype=np.float64).reshape(count, 3, 3),
+        force=np.array(columns[4], dtype=np.float64).reshape(count, 3),
+        torque=np.zeros((count, 3)),
+    )
+
+
+def _axes(normal: Array) -> Array:
+    """Contact axes (3, 3) as rows, the first the normal."""
+    aside = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
+    first = aside - normal * dense.dot(normal, aside)
+    first /= math.hypot(*first)
+    return np.array([normal, first, np.cross(normal, first)])
+
+
+def _distance(raw: mujoco.MjModel, geom: int, turn: Array, point: Array) -> float:
+    """Signed distance of a point, in the body's frame, from the surface of its geom [m].
+
+    Args:
+        raw: The compiled model.
+        geom: Of the body.
+        turn: (3, 3) from the body's axes into the geom's.
+        point: (3,) [m].
+    """
+    local = dense.times(turn, point - raw.geom_pos[geom])
+    size, kind, box = raw.geom_size[geom], int(raw.geom_type[geom]), raw.geom_aabb[geom]
+    if kind in (int(mujoco.mjtGeom.mjGEOM_SPHERE), int(mujoco.mjtGeom.mjGEOM_CAPSULE)):
+        # From the middle, or the middle line; a sphere has no second size.
+        return float(math.hypot(*local[:2], max(abs(local[2]) - size[1], 0.0)) - size[0])
+    if kind == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
+        beyond = np.array([np.hypot(local[0], local[1]) - size[0], abs(local[2]) - size[1]])
+    else:  # a mesh by the box around it
+        beyond = np.abs(local - box[:3]) - box[3:]
+    return float(math.hypot(*np.maximum(beyond, 0)) + min(beyond.max(), 0.0))
