@@ -241,18 +241,19 @@ def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> lis
     stale = {row.name for row in rows if not row.now}
     untold = [name for name in DERIVED if name not in {row.name for row in rows}]
     after_a_step, restore = behaviours["stale after a step"], behaviours["exact restore"]
-    retraced, unknown = bool(age.retraced), not age.never and age.steps is None
+    unknown = not age.never and age.steps is None
+    notes = [f"This backend does not tell: {', '.join(untold)}."] if untold else []
+    if not stale:
+        return [*notes, "All are of now."]
     sentences = [
-        (untold, f"This backend does not tell: {', '.join(untold)}."),
-        (not stale, "All are of now."),
         (
-            stale and retraced,
+            age.retraced,
             f"Found by going back: qpos − h·qvel, h = {milliseconds(engine_step(model))}, gives "
             f"the poses of {few(age.retraced)}, "
             f"{f'to {age.within:.1e} m' if age.within else 'to the bit'}.",
         ),
         (
-            stale and retraced and age.unmatched,
+            age.unmatched,
             f"{few(age.unmatched)} match neither moment: qpos or qvel was written since, or "
             "the engine integrates otherwise.",
         ),
@@ -260,20 +261,14 @@ def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> lis
             unknown and stale & set(POSES),
             "Going back one step, to qpos − h·qvel, does not lead to these poses.",
         ),
-        (
-            stale and unknown,
-            "Writes are not recorded, unless sm.watch_freshness(model, data) does.",
-        ),
-        (stale and age.written, f"Written since: {', '.join(age.written)}."),
-        (
-            stale and after_a_step.support == "unsupported",
-            f"After a step: {after_a_step.note}.",
-        ),
+        (unknown, "Writes are not recorded, unless sm.watch_freshness(model, data) does."),
+        (age.written, f"Written since: {', '.join(age.written)}."),
+        (after_a_step.support == "unsupported", f"After a step: {after_a_step.note}."),
         (
             touching and not model.capabilities.exact_restore and stale & _REMEMBERED,
             "In contacts, and the forces and accelerations of what touches, not all of the "
             f"difference need be age: {restore.note}.",
         ),
-        (stale, "sm.forward(model, data) makes all of them of now."),
+        (True, "sm.forward(model, data) makes all of them of now."),
     ]
-    return [text for holds, text in sentences if holds]
+    return notes + [text for holds, text in sentences if holds]
