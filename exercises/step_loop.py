@@ -4,6 +4,7 @@
     python step_loop.py --gravity       run one of yours, and see what it shows
     python step_loop.py --hold          run one of the two that are written already
     python step_loop.py --gravity --backend pybullet      the same on another engine
+    python step_loop.py --gravity --traceback             where an error came from, in full
     statemachine check step_loop.py     judges what your four functions do
 
 Replace each `raise NotImplementedError` by your code. A function gets a `model`, and whatever
@@ -41,10 +42,12 @@ import argparse
 import math
 import sys
 import time
+import traceback
 
 import numpy as np
 
 import statemachine as sm
+from statemachine.errors import StateMachineError
 from statemachine.interface import JointType  # noqa: F401  (for demo_state)
 
 # The command of demo_replay, one target angle for each of the six servos [rad].
@@ -221,6 +224,13 @@ SHOWS = {
 }
 
 
+def where(error, file):
+    """The last line of a function of a file that had a part in an error."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [at.lineno for at in frames if at.filename == file and at.name != "main"]
+    return f"{sys.argv[0]}, line {lines[-1]}: " if lines else ""
+
+
 def main(functions):
     """Run what the command line names; `functions` has the six by name."""
     about = {name: (functions[f"demo_{name}"].__doc__ or name).splitlines()[0] for name in SHOWS}
@@ -231,6 +241,7 @@ def main(functions):
     for name, words in about.items():
         chosen.add_argument(f"--{name}", action="store_const", dest="name", const=name, help=words)
     parser.add_argument("--backend", default="mujoco", metavar="NAME", help="an engine (mujoco)")
+    parser.add_argument("--traceback", action="store_true", help="show all of an error")
     options = parser.parse_args()
     if options.name is None:
         for name, words in about.items():
@@ -242,12 +253,15 @@ def main(functions):
     try:
         model = sm.load(scene, backend=options.backend)
         result = functions[called](model, *more)
-    except sm.errors.StateMachineError as error:
-        print(f"{called}: {error}")
-        return 2
     except NotImplementedError as todo:
         print(f"{called}: {todo}")
         return 1
+    except Exception as error:
+        if options.traceback:
+            raise
+        place, known = where(error, functions["__file__"]), isinstance(error, StateMachineError)
+        print(f"{called}: {place}{error if known else f'{type(error).__name__}: {error}'}")
+        return 2 if known else 1
     if result is None:
         print(f"{called} returned nothing: it must hand its result over with `return`")
         return 1

@@ -67,7 +67,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Files are judged by what is in them, in no time; the names of those that were."""
     seen: list[str] = []
 
-    def judge(self: ExerciseJudge, file: Path, progress: Any = None) -> Grade:
+    def judge(self: ExerciseJudge, file: Path, progress: Any = None, own: Any = None) -> Grade:
         seen.append(Path(file).name)
         text = Path(file).read_text()
         if "refuse" in text:

@@ -201,6 +201,25 @@ def test_what_ends_under_a_fault_has_caught_it(
     assert why in failure.why
 
 
+OUT_OF_ORDER = """
+import os
+
+def test_first(request):
+    request.session.items[1:] = request.session.items[:0:-1]
+
+def test_fine():
+    pass
+
+def test_ends():
+    os._exit(0)
+"""
+
+
+def test_the_test_that_ends_all_is_the_one_that_was_running(write: Write) -> None:
+    found = examine(write(OUT_OF_ORDER))
+    assert [failure.test for failure in found.failures] == ["test_ends"]
+
+
 @pytest.mark.parametrize(
     ("body", "why"),
     [

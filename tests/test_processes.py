@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import pickle
+import time
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.processes.parallel import worker_processes
 
 from .conftest import opened
 
@@ -54,3 +58,13 @@ def test_a_replay_of_20000_steps_is_bit_identical(box: sm.Model) -> None:
             sm.reset(box, data, keyframe=0)
             runs.add(_swing(box, data, 20_000))
     assert len(runs) == 1
+
+
+def test_a_worker_that_ends_loses_nothing_of_another() -> None:
+    pytest.importorskip("joblib")
+    with worker_processes(2) as (first, second):
+        waits, ends = second(time.sleep, 1.0), first(os._exit, 1)
+        with pytest.raises(BrokenProcessPool):
+            ends.result(60)
+        assert first(abs, -1).result(60) == 1
+        assert waits.result(60) is None

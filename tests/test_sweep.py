@@ -582,6 +582,24 @@ def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs:
         assert failed == [2.0, 2.0]
 
 
+NO_ALARM = """
+import signal, time
+from statemachine.sweep import worker
+del signal.setitimer
+worker._GRACE = 0.1
+with worker._limited(0.2, True):
+    time.sleep(60)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="it has none")
+def test_without_an_alarm_a_function_that_hangs_ends_its_process(tmp_path: Path) -> None:
+    """As on Windows."""
+    began = time.monotonic()
+    assert in_its_own_python(NO_ALARM, tmp_path).returncode == 1
+    assert time.monotonic() - began < 50
+
+
 def slow_sweep(policy: str, *more: str) -> list[str]:
     """The command of a sweep that takes some seconds."""
     words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]

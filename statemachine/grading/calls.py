@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
-import linecache
-import sys
-import traceback
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,13 +12,13 @@ import numpy as np
 
 from ..engines import room
 from ..errors import UnsupportedError
+from ..python_files import line_of, load_module, said
 from .answers import answer_of, encode
 from .watch import engine_watched, watching
 from .worlds import ExerciseWorld
 
 Function = Callable[..., Any]
 _MODULE = "the_students_file"
-_LONGEST = 200  # characters of an error's own text
 
 
 def reason(*rows: tuple[object, str]) -> str:
@@ -52,11 +49,6 @@ def load_file(path: Path) -> dict[str, Any]:
     Raises:
         FaultError: It does not compile, or ends with an error.
     """
-    spec = importlib.util.spec_from_file_location(_MODULE, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[_MODULE] = module  # dataclasses and pickle look it up there
     content = path.read_bytes()
     try:
         importlib.util.decode_source(content)  # which compiling bytes does not ask of comments
@@ -68,10 +60,9 @@ def load_file(path: Path) -> dict[str, Any]:
             "file. Save it as UTF-8"
         ) from None
     try:
-        spec.loader.exec_module(module)
+        return vars(load_module(_MODULE, path))
     except BaseException as error:
-        raise FaultError(f"the file cannot be loaded: {said(error, path)}") from error
-    return vars(module)
+        raise FaultError(f"the file cannot be loaded: {_remark(error, path)}") from error
 
 
 def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function:
@@ -144,52 +135,15 @@ def call(function: Function, world: ExerciseWorld) -> Any:
     except BaseException as error:
         if isinstance(error, NotImplementedError) and not isinstance(error, UnsupportedError):
             raise FaultError(f"not written yet. {error}".strip(), written=False) from None
-        raise FaultError(said(error, file)) from error
+        raise FaultError(_remark(error, file)) from error
     if result is None:
         raise FaultError("it returns nothing: print shows a result, `return` hands it over")
     return answer
 
 
-def said(error: BaseException, file: Path) -> str:
+def _remark(error: BaseException, file: Path) -> str:
     """An error in one line, with the line that it came from, in the file or one beside it."""
-    place, line, code = _line(error, file)
-    where = f"line {line}: " if line else ""
-    if line and place != file:
-        where = f"{place.name}, {where}"
-    source = f" (in `{code}`)" if code else ""
-    words = " ".join(str(error).split())
-    if len(words) > _LONGEST:
-        words = words[:_LONGEST] + " …"
-    known: dict[type[BaseException], str] = {
-        SystemExit: "it ends the program (sys.exit with "
-        f"{getattr(error, 'code', None)!r}) where it should return",
-        MemoryError: "it asks for more memory than there is for it",
-        RecursionError: "it calls itself without end",
-        EOFError: "EOFError: it asks for input, and nobody types here. A function gets what it "
-        'needs as arguments; the rest belongs below `if __name__ == "__main__":`',
-        SyntaxError: str(getattr(error, "msg", "")),
-    }
-    other = f"{type(error).__name__}{': ' * bool(words)}{words}"
-    text = next((text for kind, text in known.items() if isinstance(error, kind)), other)
-    return f"{where}{text}{source}"
-
-
-def _line(error: BaseException, file: Path) -> tuple[Path, int, str]:
-    """The last line of the student's that had a part in it: file, number and text.
-
-    Of the file, or of another in its folder or below, but for packages that live there.
-    """
-    if isinstance(error, SyntaxError) and _students(Path(error.filename or ""), file):
-        return Path(error.filename or ""), error.lineno or 0, (error.text or "").strip()
-    for frame, number in reversed(list(traceback.walk_tb(error.__traceback__))):
-        place = Path(frame.f_code.co_filename)
-        if _students(place, file):
-            return place, number, linecache.getline(str(place), number).strip()
-    return file, 0, ""
-
-
-def _students(place: Path, file: Path) -> bool:
-    beside = file.parent in place.parents and not {"site-packages", "statemachine"} & set(
-        place.relative_to(file.parent).parts
-    )
-    return place == file or (beside and place.is_file())
+    place, line, code = line_of(error, file)
+    beside = f"{place.name}, " if line and place != file else ""
+    where = f"{beside}line {line}: " if line else ""
+    return f"{where}{said(error)}" + (f" (in `{code}`)" if code else "")

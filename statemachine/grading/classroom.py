@@ -236,8 +236,7 @@ def judge_all(
     before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
     compared = _compared(submitted)
-    own = {submission.path: submission.own for submission in submitted if submission.path}
-    with ExerciseJudge(backend, time_limit, own=own) as judge:
+    with ExerciseJudge(backend, time_limit) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
         made_with = f"{backend}, {versions}, {time_limit:g} s"
         work: dict[str, Callable[[], ClassEntry]] = {}
@@ -285,7 +284,9 @@ def _entry(
     """The entry with what is not known yet."""
     if submission.path is not None and not entry.judged:
         try:
-            entry = replace(entry, functions=judge.judge(submission.path).functions)
+            entry = replace(
+                entry, functions=judge.judge(submission.path, own=submission.own).functions
+            )
         except BadInputError as error:
             entry = replace(entry, refusal=str(error))
     file = submission.named(_NAMES[1])

@@ -99,9 +99,8 @@ def run(
         UnknownNameError: There is no such backend.
         MissingEngineError: Its engine is not installed here.
     """
-    own = {} if folder is None else {Path(file): in_folder(folder)}
-    with ExerciseJudge(backend, time_limit, wall_limit, own) as judge:
-        return judge.judge(file, progress)
+    with ExerciseJudge(backend, time_limit, wall_limit) as judge:
+        return judge.judge(file, progress, None if folder is None else in_folder(folder))
 
 
 class ExerciseJudge(ExitStack):
@@ -118,13 +117,8 @@ class ExerciseJudge(ExitStack):
         backend: str,
         time_limit: float = TIME_LIMIT,
         wall_limit: float = WALL_LIMIT,
-        own: Mapping[Path, Mapping[str, Path]] | None = None,
     ) -> None:
-        """Arguments as `run` has them.
-
-        `own` has for a submission all files that belong to it, by their names in its folder; for
-        others these are what they name beside them.
-        """
+        """Arguments as `run` has them."""
         super().__init__()
         if not 0 < time_limit <= 3600:
             raise BadInputError(
@@ -139,7 +133,6 @@ class ExerciseJudge(ExitStack):
             self.versions[engine] = engine_version(engine)
         self.limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
         self.stop = threading.Event()
-        self._own = own or {}
         self._lock = threading.Lock()
         self._key: dict[str, tuple[list[ExerciseWorld], list[Any]]] = {}
 
@@ -153,21 +146,26 @@ class ExerciseJudge(ExitStack):
         return self
 
     def judge(
-        self, file: str | os.PathLike[str], progress: Callable[[float], None] = lambda _: None
+        self,
+        file: str | os.PathLike[str],
+        progress: Callable[[float], None] = lambda _: None,
+        own: Mapping[str, Path] | None = None,
     ) -> Grade:
         """Judge each function of a student's file.
 
         Args:
             file: A Python file; nothing of it runs in this process.
             progress: Told the fraction that is done.
+            own: All files that belong to it, by their names in its folder; without, what it
+                names beside it.
 
         Raises:
             BadInputError: There is no such file, or it is no Python file.
         """
         path = _python_file(Path(file))
-        own = self._own.get(Path(file)) or named_by(path)
         folder = Path(tempfile.mkdtemp(dir=self._folder))
-        judgements = self._all(_copied(path, own, folder / "own"), folder, progress)
+        copy = _copied(path, own or named_by(path), folder / "own")
+        judgements = self._all(copy, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)
         limits = self.limits
         return Grade(

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
+from functools import partial
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -53,31 +54,33 @@ def in_parallel(
 
 
 @contextmanager
-def worker_processes(jobs: int) -> Iterator[Callable[..., Future[Any]]]:
-    """A function that submits a call to one of several processes, which end with the context.
+def worker_processes(jobs: int) -> Iterator[list[Callable[..., Future[Any]]]]:
+    """A function for each of several processes, which submits a call to it.
 
-    They are joblib's, which need no `if __name__ == "__main__"` of the user. Each computes on one
-    processor. Where one ends, all that is not done yet fails with BrokenProcessPool, and what is
-    submitted next has new processes.
+    The processes end with the context. They are joblib's, which need no `if __name__ ==
+    "__main__"` of the user. Each computes on one processor. Where one ends, what was submitted to
+    it fails with BrokenProcessPool, nothing that others do is lost, and what is submitted to it
+    next has a new process.
     """
     _begin_trackers()
     loky: Any = importlib.import_module(_LOKY)
-    executor = loky.ProcessPoolExecutor(jobs, env=ALONE)
+    # An executor of several processes would lose the work of all with any one of them.
+    executors = [loky.ProcessPoolExecutor(1, env=ALONE) for _ in range(jobs)]
 
-    def submit(function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        nonlocal executor
+    def submit(worker: int, *call: Any) -> Future[Any]:
         with sigint_blocked():
             try:
-                return executor.submit(function, *arguments)
+                return executors[worker].submit(*call)
             except BrokenProcessPool:
-                executor = loky.ProcessPoolExecutor(jobs, env=ALONE)
-                return executor.submit(function, *arguments)
+                executors[worker] = loky.ProcessPoolExecutor(1, env=ALONE)
+                return executors[worker].submit(*call)
 
     try:
-        yield submit
+        yield [partial(submit, worker) for worker in range(jobs)]
     finally:
-        with suppress(Exception):
-            executor.shutdown(wait=True, kill_workers=True)
+        for executor in executors:
+            with suppress(Exception):
+                executor.shutdown(wait=True, kill_workers=True)
 
 
 def _begin_trackers() -> None:

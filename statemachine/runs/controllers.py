@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import inspect
 import itertools
 import sys
-import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +14,7 @@ from ..errors import BadInputError, did_you_mean
 from ..interface import Data, Model
 from ..interface.checks import as_vector
 from ..measures.text import count
+from ..python_files import line_of, load_module, said
 from .drive import Controller
 from .scenarios import Scenario
 
@@ -125,13 +124,8 @@ def _function(path: Path, name: str) -> Function:
     """A function of a file, which is run for it."""
     if path.suffix != ".py" or not path.is_file():
         raise _missing(path)
-    module_spec = importlib.util.spec_from_file_location(f"controller_{path.stem}", path)
-    if module_spec is None or module_spec.loader is None:
-        raise BadInputError(f"{path.name} cannot be loaded as Python")
-    module = importlib.util.module_from_spec(module_spec)
-    sys.modules[module_spec.name] = module  # dataclasses look themselves up there
     with _errors_of(path):
-        module_spec.loader.exec_module(module)
+        module = load_module(f"controller_{path.stem}", path)
     function = getattr(module, name, None)
     if not callable(function):
         functions = [key for key, value in vars(module).items() if inspect.isfunction(value)]
@@ -156,25 +150,10 @@ def _errors_of(path: Path, time: float | None = None) -> Iterator[None]:
     try:
         yield
     except (Exception, SystemExit) as error:
-        raise _failed(error, path, time) from error
+        place, line, _ = line_of(error, path.absolute())
+        where = place.name + (f", line {line}" if line else "")
+        when = "" if time is None else f", at {time:.3f} s"
+        raise BadInputError(f"{where}{when}: {said(error)}") from error
     finally:
         if folder in sys.path:
             sys.path.remove(folder)
-
-
-def _failed(error: BaseException, path: Path, time: float | None = None) -> BadInputError:
-    """What went wrong in the file, and at which of its lines."""
-    lines = [
-        frame.lineno
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename) == path or Path(frame.filename).name == path.name
-    ]
-    if isinstance(error, SyntaxError):
-        lines = [error.lineno]
-    where = path.name + (f", line {lines[-1]}" if lines else "")
-    when = "" if time is None else f", at {time:.3f} s"
-    if isinstance(error, SystemExit):
-        return BadInputError(f"{where}{when}: it ends the program (exit with {error.code!r})")
-    # A SyntaxError's text names file and line once more.
-    said = error.msg if isinstance(error, SyntaxError) else str(error)
-    return BadInputError(f"{where}{when}: {type(error).__name__}: {said}")

@@ -7,12 +7,12 @@ import math
 import os
 import time
 import warnings
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +30,12 @@ from .worker import Row, differing, row_of, run_batch
 
 Batch = Sequence[SweepCell]
 Results = Generator[list[Row], None, None]
+Submit = Callable[[PreparedSweep, Batch], Future[list[Row]]]  # to a worker
 
 _BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
 _TASKS = 4  # at least so many for each job, so that none is idle at the end
 _PATIENCE = 10.0  # seconds for a scheduler to answer
+_RUN_APART = partial(run_batch, own=True)
 
 
 @dataclass(frozen=True)
@@ -179,14 +181,9 @@ def run_apart(
     `look` is called between any two waits, and may raise.
     """
     require_extra("joblib", "a sweep", "joblib", "sweep")
-    with worker_processes(jobs) as submit:
-        yield from _results(
-            batches,
-            jobs,
-            lambda batch: submit(run_batch, ready, batch, True),
-            lambda batch: _cell_by_cell(ready, batch, look),
-            look,
-        )
+    with worker_processes(jobs) as workers:
+        here = [partial(submit, _RUN_APART) for submit in workers]
+        yield from _results(ready, batches, here, here, look)
 
 
 def _run_on_dask(
@@ -197,61 +194,69 @@ def _run_on_dask(
     Raises:
         BadInputError: The scheduler went away.
     """
-    submit = client.get_executor(pure=False).submit
+    submit = partial(client.get_executor(pure=False).submit, partial(run_batch, own=False))
+    with worker_processes(1) as (worker,):
 
-    def run_here(batch: Batch) -> list[Row]:
-        if client.status != "running":
-            raise BadInputError("the scheduler went away; what was done is kept")
-        return _cell_by_cell(ready, batch, look)
+        def submit_here(ready: PreparedSweep, batch: Batch) -> Future[list[Row]]:
+            if client.status != "running":
+                raise BadInputError("the scheduler went away; what was done is kept")
+            return worker(_RUN_APART, ready, batch)
 
-    return _results(
-        batches,
-        _workers(client),
-        lambda batch: submit(run_batch, ready, batch, False),
-        run_here,
-        look,
-    )
+        # Some batches always wait, so that no worker is idle.
+        there = [submit] * (2 * _workers(client))
+        yield from _results(ready, batches, there, [submit_here], look)
 
 
 def _results(
+    ready: PreparedSweep,
     batches: Iterable[Batch],
-    workers: int,
-    submit: Callable[[Batch], Future[list[Row]]],
-    run_again: Callable[[Batch], list[Row]],
+    workers: list[Submit],
+    here: list[Submit],
     look: Callable[[], None],
 ) -> Results:
-    """The rows of each batch, as they are ready; some always wait, so that no worker is idle."""
-    coming, waiting = iter(batches), dict[Future[list[Row]], Batch]()
+    """The rows of each batch, as they are ready.
+
+    The cells of a batch that was lost with a process are run again one by one, each by a worker
+    of `here`; one that ends that process, too, fails.
+
+    Args:
+        ready: The sweep.
+        batches: What is to run.
+        workers: Each submits one batch at a time; those that are idle.
+        here: The same for cells that are run again; it may be the same list.
+        look: Called between any two waits.
+    """
+    coming, again = iter(batches), deque[Batch]()
+    waiting: dict[Future[list[Row]], tuple[Batch, list[Submit], Submit]] = {}
+    lost: set[str] = set()  # cells of batches that a process ended with
+
+    def begin(batch: Batch, idle: list[Submit]) -> None:
+        submit = idle.pop()
+        waiting[submit(ready, batch)] = batch, idle, submit
+
     while True:
-        for batch in itertools.islice(coming, 2 * workers - len(waiting)):
-            waiting[submit(batch)] = batch
+        while again and here:
+            begin(again.popleft(), here)
+        for batch in itertools.islice(coming, len(workers)):
+            begin(batch, workers)
         if not waiting:
             return
         done = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done
         look()
         for future in done:
-            batch = waiting.pop(future)
+            batch, idle, submit = waiting.pop(future)
+            idle.append(submit)
             try:
                 rows = future.result()
             except Exception:  # its process ended
-                rows = run_again(batch)
+                if lost.issuperset(cell.id for cell in batch):
+                    error = WorkerEndedError("its process ended before it was done, twice")
+                    rows = [row_of(ready, cell, error) for cell in batch]
+                else:
+                    rows = []
+                    again += [[cell] for cell in batch]
+                    lost.update(cell.id for cell in batch)
             yield rows
-
-
-def _cell_by_cell(ready: PreparedSweep, batch: Batch, look: Callable[[], None]) -> list[Row]:
-    """The rows of a batch that was lost with a process; a cell that ends another one fails."""
-    rows: list[Row] = []
-    with worker_processes(1) as submit:
-        for cell in batch:
-            future = submit(run_batch, ready, [cell], True)
-            while not wait([future], timeout=0.2).done:
-                look()
-            try:
-                rows += future.result()
-            except BrokenProcessPool:
-                error = WorkerEndedError("its process ended before it was done, twice")
-                rows.append(row_of(ready, cell, error))
-    return rows
 
 
 @contextmanager

@@ -123,20 +123,23 @@ def _limited(seconds: float, own: bool) -> Iterator[None]:
     A run looks at the clock itself. This is for what does not come back from the user's function
     or from the engine; it needs a process of its own, whose signals are nobody else's.
     """
-    if not own or not hasattr(signal, "setitimer"):
+    if not own:
         yield
         return
+    timer = hasattr(signal, "setitimer")  # not on Windows: there a process only ends
 
     def end(_number: int, _frame: FrameType | None) -> None:
         raise _OutOfTimeError
 
-    signal.signal(signal.SIGALRM, end)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    if timer:
+        signal.signal(signal.SIGALRM, end)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
     faulthandler.dump_traceback_later(seconds + _GRACE, exit=True, file=sys.__stderr__ or 2)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        if timer:
+            signal.setitimer(signal.ITIMER_REAL, 0)
         faulthandler.cancel_dump_traceback_later()
 
 
@@ -153,7 +156,7 @@ def _model(
         BadInputError: The model or the function is another one than that of the sweep.
     """
     sweep, wrong = ready.sweep, "is not the file of the sweep: it changed, or is another here"
-    if not _same_function(ready):
+    if not _is_same(ready):
         raise BadInputError(f"{function_file(sweep.what).name} {wrong}")
     seeded = {"seed": cell.seed} if "seed" in ready.parameters else {}
     chosen = {vary.name: value for vary, value in ready.settings(cell, "parameter")}
@@ -167,7 +170,7 @@ def _model(
     key = repr((name, ready.files[name], cell.backend, first, sweep))
 
     def loaded() -> tuple[Model, Scenario]:
-        if not _same_model(ready, name):
+        if not _is_same(ready, name):
             raise BadInputError(f"{name} {wrong}")
         base = load_of(sweep, ready.places[name], cell.backend, first)
         return base, scenario.on(base)
@@ -306,18 +309,13 @@ def digest_of(function: str) -> str:
     return digest(function_file(function).read_text(encoding="utf-8", errors="replace"))
 
 
-def _same_function(ready: PreparedSweep) -> bool:
-    """Whether the user's file, if there is one, is that of the sweep."""
+def _is_same(ready: PreparedSweep, model: str = "") -> bool:
+    """Whether the file of a model, or else the user's if there is one, is that of the sweep."""
     try:
+        if model:
+            path = resolve(ready.places[model], ready.sweep.menagerie)
+            return model_digest(path) == ready.files[model]
         return not ready.function or digest_of(ready.sweep.what) == ready.function
-    except OSError:
-        return False
-
-
-def _same_model(ready: PreparedSweep, name: str) -> bool:
-    """Whether the file of a model is that of the sweep."""
-    try:
-        return model_digest(resolve(ready.places[name], ready.sweep.menagerie)) == ready.files[name]
     except (StateMachineError, OSError):
         return False
 
@@ -330,5 +328,5 @@ def differing(ready: PreparedSweep, version: str) -> str:
         version: Of the driver's library.
     """
     wrong = [] if version == __version__ else ["statemachine"]
-    wrong += [name for name in ready.files if not _same_model(ready, name)]
-    return listed(wrong if _same_function(ready) else [*wrong, ready.sweep.what])
+    wrong += [name for name in ready.files if not _is_same(ready, name)]
+    return listed(wrong if _is_same(ready) else [*wrong, ready.sweep.what])

@@ -79,9 +79,9 @@ def data(model: Model) -> Iterator[Data]:
 class PytestRecorder:
     """Writes down which tests there are, and pytest's report of each as it comes.
 
-    Lines: {"ready": true} once the fault is in, {"tests": names}, and of each report {"test": name,
-    "when": "setup", "call" or "teardown", "outcome", "text"}; of a file that cannot be imported
-    the name is `IMPORT`.
+    Lines: {"ready": true} once the fault is in, {"tests": names}, {"begins": name} as each begins,
+    and of each report {"test": name, "when": "setup", "call" or "teardown", "outcome", "text"}; of
+    a file that cannot be imported the name is `IMPORT`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -98,6 +98,9 @@ class PytestRecorder:
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         if report.failed:
             self._write(test=IMPORT, when="collect", outcome="failed", text=report.longreprtext)
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        self._write(begins=_name(nodeid))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         facts = {"when": report.when, "outcome": report.outcome, "text": report.longreprtext}

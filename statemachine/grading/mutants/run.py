@@ -260,7 +260,7 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> _Record:
     if not outcome.started:  # of which no test can be the reason
         raise EngineError(f"pytest stopped before the tests: it {_end(outcome)}")
     tests: list[str] | None = None
-    ended = 0
+    running, ended = "", set[str]()
     skipped: set[str] = set()
     failures: dict[str, str] = {}
     for line in content(record, _RECORD_MOST).splitlines():
@@ -273,8 +273,10 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> _Record:
                 pass
             case {"tests": [*names]} if all(isinstance(name, str) for name in names):
                 tests = names
+            case {"begins": str(name)}:
+                running = name
             case {"test": str(name), "when": str(when), "outcome": outcome_of, "text": str(text)}:
-                ended += when == "teardown"
+                ended |= {name} if when == "teardown" else set()
                 if outcome_of == "failed":
                     failures.setdefault(name, _said(text, file))  # the test before its teardown
                 elif outcome_of == "skipped":
@@ -283,10 +285,11 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> _Record:
                 raise BadInputError("the tests wrote into the record of what they do")
     if tests is None:
         failures.setdefault(IMPORT, f"it {_end(outcome)}")
-    elif IMPORT not in failures and ended < len(tests):  # one ended them all
-        failures.setdefault(tests[ended], _end(outcome))
-    left = tuple(test for test in tests or () if test not in skipped)
-    return _Record(outcome, left, len(skipped), failures)
+    elif IMPORT not in failures and (rest := [test for test in tests if test not in ended]):
+        # The one that was running ended them all.
+        failures.setdefault(running if running in rest else rest[0], _end(outcome))
+    counted = tuple(test for test in tests or () if test not in skipped)
+    return _Record(outcome, counted, len(skipped), failures)
 
 
 def _said(text: str, file: str) -> str:
