@@ -150,11 +150,11 @@ class DivergedWarning(UserWarning):
     """Some of many worlds diverged and are left out from now on."""
 
 
-def refuse(*rows: tuple[object, str]) -> None:
-    """Raise BadInputError with the text of the first row that holds."""
+def refuse(*rows: tuple[object, str], error: Callable[[str], Exception] = BadInputError) -> None:
+    """Raise an error with the text of the first row that holds."""
     for holds, text in rows:
         if holds:
-            raise BadInputError(text)
+            raise error(text)
 
 
 def check_name(kind: str, name: object, known: Iterable[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import linecache
 import sys
 import traceback
@@ -23,6 +24,17 @@ def load_module(name: str, path: Path) -> Any:
     sys.modules[name] = module  # dataclasses and pickle look it up there
     spec.loader.exec_module(module)
     return module
+
+
+def misfit(function: Any, *arguments: Any, **named: Any) -> tuple[str, str]:
+    """The signature of a function that cannot be called like this, and why; else twice ""."""
+    try:
+        inspect.signature(function).bind(*arguments, **named)
+    except TypeError as error:
+        return str(inspect.signature(function)), str(error)
+    except ValueError:  # something of C's without a signature
+        pass
+    return "", ""
 
 
 def line_of(error: BaseException, file: Path) -> tuple[Path, int, str]:

@@ -27,7 +27,16 @@ from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.grading.watch import engine_watched
 from statemachine.grading.worlds import ExerciseWorld, Scenes
 
-from .conftest import ROOT, Cli, assert_in, need_engine, processes_with, written, written_all
+from .conftest import (
+    ROOT,
+    Cli,
+    assert_in,
+    in_its_own_python,
+    need_engine,
+    processes_with,
+    written,
+    written_all,
+)
 from .exercises import RIGHT, WRONG, Attempt
 
 for _module in ("gravity", "state", "forward", "replay"):
@@ -495,21 +504,15 @@ def test_the_exercise_runs_as_a_program(
 
 
 def test_an_error_in_a_script_is_one_line_and_all_of_it_if_asked(tmp_path: Path) -> None:
-    body = 'raise NotImplementedError("TODO(you): read the fingertip four times")'
-    text = STUDENT.read_text().replace(body, "return [dta.qpos]")
-    script = written(tmp_path / "step_loop.py", text)
-    line = text[: text.index("dta")].count("\n") + 1
-    for flags, shown in (((), ""), (("--traceback",), "Traceback")):
-        done = subprocess.run(
-            [sys.executable, str(script), "--forward", *flags],
-            capture_output=True,
-            text=True,
-            check=False,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-        )
-        assert done.returncode == 1
-        assert done.stderr.startswith(shown)
-        said = done.stderr if shown else done.stdout
-        assert f", line {line}" in said
-        assert "NameError: name 'dta' is not defined" in said
-        assert shown or len(said.splitlines()) == 1
+    todo = 'raise NotImplementedError("TODO(you): read the fingertip four times")'
+    text = STUDENT.read_text().replace(todo, "return [dta.qpos]")
+    script = str(written(tmp_path / "step_loop.py", text))
+    line = f"line {text[: text.index('dta')].count(chr(10)) + 1}"
+    run = "import runpy, sys; sys.argv = {!r}; runpy.run_path(sys.argv[0], run_name='__main__')"
+    short, full = (
+        in_its_own_python(run.format([script, "--forward", *flags]), tmp_path)
+        for flags in ((), ("--traceback",))
+    )
+    says = f"demo_forward: {script}, {line}: NameError: name 'dta' is not defined\n"
+    assert (short.stdout, short.stderr, short.returncode) == (says, "", 1)
+    assert_in(full.stderr, "Traceback", line, "NameError: name 'dta' is not defined")

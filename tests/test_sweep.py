@@ -595,9 +595,7 @@ with worker._limited(0.2, True):
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="it has none")
 def test_without_an_alarm_a_function_that_hangs_ends_its_process(tmp_path: Path) -> None:
     """As on Windows."""
-    began = time.monotonic()
     assert in_its_own_python(NO_ALARM, tmp_path).returncode == 1
-    assert time.monotonic() - began < 50
 
 
 def slow_sweep(policy: str, *more: str) -> list[str]:

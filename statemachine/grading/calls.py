@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import inspect
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..engines import room
-from ..errors import UnsupportedError
-from ..python_files import line_of, load_module, said
+from ..errors import UnsupportedError, refuse
+from ..python_files import line_of, load_module, misfit, said
 from .answers import answer_of, encode
 from .watch import engine_watched, watching
 from .worlds import ExerciseWorld
@@ -71,20 +70,15 @@ def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function
     Raises:
         FaultError: There is none, or it takes others.
     """
-    function = names.get(name)
-    if function is None:
-        raise FaultError(f"the file has no function {name}")
-    if not callable(function):
-        raise FaultError(f"{name} is no function: {type(function).__name__}")
-    try:
-        inspect.signature(function).bind(None, *arguments)
-    except TypeError as error:
-        raise FaultError(
-            f"it is called with a model and {len(arguments)} more, and takes "
-            f"{inspect.signature(function)}: {error}"
-        ) from None
-    except ValueError:  # something of C's without a signature
-        pass
+    function: Any = names.get(name)
+    refuse(
+        (function is None, f"the file has no function {name}"),
+        (not callable(function), f"{name} is no function: {type(function).__name__}"),
+        error=FaultError,
+    )
+    takes, why = misfit(function, None, *arguments)
+    called = f"it is called with a model and {len(arguments)} more, and takes {takes}: {why}"
+    refuse((takes, called), error=FaultError)
     return function
 
 

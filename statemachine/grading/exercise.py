@@ -23,7 +23,7 @@ from typing import Any, Self
 
 from .. import __version__, errors
 from ..backends import backend_engine
-from ..errors import BadInputError, EngineError
+from ..errors import BadInputError, EngineError, refuse
 from ..installed import DEFAULT, engine_version
 from ..processes.parallel import in_parallel, unwinding
 from ..releases import is_release
@@ -120,12 +120,13 @@ class ExerciseJudge(ExitStack):
     ) -> None:
         """Arguments as `run` has them."""
         super().__init__()
-        if not 0 < time_limit <= 3600:
-            raise BadInputError(
-                f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
-            )
-        if is_release(backend):
-            raise BadInputError("exercises are judged on engines that are installed")
+        refuse(
+            (
+                not 0 < time_limit <= 3600,
+                f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}",
+            ),
+            (is_release(backend), "exercises are judged on engines that are installed"),
+        )
         engine = backend_engine(backend)
         self.backend = backend
         self.versions = {"statemachine": __version__, "python": sys.version.split()[0]}
@@ -258,24 +259,28 @@ def _python_file(path: Path) -> Path:
         folder, file = path.is_dir(), path.is_file()
     except (OSError, ValueError, RuntimeError) as error:
         raise BadInputError(f"no file can have this name: {error}") from None
-    if folder:
-        raise BadInputError(f"{path.name} is a folder: name the student's file in it")
-    if not file:
-        raise BadInputError(f"there is no file {path.name}")
-    if path.suffix != ".py":
-        raise BadInputError(f"{path.name} is no Python file: its name does not end in .py")
+    refuse(
+        (folder, f"{path.name} is a folder: name the student's file in it"),
+        (not file, f"there is no file {path.name}"),
+        (path.suffix != ".py", f"{path.name} is no Python file: its name does not end in .py"),
+    )
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST + 1)
     except OSError as error:
         raise BadInputError(f"{path.name} cannot be read: {error.strerror}") from None
-    if len(content) > LARGEST or b"\0" in content:
-        raise BadInputError(f"{path.name} is no Python file, or far too large for one")
-    if re.search(rb"^def test_", content, re.M) and not re.search(rb"demo_\w+", content):
-        raise BadInputError(
+    tests = re.search(rb"^def test_", content, re.M) and not re.search(rb"demo_\w+", content)
+    refuse(
+        (
+            len(content) > LARGEST or b"\0" in content,
+            f"{path.name} is no Python file, or far too large for one",
+        ),
+        (
+            tests,
             f"{path.name} holds tests and none of the functions: did you mean "
-            f"statemachine check --mutants {path.name}?"
-        )
+            f"statemachine check --mutants {path.name}?",
+        ),
+    )
     return path
 
 

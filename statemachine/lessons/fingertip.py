@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import BadInputError, ModelError, UnknownNameError
+from ..errors import BadInputError, ModelError, UnknownNameError, refuse
 from ..installed import WITNESS
 from ..interface import Array, JointType, Model, forward, make_data
 from ..interface.checks import as_count
@@ -147,16 +147,17 @@ def certify(
             that the model has not, or nothing moves.
     """
     wanted = as_count(poses, "poses")
-    if not 2 <= wanted <= _MOST:
-        raise BadInputError(
+    refuse(
+        (
+            not 2 <= wanted <= _MOST,
             f"poses must be from 2, as one cannot tell a frame from a joint, to {_MOST:,}; "
-            f"got {wanted:,}"
-        )
-    if seed < 0:
-        raise BadInputError(f"seed must not be negative; got {seed}")
+            f"got {wanted:,}",
+        ),
+        (seed < 0, f"seed must not be negative; got {seed}"),
+    )
     tips = tips_of(model, site)
-    if witness_frame is not None and len(tips) > 1:
-        raise BadInputError("--witness-frame names one frame: say which with --site")
+    several = witness_frame is not None and len(tips) > 1
+    refuse((several, "--witness-frame names one frame: say which with --site"))
     known, asked, reason = _asked(model, tips, witness, witness_frame)
     joints = shared_joints(known, model.joint_names)
     configurations = random_qpos(model, joints, wanted, seed)

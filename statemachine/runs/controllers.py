@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, did_you_mean
+from ..errors import BadInputError, did_you_mean, refuse
 from ..interface import Data, Model
 from ..interface.checks import as_vector
 from ..measures.text import count
-from ..python_files import line_of, load_module, said
+from ..python_files import line_of, load_module, misfit, said
 from .drive import Controller
 from .scenarios import Scenario
 
@@ -107,16 +107,9 @@ def _place(spec: str) -> tuple[Path, str]:
 def _imported(path: Path, name: str, parameters: Mapping[str, Any]) -> Function:
     """A function of a file, which is run for it, that can be called like this."""
     function = _function(path, name)
-    try:
-        inspect.signature(function).bind(*_TAKES, **parameters)
-    except TypeError:
-        listed = ", ".join((*_TAKES, *parameters))
-        raise BadInputError(
-            f"{name} of {path.name} takes {inspect.signature(function)}, and is called with "
-            f"({listed})"
-        ) from None
-    except ValueError:  # something of C's without a signature
-        pass
+    takes, _ = misfit(function, *_TAKES, **parameters)
+    given = ", ".join((*_TAKES, *parameters))
+    refuse((takes, f"{name} of {path.name} takes {takes}, and is called with ({given})"))
     return function
 
 

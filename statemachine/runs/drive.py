@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, DivergedError
+from ..errors import BadInputError, DivergedError, refuse
 from ..interface import Data, Model, make_data, step
 
 Progress = Callable[[float], None]  # told the fraction that is done
@@ -42,14 +42,15 @@ def cost_of_a_second(model: Model) -> float:
 
 def steps_in(model: Model, seconds: float) -> int:
     """Number of timesteps in a time, at least one."""
-    if not np.isfinite(seconds) or seconds <= 0:
-        raise BadInputError(f"seconds must be above 0; got {seconds}")
     steps = max(1.0, seconds / model.timestep)
-    if steps * model.substeps > _STEPS_MOST:
-        raise BadInputError(
+    refuse(
+        (not np.isfinite(seconds) or seconds <= 0, f"seconds must be above 0; got {seconds}"),
+        (
+            steps * model.substeps > _STEPS_MOST,
             f"{seconds:g} s are {steps * model.substeps:.3g} steps of the engine, and a run has "
-            f"at most {_STEPS_MOST:,}"
-        )
+            f"at most {_STEPS_MOST:,}",
+        ),
+    )
     return round(steps)
 
 

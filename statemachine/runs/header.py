@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import TraceError
+from ..errors import TraceError, refuse
 from ..interface import OPTIONS, JointType
 from ..interface.checks import HUGE
 from .provenance import Provenance
@@ -189,10 +189,12 @@ class Header:
             ("ctrlrange", nu, None, None),
         ):
             entries = getattr(self, name)
-            if len(entries) != length:
-                raise TraceError(f"{name} of the trace has {len(entries)} entries")
-            if below is not None and not all(least <= number < below for number in entries):
-                raise TraceError(f"{name} of the trace names one that is not there")
+            beyond = below is not None and not all(least <= k < below for k in entries)
+            refuse(
+                (len(entries) != length, f"{name} of the trace has {len(entries)} entries"),
+                (beyond, f"{name} of the trace names one that is not there"),
+                error=TraceError,
+            )
         for name, kind, qpos, dof in zip(
             self.joint_labels, self.jnt_type, self.jnt_qposadr, self.jnt_dofadr, strict=True
         ):

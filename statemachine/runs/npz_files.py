@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -9,7 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.lib import format as npy
 
-from ..errors import TraceError
+from ..errors import TraceError, refuse
 from .header import INPUTS, Header
 from .trace import WHOLE, Trace, as_column, check_shapes, check_size
 
@@ -52,12 +53,13 @@ def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     entries: dict[str, zipfile.ZipInfo] = {}
     for entry in archive.infolist():
         name = entry.filename.removesuffix(".npy")
-        if name == entry.filename:
-            raise TraceError(f"holds {name[:40]!r}, which is no array")
-        if entry.comment or entry.extra:  # where a damaged list of contents hides its next entries
-            raise TraceError("has a damaged list of contents")
-        if name in entries:
-            raise TraceError(f"holds two arrays {name[:40]!r}")
+        refuse(
+            (name == entry.filename, f"holds {name[:40]!r}, which is no array"),
+            # Where a damaged list of contents hides its next entries.
+            (entry.comment or entry.extra, "has a damaged list of contents"),
+            (name in entries, f"holds two arrays {name[:40]!r}"),
+            error=TraceError,
+        )
         entries[name] = entry
     return entries
 
@@ -77,10 +79,12 @@ def _describe(
 
 def _read_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
     shape, kind = _describe(archive, entry)
-    if kind != np.uint8 or len(shape) != 1:
-        raise TraceError("has a header that is no text: it is no trace")
-    if shape[0] > _HEADER_MOST:
-        raise TraceError(f"has a header of {shape[0]:,} bytes; at most {_HEADER_MOST:,}")
+    size = math.prod(shape)
+    refuse(
+        (kind != np.uint8 or len(shape) != 1, "has a header that is no text: it is no trace"),
+        (size > _HEADER_MOST, f"has a header of {size:,} bytes; at most {_HEADER_MOST:,}"),
+        error=TraceError,
+    )
     return Header.from_json(_unfold(archive, entry).tobytes().decode())
 
 

@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..errors import TraceError
+from ..errors import TraceError, refuse
 from ..interface import Array, Data, Model, make_data, reset
 from .drive import Controller, Progress, check_length, silent
 from .recorder import record
@@ -172,17 +172,24 @@ def play(
         TraceError: The model has other joints or actuators, in name or in order.
     """
     header = trace.header
-    for what, ours, theirs in (
-        ("joints", model.joint_names, header.joints),
-        ("actuators", model.actuator_names, header.actuators),
-    ):
-        if tuple(ours) != tuple(theirs):
-            raise TraceError(
+    refuse(
+        *(
+            (
+                tuple(ours) != tuple(theirs),
                 f"the trace has other {what} than {model.path.name}: "
-                f"{', '.join(theirs)} and {', '.join(ours)}"
+                f"{', '.join(theirs)} and {', '.join(ours)}",
             )
-    if (header.nq, header.nv) != (model.nq, model.nv):
-        raise TraceError("the trace's joints are of other kinds than the model's")
+            for what, ours, theirs in (
+                ("joints", model.joint_names, header.joints),
+                ("actuators", model.actuator_names, header.actuators),
+            )
+        ),
+        (
+            (header.nq, header.nv) != (model.nq, model.nv),
+            "the trace's joints are of other kinds than the model's",
+        ),
+        error=TraceError,
+    )
     rerun = replayed(trace, model, defaults, options)
     return rerun.record(command=command, progress=progress)
 

@@ -87,25 +87,14 @@ def fitting(model: Model) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _hold(model: Model, _seed: int) -> Controller:
-    """One command from the beginning on."""
-    target = hold_ctrl(model)
-    return lambda _time, _data: target
-
-
-def _box(_model: Model, _seed: int) -> Controller:
-    target = np.array(MOVING)
-    return lambda _time, _data: target
+def _constant(ctrl: Array | None) -> Controller:
+    """One command from the beginning on; None where nobody writes ctrl."""
+    return lambda _time, _data: ctrl
 
 
 def _need_box(model: Model) -> None:
     if not is_the_arm(model) or all(frame.name != "held" for frame in model.keyframes):
         raise BadInputError(f"{model.path.name} has no SO-101 that holds a box (so101/scene_box)")
-
-
-def _untouched(_model: Model, _seed: int) -> Controller:
-    """Nobody writes ctrl."""
-    return lambda _time, _data: None
 
 
 def _need_joints(model: Model) -> None:
@@ -138,7 +127,7 @@ SCENARIOS = {
             "The arm is told one pose and goes there; on the way a finger meets the floor.",
             "so101/scene",
             2.0,
-            _hold,
+            lambda model, _seed: _constant(hold_ctrl(model)),
             "Each position servo is told a pose and goes there; any other actuator exerts what "
             "holds its joint at the start, or is left at the start's ctrl.",
             _need_actuators,
@@ -148,7 +137,7 @@ SCENARIOS = {
             "The servos are off: the arm falls onto the floor.",
             "so101/scene",
             4.0,
-            _untouched,
+            lambda _model, _seed: _constant(None),
             "No actuator acts: what can move is left to gravity and to what it touches.",
             _need_joints,
             options={"actuation": False},
@@ -158,7 +147,7 @@ SCENARIOS = {
             "Nobody writes ctrl: the servos hold the arm at zero.",
             "so101/scene",
             2.0,
-            _untouched,
+            lambda _model, _seed: _constant(None),
             "Nobody writes ctrl: each servo holds, and any other actuator exerts, what the start's "
             "ctrl says.",
             _need_actuators,
@@ -168,7 +157,7 @@ SCENARIOS = {
             "The servos are off and nothing can touch anything: the arm falls.",
             "so101/scene",
             2.0,
-            _untouched,
+            lambda _model, _seed: _constant(None),
             "No actuator acts and nothing can touch anything: what can move is left to gravity.",
             _need_joints,
             options={"actuation": False, "contacts": False},
@@ -178,7 +167,7 @@ SCENARIOS = {
             "The jaws hold a box while the arm swings it aside.",
             "so101/scene_box",
             3.0,
-            _box,
+            lambda _model, _seed: _constant(np.array(MOVING)),
             "The jaws hold a box while the arm swings it aside.",
             _need_box,
             keyframe="held",

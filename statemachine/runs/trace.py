@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import TraceError
+from ..errors import TraceError, refuse
 from ..interface import Array, Ints
 from ..interface.checks import HUGE, index_of
 from ..measures import ContactNames, overlaps
@@ -109,10 +109,17 @@ class Trace:
 
     def _check_contacts(self, rows: int) -> None:
         row, geom = self.columns["contact_row"], self.columns["contact_geom"]
-        if len(row) and (row.min() < 0 or row.max() >= rows or (np.diff(row) < 0).any()):
-            raise TraceError("contact_row is not an ascending list of rows")
-        if len(geom) and (geom.min() < 0 or geom.max() >= len(self.header.geoms)):
-            raise TraceError("contact_geom names a geom that is not there")
+        refuse(
+            (
+                len(row) and (row.min() < 0 or row.max() >= rows or (np.diff(row) < 0).any()),
+                "contact_row is not an ascending list of rows",
+            ),
+            (
+                len(geom) and (geom.min() < 0 or geom.max() >= len(self.header.geoms)),
+                "contact_geom names a geom that is not there",
+            ),
+            error=TraceError,
+        )
 
     def __len__(self) -> int:
         return len(self.time)

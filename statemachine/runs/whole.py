@@ -15,7 +15,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import BadInputError, StateMachineError
+from ..errors import StateMachineError, refuse
 
 _FORMULA = tuple("=+-@\t\r")  # how a formula begins
 _PART = ".part-"  # in the names of files that are being written
@@ -28,17 +28,16 @@ def check_place(target: Path) -> None:
     Raises:
         BadInputError: It is a folder, or its folder is not there or not to be written into.
     """
-    folder = target.parent
-    if target.is_dir():
-        raise BadInputError(f"{target} is a folder; name a file in it")
-    if _special(target):
-        if not os.access(target, os.W_OK):
-            raise BadInputError(f"{target} cannot be written: it is read-only for you")
-        return
-    if not folder.is_dir():
-        raise BadInputError(f"{target} cannot be written: there is no folder {folder}")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise BadInputError(f"{target} cannot be written: its folder is read-only for you")
+    folder, file, cannot = target.parent, not _special(target), f"{target} cannot be written"
+    refuse(
+        (target.is_dir(), f"{target} is a folder; name a file in it"),
+        (not (file or os.access(target, os.W_OK)), f"{cannot}: it is read-only for you"),
+        (file and not folder.is_dir(), f"{cannot}: there is no folder {folder}"),
+        (
+            file and not os.access(folder, os.W_OK | os.X_OK),
+            f"{cannot}: its folder is read-only for you",
+        ),
+    )
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import BadInputError, StateMachineError, check_name, refuse
+from ..errors import StateMachineError, check_name, refuse
 from ..interface import Array
 from ..measures.text import listed
 from ..runs.drive import Progress, part_of, silent
@@ -196,13 +196,10 @@ def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
     for name in asked:
         check_name("backend of this sweep", name, there)
     chosen = list(dict.fromkeys(asked or there[:2]))
-    if len(chosen) == 2:
-        return chosen[0], chosen[1]
-    if len(there) > 2:
-        hint = f"this sweep has {listed(list(there))}: name two with --backend"
-    else:
-        hint = f"got {listed(chosen)} alone"
-    raise BadInputError(f"a report is of two engines; {hint}")
+    several = f"this sweep has {listed(list(there))}: name two with --backend"
+    hint = several if len(there) > 2 else f"got {listed(chosen)} alone"
+    refuse((len(chosen) != 2, f"a report is of two engines; {hint}"))
+    return chosen[0], chosen[1]
 
 
 def _together(

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..errors import BadInputError, WorkerEndedError
+from ..errors import BadInputError, WorkerEndedError, refuse
 from ..installed import require_extra
 from ..processes import checked_jobs
 from ..processes.parallel import unwinding, worker_processes
@@ -105,8 +105,11 @@ def run_sweep(
     with locked(folder), ExitStack() as stack:
         client = stack.enter_context(_connected(scheduler, ready)) if scheduler else None
         known = dict(counted(folder))
-        if extend:
-            _check_growth(ready, known, folder)
+        if extend and known:
+            shared = sum(cell.id in known for name in ready.backends for cell in ready.cells(name))
+            others = f"{folder} has {len(known) - shared} cells that are not of this design"
+            grows = "a sweep grows by values, seeds and backends that are added"
+            refuse((shared < len(known), f"{others}: {grows}"))
         settle_manifest(folder, ready.manifest(), extend)
         if retry_failed:
             remove_failed(folder)
@@ -114,12 +117,13 @@ def run_sweep(
         missing, ran = len(ready) - len(known), 0
         kinds = Counter(known.values())
         writer = RowWriter(folder, ready.design.factors, ready.provenance())
-        batches = _batches(ready, known, _workers(client) if client else jobs)
+        workers = max(1, sum(client.nthreads().values())) if client else jobs
+        batches = _batches(ready, known, workers)
         with unwinding(at_once=False) as raise_if_ended:
             run = (
-                _run_on_dask(ready, batches, client, raise_if_ended)
+                _run_on_dask(ready, batches, workers, client, raise_if_ended)
                 if client
-                else run_apart(ready, batches, jobs, raise_if_ended)
+                else run_apart(ready, batches, workers, raise_if_ended)
             )
             try:
                 with closing(run) as results:
@@ -142,18 +146,6 @@ def run_sweep(
         said=ready.said,
         read=f'pyarrow.dataset.dataset("{place}", partitioning="hive").to_table()',
     )
-
-
-def _check_growth(ready: PreparedSweep, known: Mapping[str, str], folder: Path) -> None:
-    """Raise BadInputError where a folder has cells that a design lacks."""
-    if not known:
-        return
-    shared = sum(cell.id in known for name in ready.backends for cell in ready.cells(name))
-    if shared < len(known):
-        raise BadInputError(
-            f"{folder} has {len(known) - shared} cells that are not of this design: a sweep grows "
-            "by values, seeds and backends that are added"
-        )
 
 
 def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Iterator[Batch]:
@@ -187,7 +179,11 @@ def run_apart(
 
 
 def _run_on_dask(
-    ready: PreparedSweep, batches: Iterable[Batch], client: Any, look: Callable[[], None]
+    ready: PreparedSweep,
+    batches: Iterable[Batch],
+    workers: int,
+    client: Any,
+    look: Callable[[], None],
 ) -> Results:
     """The same from the workers of Dask; what they do not survive is run here.
 
@@ -203,8 +199,7 @@ def _run_on_dask(
             return worker(_RUN_APART, ready, batch)
 
         # Some batches always wait, so that no worker is idle.
-        there = [submit] * (2 * _workers(client))
-        yield from _results(ready, batches, there, [submit_here], look)
+        yield from _results(ready, batches, 2 * workers * [submit], [submit_here], look)
 
 
 def _results(
@@ -280,18 +275,14 @@ def _connected(address: str, ready: PreparedSweep) -> Iterator[Any]:
         with suppress(TimeoutError):
             client.wait_for_workers(1, timeout=_PATIENCE)
         answers = client.run(differing, ready, __version__, on_error="return")
-        if not answers:
-            raise BadInputError(f"the scheduler at {address} has no workers")
+        refuse((not answers, f"the scheduler at {address} has no workers"))
         for worker, wrong in answers.items():
-            if isinstance(wrong, BaseException):
-                raise BadInputError(f"the worker {worker} cannot run a sweep: {wrong}")
-            if wrong:
-                raise BadInputError(f"the worker {worker} has not the same {wrong} as this machine")
+            fails = isinstance(wrong, BaseException)
+            refuse(
+                (fails, f"the worker {worker} cannot run a sweep: {wrong}"),
+                (wrong, f"the worker {worker} has not the same {wrong} as this machine"),
+            )
         yield client
     finally:
         with suppress(Exception):
             client.close(timeout=2)
-
-
-def _workers(client: Any) -> int:
-    return max(1, sum(client.nthreads().values()))

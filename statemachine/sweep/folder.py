@@ -99,16 +99,15 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
 def design_of(manifest: Mapping[str, Any]) -> Design:
     """The design that a manifest tells, with the points of its dataset."""
     design = manifest["design"]
-    factors = [
-        Vary(**{name: _tuple(factor[name]) for name in Vary.__dataclass_fields__})
+    factors: list[dict[str, Any]] = [
+        {
+            name: tuple(value) if isinstance(value := factor[name], list) else value
+            for name in Vary.__dataclass_fields__
+        }
         for factor in manifest["factors"]
     ]
-    return Design(tuple(factors), design["samples"], design["indices"], design["design_seed"])
-
-
-def _tuple(value: Any) -> Any:
-    """A list as a tuple; anything else as it is."""
-    return tuple(value) if isinstance(value, list) else value
+    varied = tuple(Vary(**factor) for factor in factors)
+    return Design(varied, design["samples"], design["indices"], design["design_seed"])
 
 
 def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> None:

@@ -136,10 +136,8 @@ def counted(folder: Path) -> Iterator[tuple[str, str]]:
         BadInputError: A file is none of the dataset.
     """
     for part in _parts(folder):
-        table = _read(part, ["cell", "status", "error_class"])
-        columns = (table[name].to_pylist() for name in ("cell", "status", "error_class"))
-        for cell, status, error_class in zip(*columns, strict=True):
-            yield cell, error_class or status
+        for row in _read(part, ["cell", "status", "error_class"]).to_pylist():
+            yield row["cell"], row["error_class"] or row["status"]
 
 
 def remove_failed(folder: Path) -> None:

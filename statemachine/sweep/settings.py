@@ -91,8 +91,7 @@ def start_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> tuple[dict
         BadInputError: A joint is neither a hinge nor a slide, or a number is beyond the array.
         UnknownNameError: The model has no such joint.
     """
-    qpos: dict[int, float] = {}
-    qvel: dict[int, float] = {}
+    qpos, qvel = dict[int, float](), dict[int, float]()
     for vary, value in settings:
         if isinstance(value, (bool, str)):
             raise BadInputError(f"{vary.label} wants numbers; got {value}")

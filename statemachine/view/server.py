@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from ..errors import BadInputError, MissingEngineError
+from ..errors import BadInputError, MissingEngineError, refuse
 from ..installed import require_extra
 
 _PORTS = 100  # tried one after another
@@ -125,10 +125,11 @@ def free_port(host: str, port: int) -> int:
         BadInputError: It is no port, the host is no address of this machine, or all near it
             are taken.
     """
-    if not 0 <= port <= 65535:
-        raise BadInputError(f"port must be from 0 to 65535; got {port}")
-    if not host.strip():  # which would mean everywhere
-        raise BadInputError("host must be an address; 127.0.0.1 is this machine alone")
+    refuse(
+        (not 0 <= port <= 65535, f"port must be from 0 to 65535; got {port}"),
+        # Which would mean everywhere.
+        (not host.strip(), "host must be an address; 127.0.0.1 is this machine alone"),
+    )
     try:
         family, _, _, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import BadInputError, StateMachineError, TraceError
+from ..errors import BadInputError, StateMachineError, TraceError, refuse
 from ..interface import (
     Array,
     Data,
@@ -27,7 +27,7 @@ from ..interface import (
     usual_site,
 )
 from ..measures import Gap, distances, joint_gap
-from ..runs import Header, Trace
+from ..runs import Trace
 
 SLOWEST, FASTEST = 0.001, 1000.0
 _STEPS_MOST = 100_000  # of one press of a button
@@ -237,13 +237,17 @@ class LiveSession(Session, ExitStack):
         ExitStack.__init__(self)
         first = models[0]
         for other in models[1:]:
-            if (other.nq, other.nu, other.nbody) != (first.nq, first.nu, first.nbody):
-                raise BadInputError(f"{other!r} is another model than {first!r}")
-            if other.timestep != first.timestep:
-                raise BadInputError(
+            refuse(
+                (
+                    (other.nq, other.nu, other.nbody) != (first.nq, first.nu, first.nbody),
+                    f"{other!r} is another model than {first!r}",
+                ),
+                (
+                    other.timestep != first.timestep,
                     f"the timesteps differ: {first.timestep:g} s on {first.backend}, "
-                    f"{other.timestep:g} s on {other.backend}"
-                )
+                    f"{other.timestep:g} s on {other.backend}",
+                ),
+            )
         super().__init__(
             tuple(model.backend for model in models),
             first.timestep,
@@ -325,14 +329,27 @@ class TraceSession(Session):
         """
         first = traces[0]
         for trace in traces:
-            for column in ("xpos", "xquat"):
-                if column not in trace or not np.isfinite(trace[column]).all():
-                    raise TraceError(f"{trace!r} has no {column}: it cannot be drawn")
-            if (trace.header.bodies, trace.header.nq) != (first.header.bodies, first.header.nq):
-                raise TraceError(f"{trace!r} is of another model than {first!r}")
+            refuse(
+                *(
+                    (
+                        column not in trace or not np.isfinite(trace[column]).all(),
+                        f"{trace!r} has no {column}: it cannot be drawn",
+                    )
+                    for column in ("xpos", "xquat")
+                ),
+                (
+                    (trace.header.bodies, trace.header.nq)
+                    != (first.header.bodies, first.header.nq),
+                    f"{trace!r} is of another model than {first!r}",
+                ),
+                error=TraceError,
+            )
         header = first.header
         sites = header.sites if all("site_xpos" in trace for trace in traces) else ()
-        names = tuple(_engine_of(trace.header) for trace in traces)
+        names = tuple(
+            trace.header.backend + ", engine defaults" * (trace.header.defaults == "engine")
+            for trace in traces
+        )
         joints = header.joints, header.jnt_type, header.jnt_qposadr
         super().__init__(names, header.timestep, joints, sites, usual_site(sites))
         self.header, self._traces = header, traces
@@ -379,10 +396,6 @@ class TraceSession(Session):
         return self._snapshot(
             float(first.time[self.steps]), first.ctrl[self.steps], tuple(poses), bool(same)
         )
-
-
-def _engine_of(header: Header) -> str:
-    return header.backend + (", engine defaults" if header.defaults == "engine" else "")
 
 
 def checked_speed(speed: float) -> float:
