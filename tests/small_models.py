@@ -350,13 +350,6 @@ SLEEPY = """
 """
 
 
-NAMED_PENDULUM = (
-    "<body name='p' pos='0 0 1'><joint name='j' axis='0 1 0' {}/>"
-    "<geom name='rod' type='capsule' fromto='0 0 0 0.3 0 0' size='0.02'/>"
-    "<site name='tip' pos='0.3 0 0'/></body>"
-)
-
-
 GEOM = "<geom size='0.1' mass='1'/>"
 
 

@@ -154,8 +154,9 @@ def test_a_huge_file_is_refused_unread(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_what_is_not_looked_at_is_told(folder: Path, judged: list[str]) -> None:
-    ignored_ones = dict.fromkeys(("gus.ipynb", "hal.zip", ".hidden"), "")
-    written_all(folder, ignored_ones | {"IDA.PY": "return 1\n"})
+    written_all(
+        folder, dict.fromkeys(("gus.ipynb", "hal.zip", ".hidden"), "") | {"IDA.PY": "return 1\n"}
+    )
     (folder / "__MACOSX").mkdir()
     found = submissions([folder])
     assert "IDA.PY" in [each.name for each in found]
@@ -245,8 +246,10 @@ def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path
 def test_a_roster_gives_every_student_a_row(
     folder: Path, judged: list[str], tmp_path: Path
 ) -> None:
-    names = "Lee_Bo_41017_assignment.py", "x_41018.py", "x_again_41018.py"
-    written_all(folder, dict.fromkeys(names, "return 1\n"))
+    written_all(
+        folder,
+        dict.fromkeys("Lee_Bo_41017_assignment.py", "x_41018.py", "x_again_41018.py", "return 1\n"),
+    )
     roster = tmp_path / "roster.csv"
     roster.write_text(
         "name;number;file\nAnn Smith;1;ann\nBo Lee;41017\nCy;41018\n\nZoë;99;\n",
@@ -410,8 +413,7 @@ def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -
 
 
 def test_all_of_a_students_folder_belongs_to_the_file(tmp_path: Path) -> None:
-    texts = {"step_loop.py": "from mine import *\n", "mine.py": SOLUTION.read_text()}
-    written_all(tmp_path, texts)
+    written_all(tmp_path, {"step_loop.py": "from mine import *\n", "mine.py": SOLUTION.read_text()})
     assert main(["check", str(tmp_path), "--gradescope", str(tmp_path / "r.json")]) == 0
     written_all(tmp_path, {"class/ann/.old/a.py": "def demo_gravity(:\n"})
     (entry,) = judge_all(submissions([tmp_path / "class"]), "mujoco")

@@ -248,8 +248,12 @@ def test_moments_that_both_have_are_compared_and_no_others() -> None:
 
 
 def test_what_makes_it_less_than_a_comparison_of_engines_is_said(hold: Trace, box: Trace) -> None:
-    notes = " ".join(compare(hold, box).notes)
-    assert_in(notes, "different model files", "missing on one side: box", "experiments are two")
+    assert_in(
+        " ".join(compare(hold, box).notes),
+        "different model files",
+        "missing on one side: box",
+        "experiments are two",
+    )
 
 
 def test_joints_without_names_are_each_compared(tmp_path: Path) -> None:

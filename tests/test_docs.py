@@ -119,8 +119,11 @@ def test_no_page_of_the_path_shows_its_answers_open(name: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     source = tmp_path / "docs"
-    made = shutil.ignore_patterns("_build", "path", "reference", "comparisons", "__pycache__")
-    shutil.copytree(ROOT / "docs", source, ignore=made)
+    shutil.copytree(
+        ROOT / "docs",
+        source,
+        ignore=shutil.ignore_patterns("_build", "path", "reference", "comparisons", "__pycache__"),
+    )
     for name in ("models", "statemachine", "CONTRIBUTING.md"):
         (tmp_path / name).symlink_to(ROOT / name)
     done = subprocess.run(

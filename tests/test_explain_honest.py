@@ -83,8 +83,9 @@ def file(folder: Path, name: str, **changed: str) -> str:
 
 
 def asked(capsys: Any, *words: str) -> tuple[int, dict[str, Any]]:
-    code = main(["compare", *words, "--keyframe", "k", "--json"])
-    return code, json.loads(capsys.readouterr().out)
+    return main(["compare", *words, "--keyframe", "k", "--json"]), json.loads(
+        capsys.readouterr().out
+    )
 
 
 @pytest.mark.usefixtures("bullet")
@@ -211,8 +212,10 @@ def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
 
 def test_a_function_that_draws_without_a_seed_has_no_causes(folder: Path, here: Cli) -> None:
     file(folder, "l.xml")
-    done = here("compare", "f.py:drawn", "l.xml", "l.xml", "damping=0.5", "--why")
-    one_line(done, "does not command the same twice")
+    one_line(
+        here("compare", "f.py:drawn", "l.xml", "l.xml", "damping=0.5", "--why"),
+        "does not command the same twice",
+    )
 
 
 def test_forces_of_a_function_leave_no_open_loop(folder: Path, capsys: Any) -> None:
@@ -243,8 +246,9 @@ def test_recorded_runs_are_explained_by_the_models_that_their_headers_name(
         write(push, f"{side}_push.npz")
 
     def why(*words: str) -> tuple[int, dict[str, Any]]:
-        code = main(["compare", *words, "--why", "--no-chaos", "--json"])
-        return code, json.loads(capsys.readouterr().out)
+        return main(["compare", *words, "--why", "--no-chaos", "--json"]), json.loads(
+            capsys.readouterr().out
+        )
 
     code, found = why("l.npz", "r.npz")
     assert (code, [row["name"] for row in found["shares"]]) == (0, ["damping of j1"])

@@ -361,8 +361,11 @@ def test_without_gymnasium_the_extra_is_named() -> None:
         "try:\n    import statemachine.gym\n"
         "except ImportError as error:\n    print(type(error).__name__, error)\n"
     )
-    needs = "the tasks need Gymnasium: pip install 'statemachine-sim[gym]'"
-    runs_in_silence(code, ROOT, f"MissingEngineError {needs}\n")
+    runs_in_silence(
+        code,
+        ROOT,
+        "MissingEngineError the tasks need Gymnasium: pip install 'statemachine-sim[gym]'\n",
+    )
 
 
 def test_what_is_closed_says_so_and_starts_nothing() -> None:

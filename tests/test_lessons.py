@@ -740,8 +740,11 @@ def test_a_lesson_that_says_no_is_the_exit_code_of_the_path(
 @pytest.fixture
 def short_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every lesson is one question, for somebody at a terminal."""
-    page = Page("t", "o", [Question("q", ("a", "b"), 0, "because")])
-    monkeypatch.setattr(lesson_command, "_compute", lambda *_: (page, {}))
+    monkeypatch.setattr(
+        lesson_command,
+        "_compute",
+        lambda *_: (Page("t", "o", [Question("q", ("a", "b"), 0, "because")]), {}),
+    )
     monkeypatch.setattr(quiz, "can_ask", lambda: True)
 
 

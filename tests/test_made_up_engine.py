@@ -195,8 +195,11 @@ def test_what_it_takes_for_granted_is_not_asked(capsys: Output, words: tuple[str
 @pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_exercises_are_judged_on_it(capsys: Output) -> None:
-    text = said(capsys, "check", str(ROOT / "exercises" / "step_loop.py"), *ON, code=SAYS_NO)
-    assert_in(text, f"step_loop.py on {NAME}", "4 not written yet")
+    assert_in(
+        said(capsys, "check", str(ROOT / "exercises" / "step_loop.py"), *ON, code=SAYS_NO),
+        f"step_loop.py on {NAME}",
+        "4 not written yet",
+    )
 
 
 @pytest.mark.usefixtures("engine")

@@ -37,10 +37,6 @@ def _module(folder: Path, name: str = "arm.py", source: str = SOURCE) -> Path:
     return file
 
 
-def _standing(folder: Path) -> dict[tuple[str, str, int, str], list[Site]]:
-    return {site.mutant.code: [site] for site in all_sites(folder)}
-
-
 def test_each_kind_of_fault_is_put_in_its_place(tmp_path: Path) -> None:
     found = list(sites(_module(tmp_path), tmp_path))
     assert Counter(site.mutant.kind for site in found) == {
@@ -65,7 +61,8 @@ def test_a_fault_is_found_where_its_code_went(tmp_path: Path) -> None:
     mutants = [site.mutant for site in sites(_module(tmp_path), tmp_path)]
     (tmp_path / "statemachine" / "arm.py").unlink()
     _module(tmp_path, "moved.py", SOURCE.replace("LIMIT:", "LIMIT + 1:"))
-    found = {mutant: find(mutant, _standing(tmp_path)) for mutant in mutants}
+    standing = {site.mutant.code: [site] for site in all_sites(tmp_path)}
+    found = {mutant: find(mutant, standing) for mutant in mutants}
     gone = {mutant.statement for mutant, site in found.items() if site is None}
     assert gone == {"LIMIT = 3", "if x + 1 < LIMIT:"}  # short, without a function; and changed
     assert {site.mutant.file for site in found.values() if site} == {"statemachine/moved.py"}

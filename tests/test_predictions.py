@@ -58,8 +58,10 @@ def test_another_file_is_not_overwritten(tmp_path: Path, text: str) -> None:
 
 
 def test_nobody_there_to_answer(cli: Cli, tmp_path: Path) -> None:
-    done = cli("lesson", "state", "--record", str(tmp_path / "mine.json"))
-    one_line(done, "needs a terminal that asks")
+    one_line(
+        cli("lesson", "state", "--record", str(tmp_path / "mine.json")),
+        "needs a terminal that asks",
+    )
     assert not (tmp_path / "mine.json").exists()
 
 
@@ -67,8 +69,11 @@ def test_nobody_there_to_answer(cli: Cli, tmp_path: Path) -> None:
 def test_a_lesson_at_a_terminal_is_recorded(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     typed = [("Your prediction", "c\n")]
-    seen = _at_a_terminal("lesson", "state", "--record", str(file), typed=typed)
-    assert_in(seen, "You predicted it", "mine.json: 1 of 1 predictions right")
+    assert_in(
+        _at_a_terminal("lesson", "state", "--record", str(file), typed=typed),
+        "You predicted it",
+        "mine.json: 1 of 1 predictions right",
+    )
     record = json.loads(file.read_text())
     assert (record["score"], record["of"]) == (1, 1)
     assert record["answers"][0]["predicted"] == "12"

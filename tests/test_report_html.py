@@ -60,11 +60,7 @@ Seen = Callable[..., Any]
 
 
 def of(one: Trace, two: Trace) -> Made:
-    return of_look(one, two, look_of(one))
-
-
-def look_of(trace: Trace) -> Look:
-    return drawing_of(sm.load(trace.header.provenance.model_file))
+    return of_look(one, two, drawing_of(sm.load(one.header.provenance.model_file)))
 
 
 def page_of(made: Made, **more: Any) -> str:

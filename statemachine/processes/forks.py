@@ -72,13 +72,13 @@ def in_forks(
     global _work  # noqa: PLW0603  (forks find it here, and nothing is pickled)
     _work = work
     limit = max(_LEAST, _LONGEST * seconds)
-    found = _shared(range(len(work)), jobs, ended, limit)
-    for number, (error, _) in dict(found).items():
+    outcomes = _shared(range(len(work)), jobs, ended, limit)
+    for number, (error, _) in dict(outcomes).items():
         if isinstance(error, BrokenProcessPool):
-            found |= _shared([number], 1, ended, limit)
+            outcomes |= _shared([number], 1, ended, limit)
     results: list[T | None] = []
     for number, call in enumerate(work):
-        error, result = found.get(number, (NotImplementedError(), None))
+        error, result = outcomes.get(number, (NotImplementedError(), None))
         well = error is None or isinstance(error, BrokenProcessPool)
         results.append(result if well else call())
     return results
@@ -91,17 +91,17 @@ def _shared(
     if sys.platform == "win32":
         raise OSError("this system has no forks")
     pool = ProcessPoolExecutor(min(jobs, len(numbers)), get_context("fork"), _settle)
-    futures: dict[int, Future[Any]] = {}
+    futures: dict[Future[Any], int] = {}
     try:
         with sigint_blocked(), warnings.catch_warnings():
             # Python counts threads of libraries, too: that of OpenBLAS is made for forks.
             warnings.simplefilter("ignore", DeprecationWarning)
             for number in numbers:
-                futures[number] = pool.submit(_do, number)
+                futures[pool.submit(_do, number)] = number
     except OSError:  # no more processes, or no more files
         return {}
-    forks, waiting = list(pool._processes.values()), set(futures.values())
-    found: dict[Any, tuple[BaseException | None, Any]] = {}
+    forks, waiting = list(pool._processes.values()), set(futures)
+    outcomes: dict[int, tuple[BaseException | None, Any]] = {}
     try:
         while waiting:
             done, waiting = wait(waiting, limit, FIRST_COMPLETED)
@@ -109,14 +109,14 @@ def _shared(
                 break
             for future in done:
                 error = future.exception()
-                found[future] = error, None if error else future.result()
+                outcomes[futures[future]] = error, None if error else future.result()
                 if not error:
                     ended()
     finally:
         for fork in forks:
             fork.kill()
         pool.shutdown(cancel_futures=True)
-    return {number: found[future] for number, future in futures.items() if future in found}
+    return outcomes
 
 
 def _settle() -> None:

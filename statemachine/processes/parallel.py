@@ -65,14 +65,15 @@ def worker_processes(jobs: int) -> Iterator[list[Callable[..., Future[Any]]]]:
     _begin_trackers()
     loky: Any = importlib.import_module(_LOKY)
     # An executor of several processes would lose the work of all with any one of them.
-    executors = [loky.ProcessPoolExecutor(1, env=ALONE) for _ in range(jobs)]
+    new = partial(loky.ProcessPoolExecutor, 1, env=ALONE)
+    executors = [new() for _ in range(jobs)]
 
     def submit(worker: int, *call: Any) -> Future[Any]:
         with sigint_blocked():
             try:
                 return executors[worker].submit(*call)
             except BrokenProcessPool:
-                executors[worker] = loky.ProcessPoolExecutor(1, env=ALONE)
+                executors[worker] = new()
                 return executors[worker].submit(*call)
 
     try:
@@ -88,14 +89,13 @@ def _begin_trackers() -> None:
 
     What is left where work is stopped they remove; they need not tell.
     """
-    told = os.environ.get("PYTHONWARNINGS")
-    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (told, "ignore:resource_tracker")))
+    before = os.environ.get("PYTHONWARNINGS", "")
+    os.environ["PYTHONWARNINGS"] = f"{before},ignore:resource_tracker".lstrip(",")
     try:
         for name in _TRACKERS if os.name != "nt" else ():
             importlib.import_module(name).ensure_running()
     finally:
-        del os.environ["PYTHONWARNINGS"]
-        os.environ.update({} if told is None else {"PYTHONWARNINGS": told})
+        os.environ["PYTHONWARNINGS"] = before  # "" is as if it were not there
 
 
 @contextmanager

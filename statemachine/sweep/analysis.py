@@ -196,9 +196,14 @@ def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
     for name in asked:
         check_name("backend of this sweep", name, there)
     chosen = list(dict.fromkeys(asked or there[:2]))
-    several = f"this sweep has {listed(list(there))}: name two with --backend"
-    hint = several if len(there) > 2 else f"got {listed(chosen)} alone"
-    refuse((len(chosen) != 2, f"a report is of two engines; {hint}"))
+    refuse(
+        (
+            len(there) > 2 != len(chosen),
+            f"a report is of two engines; this sweep has {listed(list(there))}: name two with "
+            "--backend",
+        ),
+        (len(chosen) != 2, f"a report is of two engines; got {listed(chosen)} alone"),
+    )
     return chosen[0], chosen[1]
 
 

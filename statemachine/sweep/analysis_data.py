@@ -227,8 +227,3 @@ def drawn_again(count: int) -> Iterator[Ints]:
     draw = np.random.default_rng(0)
     for _ in range(_RESAMPLES):
         yield draw.integers(0, count, count)
-
-
-def known(figure: Array) -> float | None:
-    """A figure; None where it is no number."""
-    return None if np.isnan(figure) else float(figure)

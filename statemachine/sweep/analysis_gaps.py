@@ -10,10 +10,11 @@ import numpy as np
 
 from ..interface import Array, Ints
 from ..measures import QUANTITIES, Tolerance, tolerance_of
-from .analysis_data import RUN_QUANTITIES, SweepData, known, largest_known, median
+from .analysis_data import RUN_QUANTITIES, SweepData, largest_known, median
 from .analysis_indices import Sensitivity, ranked
 from .analysis_runs import ModelFacts
 from .design import Value, Vary
+from .rows import known
 
 SettingVerdict = Literal["agrees", "some seeds", "chaos", "differs", "no runs"]
 VERDICTS: tuple[SettingVerdict, ...] = ("agrees", "some seeds", "chaos", "differs", "no runs")

@@ -77,10 +77,8 @@ def sensitivity(data: SweepData, figures: Array) -> Sensitivity | None:
 
 def ranked(design: Design, shares: Sensitivity | None) -> list[Vary]:
     """What is varied, the most sensitive first."""
-    order = [index.label for index in shares.indices] if shares else []
-    return sorted(
-        design.factors, key=lambda v: order.index(v.label) if v.label in order else len(order)
-    )
+    rank = {index.label: k for k, index in enumerate(shares.indices)} if shares else {}
+    return sorted(design.factors, key=lambda vary: rank.get(vary.label, len(rank)))
 
 
 def _sobol(design: Design, centre: Array) -> Sensitivity | None:

@@ -320,9 +320,7 @@ class Design:
         """Number of points; it may be too large for `len`."""
         blocks = len(self.sampled) + 2 if self.indices else 1
         count = blocks * self.samples if self.sampled else 1
-        for vary in self.listed:
-            count *= len(vary.values)
-        return count
+        return count * math.prod(len(vary.values) for vary in self.listed)
 
     def points(self) -> Iterator[DesignPoint]:
         """Every point; the samples change slowest."""

@@ -107,9 +107,13 @@ def run_sweep(
         known = dict(counted(folder))
         if extend and known:
             shared = sum(cell.id in known for name in ready.backends for cell in ready.cells(name))
-            others = f"{folder} has {len(known) - shared} cells that are not of this design"
-            grows = "a sweep grows by values, seeds and backends that are added"
-            refuse((shared < len(known), f"{others}: {grows}"))
+            refuse(
+                (
+                    shared < len(known),
+                    f"{folder} has {len(known) - shared} cells that are not of this design: a "
+                    "sweep grows by values, seeds and backends that are added",
+                )
+            )
         settle_manifest(folder, ready.manifest(), extend)
         if retry_failed:
             remove_failed(folder)
@@ -221,36 +225,31 @@ def _results(
         here: The same for cells that are run again; it may be the same list.
         look: Called between any two waits.
     """
-    coming, again = iter(batches), deque[Batch]()
-    waiting: dict[Future[list[Row]], tuple[Batch, list[Submit], Submit]] = {}
-    lost: set[str] = set()  # cells of batches that a process ended with
+    coming, again = iter(batches), deque[SweepCell]()
+    waiting: dict[Future[list[Row]], tuple[Batch, bool, list[Submit], Submit]] = {}
 
-    def begin(batch: Batch, idle: list[Submit]) -> None:
+    def begin(batch: Batch, is_again: bool, idle: list[Submit]) -> None:
         submit = idle.pop()
-        waiting[submit(ready, batch)] = batch, idle, submit
+        waiting[submit(ready, batch)] = batch, is_again, idle, submit
 
     while True:
         while again and here:
-            begin(again.popleft(), here)
+            begin([again.popleft()], True, here)
         for batch in itertools.islice(coming, len(workers)):
-            begin(batch, workers)
+            begin(batch, False, workers)
         if not waiting:
             return
         done = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done
         look()
         for future in done:
-            batch, idle, submit = waiting.pop(future)
+            batch, is_again, idle, submit = waiting.pop(future)
             idle.append(submit)
             try:
                 rows = future.result()
             except Exception:  # its process ended
-                if lost.issuperset(cell.id for cell in batch):
-                    error = WorkerEndedError("its process ended before it was done, twice")
-                    rows = [row_of(ready, cell, error) for cell in batch]
-                else:
-                    rows = []
-                    again += [[cell] for cell in batch]
-                    lost.update(cell.id for cell in batch)
+                again += () if is_again else batch
+                error = WorkerEndedError("its process ended before it was done, twice")
+                rows = [row_of(ready, cell, error) for cell in batch if is_again]
             yield rows
 
 
@@ -277,9 +276,11 @@ def _connected(address: str, ready: PreparedSweep) -> Iterator[Any]:
         answers = client.run(differing, ready, __version__, on_error="return")
         refuse((not answers, f"the scheduler at {address} has no workers"))
         for worker, wrong in answers.items():
-            fails = isinstance(wrong, BaseException)
             refuse(
-                (fails, f"the worker {worker} cannot run a sweep: {wrong}"),
+                (
+                    isinstance(wrong, BaseException),
+                    f"the worker {worker} cannot run a sweep: {wrong}",
+                ),
                 (wrong, f"the worker {worker} has not the same {wrong} as this machine"),
             )
         yield client

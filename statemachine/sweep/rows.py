@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -53,6 +54,11 @@ COLUMNS = (
 )
 _SOON, _LATE, _SHARE = 5.0, 60.0, 0.02  # seconds between two files, and of the time so far
 _MOST = 20_000  # rows of a file
+
+
+def known(figure: Any) -> float | None:
+    """A figure; None where it is no finite number."""
+    return float(figure) if math.isfinite(figure) else None
 
 
 def require_parquet() -> tuple[Any, Any]:

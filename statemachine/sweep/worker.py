@@ -39,7 +39,7 @@ from ..runs.scenarios import Scenario
 from ..silence import silence
 from .design import digest
 from .request import PreparedSweep, Sweep, SweepCell
-from .rows import DONE, FAILED
+from .rows import DONE, FAILED, known
 from .settings import drawn_start, options_at, start_at
 
 T = TypeVar("T")
@@ -286,8 +286,7 @@ def _run(
         row["sample_tip"] = tips = _tips(model, data, samples)
         row["tip"] = tips[-1] if tips else None
     both, _ = energies(model, sweep.defaults, *states, options.get("gravity"))
-    sums = [float(energy) if np.isfinite(energy) else None for energy in both.sum(axis=1)]
-    row["energy_start"], row["energy"] = sums
+    row["energy_start"], row["energy"] = map(known, both.sum(axis=1))
 
 
 def _tips(model: Model, data: Data, samples: list[Array]) -> list[list[float]] | None:
@@ -313,8 +312,8 @@ def _is_same(ready: PreparedSweep, model: str = "") -> bool:
     """Whether the file of a model, or else the user's if there is one, is that of the sweep."""
     try:
         if model:
-            path = resolve(ready.places[model], ready.sweep.menagerie)
-            return model_digest(path) == ready.files[model]
+            file = resolve(ready.places[model], ready.sweep.menagerie)
+            return model_digest(file) == ready.files[model]
         return not ready.function or digest_of(ready.sweep.what) == ready.function
     except (StateMachineError, OSError):
         return False
