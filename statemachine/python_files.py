@@ -62,7 +62,7 @@ def _is_users(place: Path, file: Path) -> bool:
 def said(error: BaseException) -> str:
     """The kind and the text of an error, in one line."""
     # A SyntaxError's text names file and line once more.
-    words = " ".join(str(getattr(error, "msg", error)).split())
+    words = " ".join(str(error.msg if isinstance(error, SyntaxError) else error).split())
     if len(words) > _LONGEST:
         words = words[:_LONGEST] + " …"
     known: dict[type[BaseException], str] = {

@@ -248,7 +248,9 @@ def test_a_roster_gives_every_student_a_row(
 ) -> None:
     written_all(
         folder,
-        dict.fromkeys("Lee_Bo_41017_assignment.py", "x_41018.py", "x_again_41018.py", "return 1\n"),
+        dict.fromkeys(
+            ("Lee_Bo_41017_assignment.py", "x_41018.py", "x_again_41018.py"), "return 1\n"
+        ),
     )
     roster = tmp_path / "roster.csv"
     roster.write_text(
