@@ -429,7 +429,7 @@ def test_it_reaches_neither_us_nor_the_files(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("def demo_gravity(model:\n", "cannot be loaded: line 1: SyntaxError: '(' was never closed"),
+        ("def demo_gravity(model:\n", "be loaded: line 1: SyntaxError: '(' was never closed"),
         ("import sys\nsys.exit(0)\n", "the file cannot be loaded: line 2: it ends the program"),
         ("x = 1 / 0\n", "line 1: ZeroDivisionError: division by zero (in `x = 1 / 0`)"),
         ("import not_there\n", "No module named 'not_there'"),
