@@ -366,7 +366,7 @@ def test_each_figure_of_a_model_is_found_and_brought_over(model):
 
     left, random = sm.load(model), np.random.default_rng(0)
     raw, tried = left.compiled, 0
-    for row in fields.ROWS:
+    for row in (row for rows in fields.ROWS.values() for row in rows):
         name = row.fields[0]
         array = getattr(raw, name)
         places = np.arange(len(array))

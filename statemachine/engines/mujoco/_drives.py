@@ -10,7 +10,6 @@ import numpy as np
 
 from ...installed import require
 from ..records import Counterparts, Edit, ModelDifference
-from . import _fields as fields
 from ._sides import Sides, name_of, plain, same, zeros
 
 # mjtTrn: what an actuator acts on, and from which site it measures.
@@ -28,7 +27,6 @@ _STILL = (
     *("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
     *("actuator_armature", "actuator_damping"),
 )
-_OBJECTS = (("sensor_objtype", "sensor_objid"), ("sensor_reftype", "sensor_refid"))
 
 
 def drives(sides: Sides) -> Iterator[ModelDifference]:
@@ -41,15 +39,15 @@ def drives(sides: Sides) -> Iterator[ModelDifference]:
         yield from _laws(sides, a, b)
         yield from _delay(sides, a, b)
         targets = [_targets(sides, side, k) for side, k in enumerate((a, b))]
-        if targets[0] != targets[1]:
-            values = (("drives", _words(left, a), _words(right, b)),)
+        if targets[0][0] != targets[1][0]:
             why = "it drives another thing, or in another way"
+            values = (("drives", *(words for _, words in targets)),)
             yield sides.tell("transmission", "actuator", a, values, refused=why)
     if left.opt.disableactuator or right.opt.disableactuator:
-        yield from sides.rows("actuator", fields.GROUP, actuators)
+        yield from sides.rows("actuator", actuators, "group")
     for a, b in places:
         name = name_of(left, "actuator", int(owners[0][a]))
-        yield from sides.rows("actuator", fields.CONTROL, [(a, b)], name)
+        yield from sides.rows("actuator", [(a, b)], "control", name)
     yield from sides.extras("actuator", actuators, lambda raw, k: zeros(_STILL, raw, k))
 
 
@@ -57,20 +55,20 @@ def _laws(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """Rows of an actuator; together, where its own state moves by another law."""
     laws = _law(sides.left, a), _law(sides.right, b)
     sized = laws[0][1:] == laws[1][1:]
-    rows = [row for row in fields.ACTUATOR if sized or row.when != "actuator_dyntype"]
-    found = list(sides.rows("actuator", rows, [(a, b)]))
+    rows = list(sides.rows("actuator", [(a, b)]))
     values = (("dyntype", laws[0][0], laws[1][0]),)
     if not sized:
         why = "its own state has another size"
-        found.append(sides.tell("law of its state", "actuator", a, values, refused=why))
+        rows = [row for row in rows if row.subject != "dynamics"]
+        rows.append(sides.tell("law of its state", "actuator", a, values, refused=why))
     elif laws[0] != laws[1]:
-        of_law = [each for each in found if each.subject in _OF_A_LAW]
+        of_law = [row for row in rows if row.subject in _OF_A_LAW]
         edits: list[Edit] = [("actuator_dyntype", (b,), laws[0][0])]
-        edits += [edit for each in of_law for edit in each.edits]
-        values += tuple(value for each in of_law for value in each.values)
+        edits += [edit for row in of_law for edit in row.edits]
+        values += tuple(value for row in of_law for value in row.values)
         yield sides.tell("law", "actuator", a, values, "", edits)
-        found = [each for each in found if each not in of_law]
-    yield from found
+        rows = [row for row in rows if row not in of_law]
+    yield from rows
 
 
 def _law(raw: Any, k: int) -> tuple[int, ...]:
@@ -85,29 +83,22 @@ def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     left, right = sides.left, sides.right
     sizes = left.actuator_history[a], right.actuator_history[b]
     back = bool(sizes[0][0] and not sizes[1][0])
-    yield from sides.rows("actuator", fields.DELAY, [(a, b)], back=back)
+    yield from sides.rows("actuator", [(a, b)], "delay", back=back)
     if left.actuator_delay[a] and right.actuator_delay[b] and not same(*sizes):
         values = (("history", plain(sizes[0]), plain(sizes[1])),)
         why = "it keeps another number of commands, or reads between them in another way"
         yield sides.tell("memory of commands", "actuator", a, values, refused=why)
 
 
-def _targets(sides: Sides, side: int, k: int) -> tuple[int, ...]:
-    """What an actuator acts on, in ids of the second model."""
+def _targets(sides: Sides, side: int, k: int) -> tuple[tuple[int, ...], str]:
+    """What an actuator acts on and from which site it measures: ids of the second model, words."""
     raw = (sides.left, sides.right)[side]
     kind, ids = int(raw.actuator_trntype[k]), raw.actuator_trnid[k].tolist()
-    for place, target in enumerate(_DRIVES.get(kind, ())):
-        ids[place] = sides.there(side, target, ids[place])
-    return kind, *ids
-
-
-def _words(raw: Any, k: int) -> str:
-    """What an actuator drives, and from which site it measures."""
-    kind, ids = int(raw.actuator_trntype[k]), raw.actuator_trnid[k].tolist()
-    word = require("mujoco").mjtTrn(kind).name.removeprefix("mjTRN_")
-    targets = zip(_DRIVES.get(kind, ()), ids, strict=False)
+    targets = list(zip(_DRIVES.get(kind, ()), ids, strict=False))
     names = [name_of(raw, target, i) for target, i in targets if i >= 0]
-    return f"{word.lower()} {', '.join(names)}"
+    word = require("mujoco").mjtTrn(kind).name.removeprefix("mjTRN_").lower()
+    ids[: len(targets)] = [sides.there(side, target, i) for target, i in targets]
+    return (kind, *ids), f"{word} {', '.join(names)}"
 
 
 def sensors(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]:
@@ -120,24 +111,24 @@ def sensors(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]
     """
     why = "a sensor is built by the compiler"  # so only a cutoff can be brought over
     return [
-        each if each.subject == "cutoff" else replace(each, edits=(), edits_one=(), refused=why)
-        for each in _sensors(Sides(left, right, pairs))
+        row if row.subject == "cutoff" else replace(row, edits=(), edits_one=(), refused=why)
+        for row in _sensors(Sides(left, right, pairs))
     ]
 
 
 def _sensors(sides: Sides) -> Iterator[ModelDifference]:
-    left, right = sides.left, sides.right
+    left, right, mujoco = sides.left, sides.right, require("mujoco")
     pairs = list(sides.by_name("sensor"))
-    yield from sides.rows("sensor", fields.SENSOR, pairs)
+    yield from sides.rows("sensor", pairs)
     for a, b in pairs:
-        values = []
-        kinds = [int(raw.sensor_type[k]) for raw, k in ((left, a), (right, b))]
-        if kinds[0] != kinds[1]:
-            values.append(("type", *(require("mujoco").mjtSensor(kind).name for kind in kinds)))
-        for types, ids in _OBJECTS:
-            words = _object(left, types, ids, a), _object(right, types, ids, b)
-            if words[0] != words[1] and not _is_same(sides, types, ids, a, b):
-                values.append((ids.removeprefix("sensor_"), *words))
+        kinds = [mujoco.mjtSensor(raw.sensor_type[k]).name for raw, k in ((left, a), (right, b))]
+        values = [("type", *kinds)] if kinds[0] != kinds[1] else []
+        for end in ("obj", "ref"):
+            ours, theirs = _object(left, end, a), _object(right, end, b)
+            # They may be counterparts, by whatever names.
+            there = sides.ids.get(ours[0].removeprefix("x"), {}).get(ours[1])
+            if ours[2] != theirs[2] and (ours[0], there) != theirs[:2]:
+                values.append((f"{end}id", ours[2], theirs[2]))
         if values:
             yield sides.tell("sensor", "sensor", a, values)
     yield from sides.extras("sensor", pairs, lambda raw, k: zeros(("sensor_cutoff",), raw, k))
@@ -147,20 +138,10 @@ def _sensors(sides: Sides) -> Iterator[ModelDifference]:
         yield ModelDifference("order of sensordata", "sensor", "", (("order", *orders),))
 
 
-def _is_same(sides: Sides, types: str, ids: str, a: int, b: int) -> bool:
-    """Whether what two sensors are of are counterparts, by whatever names."""
-    (kind, here), (other, there) = (
-        (int(getattr(raw, types)[k]), int(getattr(raw, ids)[k]))
-        for raw, k in ((sides.left, a), (sides.right, b))
-    )
-    word = str(require("mujoco").mju_type2Str(kind) or "").removeprefix("x")
-    return kind == other and sides.ids.get(word, {}).get(here) == there
-
-
-def _object(raw: Any, types: str, ids: str, k: int) -> str:
-    """What a sensor is of, as its kind and its name."""
+def _object(raw: Any, end: str, k: int) -> tuple[str, int, str]:
+    """What a sensor is of: its kind, its id, and both in words."""
     mujoco = require("mujoco")
-    kind, number = int(getattr(raw, types)[k]), int(getattr(raw, ids)[k])
-    if number < 0:
-        return "none"
-    return f"{mujoco.mju_type2Str(kind)} {mujoco.mj_id2name(raw, kind, number) or number}"
+    kind, number = (int(getattr(raw, f"sensor_{end}{part}")[k]) for part in ("type", "id"))
+    word = str(mujoco.mju_type2Str(kind) or "")
+    named = f"{word} {mujoco.mj_id2name(raw, kind, number) or number}"
+    return word, number, named if number >= 0 else "none"

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...installed import require
-from ...interface import Array
+from ...interface import Array, JointType
+from ...measures.text import grouped
 from ...rotations import HERE, Placement, matrix_from_quat
 from ..records import Edit, ModelDifference
-from . import _fields as fields
 from ._geoms import NO_TOUCH, touches
-from ._sides import HINGE, SLIDE, Pairs, Sides, differing, name_of, plain, quat_of, same, zeros
+from ._sides import Pairs, Sides, differing, name_of, plain, quat_of, same, zeros
 
 # In the place of a field: what a pair has is to be that of its geoms, as edited as these are.
 AS_GEOMS = "pair as its geoms"
-_DOFS = {0: 6, 1: 3}  # mjtJoint, where it is not 1
 _OF_A_SLIDE = {"rad": "m", "N·m/rad": "N/m", "N·m": "N", "kg m²": "kg", "N·m·s": "N·s/m"}
 _NUMBERED = (1, 2)  # mjtWrap: a joint with its coefficient, a pulley with its divisor
 _WRAPS = {1: "joint", 3: "site", 4: "geom", 5: "geom"}  # mjtWrap, what an entry refers to
@@ -30,7 +29,6 @@ _CONNECT, _WELD, _JOINT, _TENDON = range(4)  # mjtEq
 _BODY = 1  # mjtObj
 _KEEPS = {_BODY: "body", 3: "joint", 5: "geom", 6: "site", 18: "tendon"}  # mjtObj
 _NEAR = 1e-9  # [m], and of entries of matrices: as a file with ten digits leaves it
-_KEPT = fields.EQUALITY[1]
 
 
 def elements(sides: Sides) -> Iterator[ModelDifference]:
@@ -41,11 +39,11 @@ def elements(sides: Sides) -> Iterator[ModelDifference]:
     # Of a geom that only a tendon wraps, or a medium flows around, the shape is all that acts.
     touching = touches(sides.left), touches(sides.right)
     geoms = [(a, b) for a, b in sides.ids["geom"].items() if touching[0][a] or touching[1][b]]
-    yield from sides.rows("geom", fields.GEOM, geoms)
+    yield from sides.rows("geom", geoms)
     tendons = sorted(sides.ids["tendon"].items())
     for a, b in tendons:
         yield from _path(sides, a, b)
-    yield from sides.rows("tendon", fields.TENDON, tendons)
+    yield from sides.rows("tendon", tendons)
     yield from sides.extras("tendon", tendons, lambda raw, k: zeros(_SLACK, raw, k))
 
 
@@ -60,40 +58,39 @@ def _bodies(sides: Sides) -> Iterator[ModelDifference]:
         }
         for (a, b), body in sorted(trees.items()):
             if a >= 0 and b >= 0:
-                yield from sides.rows("body", fields.TREE, [(a, b)], name_of(left, "body", body))
+                yield from sides.rows("body", [(a, b)], "tree", name_of(left, "body", body))
     # The engine looks only where the file had some.
-    pairs = sorted(sides.ids["body"].items())
-    yield from sides.rows("body", fields.BODY, pairs, back=not right.ngravcomp)
+    yield from sides.rows("body", sorted(sides.ids["body"].items()), back=not right.ngravcomp)
 
 
 def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     left, right = sides.left, sides.right
-    name, kind = name_of(left, "joint", a), int(left.jnt_type[a])
-    differences = [*sides.rows("joint", fields.JOINT, [(a, b)]), *_rest(sides, a, b)]
+    name, kind = name_of(left, "joint", a), JointType(left.jnt_type[a])
+    differences = [*sides.rows("joint", [(a, b)]), *_rest(sides, a, b, kind)]
     here, there = int(left.jnt_dofadr[a]), int(right.jnt_dofadr[b])
-    dofs = [(here + k, there + k) for k in range(_DOFS.get(kind, 1))]
-    for row in fields.DOF:
-        if differ := list(sides.rows("joint", [row], dofs, name)):
-            edits = tuple(edit for difference in differ for edit in difference.edits)
-            differences.append(replace(differ[0], edits=edits))
+    dofs = [(here + k, there + k) for k in range(kind.nv)]
+    # One difference for all degrees of freedom of a joint.
+    for rows in grouped((d.subject, d) for d in sides.rows("joint", dofs, "dof", name)).values():
+        edits = tuple(edit for difference in rows for edit in difference.edits)
+        differences.append(replace(rows[0], edits=edits))
     for difference in differences:
-        unit = _OF_A_SLIDE.get(difference.unit, "") if kind == SLIDE else difference.unit
-        yield replace(difference, unit=unit)
+        unit = difference.unit
+        yield replace(
+            difference, unit=_OF_A_SLIDE.get(unit, "") if kind == JointType.SLIDE else unit
+        )
 
 
-def _rest(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
+def _rest(sides: Sides, a: int, b: int, kind: JointType) -> Iterator[ModelDifference]:
     """Where the spring of a joint is slack."""
     left, right = sides.left, sides.right
     stiff = ("jnt_stiffness", "jnt_stiffnesspoly")
-    if not any(getattr(left, n)[a].any() or getattr(right, n)[b].any() for n in stiff):
-        return
     here, there = int(left.jnt_qposadr[a]), int(right.jnt_qposadr[b])
-    number = {0: 7, 1: 4}.get(int(left.jnt_type[a]), 1)
-    ours, theirs = left.qpos_spring[here : here + number], right.qpos_spring[there : there + number]
-    if not same(ours, theirs):
-        edits = [("qpos_spring", (there + k,), float(ours[k])) for k in range(number)]
-        unit = "rad" if int(left.jnt_type[a]) in (SLIDE, HINGE) else ""
+    ours, theirs = left.qpos_spring[here:][: kind.nq], right.qpos_spring[there:][: kind.nq]
+    acts = any(getattr(left, n)[a].any() or getattr(right, n)[b].any() for n in stiff)
+    if acts and not same(ours, theirs):
+        edits = [("qpos_spring", (there + k,), float(ours[k])) for k in range(kind.nq)]
         values = (("springref", plain(ours), plain(theirs)),)
+        unit = "rad" if kind.nq == 1 else ""
         yield sides.tell("rest of the spring", "joint", a, values, unit, edits)
 
 
@@ -116,23 +113,23 @@ def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]]:
     """What a tendon passes: its kind, its id in the second model, and a number."""
     raw = (sides.left, sides.right)[side]
-    start, found = int(raw.tendon_adr[tendon]), []
+    start, passes = int(raw.tendon_adr[tendon]), []
     for k in range(start, start + int(raw.tendon_num[tendon])):
         kind, number = int(raw.wrap_type[k]), round(float(raw.wrap_prm[k]), 9)
         target = _WRAPS.get(kind)
         if target == "geom":  # the site on whose side it passes
             number = sides.there(side, "site", int(number))
-        found.append((kind, sides.there(side, target, int(raw.wrap_objid[k])), number))
-    return found
+        passes.append((kind, sides.there(side, target, int(raw.wrap_objid[k])), number))
+    return passes
 
 
 def equalities(sides: Sides) -> Iterator[ModelDifference]:
     """Equalities; the two bodies of a connect or a weld have no order."""
     pairs = sorted(_match(sides))
-    yield from sides.rows("equality", [row for row in fields.EQUALITY if row is not _KEPT], pairs)
+    yield from sides.rows("equality", pairs)
     for a, b in pairs:
         if not _is_of_bodies(sides, a):
-            yield from sides.rows("equality", [_KEPT], [(a, b)])
+            yield from sides.rows("equality", [(a, b)], "kept")
             continue
         wanted, there = _wanted(sides, a, b), np.array(sides.right.eq_data[b])
         used = 6 if int(sides.right.eq_type[b]) == _CONNECT else 11
@@ -143,12 +140,11 @@ def equalities(sides: Sides) -> Iterator[ModelDifference]:
         if off.max() > _NEAR:
             values = differing(("eq_data",), [wanted[:used]], [there[:used]])
             edits = [("eq_data", (b,), wanted)]
-            yield sides.tell(_KEPT.subject, "equality", a, values, "", edits)
-
-    def inactive(raw: Any, k: int) -> tuple[Edit, ...]:
-        return zeros(("eq_active0",), raw, k) if raw.eq_active0[k] else ()
-
-    yield from sides.extras("equality", pairs, inactive)
+            yield sides.tell("what it keeps", "equality", a, values, "", edits)
+    yield from sides.extras(
+        *("equality", pairs),
+        lambda raw, k: zeros(("eq_active0",), raw, k) if raw.eq_active0[k] else (),
+    )
 
 
 def _match(sides: Sides) -> Iterator[tuple[int, int]]:
@@ -172,7 +168,7 @@ def _keeps(sides: Sides, side: int, k: int) -> tuple[int, ...]:
     raw = (sides.left, sides.right)[side]
     kind, of = int(raw.eq_type[k]), int(raw.eq_objtype[k])
     target = {_JOINT: "joint", _TENDON: "tendon"}.get(kind, _KEEPS.get(of))
-    ids = [sides.there(side, target, int(each[k])) for each in (raw.eq_obj1id, raw.eq_obj2id)]
+    ids = [sides.there(side, target, int(end[k])) for end in (raw.eq_obj1id, raw.eq_obj2id)]
     return kind, of, *(sorted(ids) if kind in (_CONNECT, _WELD) else ids)
 
 
@@ -224,24 +220,19 @@ def _unit(quat: Array) -> Array:
 
 def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
     """Which pairs of geoms touch by rules of their own, and which bodies never do."""
-    ours, theirs = (
-        [
-            {sides.there(side, "geom", int(g)) for g in (raw.pair_geom1[k], raw.pair_geom2[k])}
-            for k in range(raw.npair)
-        ]
-        for side, raw in enumerate((sides.left, sides.right))
-    )
-    pairs: Pairs = [(k, theirs.index(each)) for k, each in enumerate(ours) if each in theirs]
-    yield from sides.rows("pair", fields.PAIR, pairs)
-    yield from sides.extras("pair", pairs, lambda _raw, k: ((AS_GEOMS, (k,), None),))
-    apart = [
-        [
-            {sides.there(side, "body", b) for b in (int(s) >> 16, int(s) & 0xFFFF)}
-            for s in raw.exclude_signature
-        ]
-        for side, raw in enumerate((sides.left, sides.right))
-    ]
-    alike = [(k, apart[1].index(each)) for k, each in enumerate(apart[0]) if each in apart[1]]
+
+    def pairs(kind: str, ends: Callable[[Any], Iterable[tuple[int, int]]]) -> Pairs:
+        """Those of either model that are of the same two elements."""
+        ours, theirs = (
+            [{sides.there(side, kind, int(end)) for end in pair} for pair in ends(raw)]
+            for side, raw in enumerate((sides.left, sides.right))
+        )
+        return [(k, theirs.index(pair)) for k, pair in enumerate(ours) if pair in theirs]
+
+    alike = pairs("geom", lambda raw: zip(raw.pair_geom1, raw.pair_geom2, strict=True))
+    yield from sides.rows("pair", alike)
+    yield from sides.extras("pair", alike, lambda _raw, k: ((AS_GEOMS, (k,), None),))
+    alike = pairs("body", lambda raw: [divmod(int(s), 1 << 16) for s in raw.exclude_signature])
     # The world is never apart from itself: an entry without an effect.
     yield from sides.extras("exclude", alike, lambda raw, k: zeros(("exclude_signature",), raw, k))
 

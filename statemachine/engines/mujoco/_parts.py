@@ -9,24 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...installed import require
-from ...interface import Array
+from ...interface import Array, JointType
 from ...rotations import HERE
 from ..description.records import Inertial, motion
 from ..records import BodyPair, Edit, ModelDifference
-from ._sides import (
-    HINGE,
-    NEAR,
-    SLIDE,
-    Sides,
-    apart,
-    copies,
-    plain,
-    quat_of,
-    same,
-    zeros,
-)
+from ._sides import NEAR, Sides, apart, copies, plain, quat_of, same, zeros
 
-_FREE, _BALL = 0, 1  # mjtJoint
+_FREE, _BALL, _SLIDE, _HINGE = JointType
 _WEIGHS = {
     "mass": ("body_mass",),
     "centre of mass": ("body_ipos",),
@@ -181,18 +170,15 @@ def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
 
 def _axis(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[ModelDifference]:
     left, right, align = sides.left, sides.right, pair.align
-    kind, axis, anchor = (
-        int(left.jnt_type[a]),
-        align.mat @ left.jnt_axis[a],
-        align.of(left.jnt_pos[a]),
-    )
-    if kind in (SLIDE, HINGE) and np.abs(axis - right.jnt_axis[b]).max() > NEAR:
+    kind, axis = int(left.jnt_type[a]), align.mat @ left.jnt_axis[a]
+    if kind in (_SLIDE, _HINGE) and np.abs(axis - right.jnt_axis[b]).max() > NEAR:
         values = (("axis", plain(axis), plain(right.jnt_axis[b])),)
         yield sides.tell("axis", "joint", a, values, "", [("jnt_axis", (b,), axis)])
+    anchor = align.of(left.jnt_pos[a])
     off = anchor - right.jnt_pos[b]
-    if kind == HINGE:  # a point along the axis is as good
+    if kind == _HINGE:  # a point along the axis is as good
         off = off - axis * (off @ axis)
-    if kind in (HINGE, _BALL) and np.linalg.norm(off) > NEAR:
+    if kind in (_HINGE, _BALL) and np.linalg.norm(off) > NEAR:
         values = (("anchor", plain(anchor), plain(right.jnt_pos[b])),)
         yield sides.tell("anchor", "joint", a, values, "m", [("jnt_pos", (b,), anchor)])
 
@@ -217,14 +203,14 @@ def _place(
     if not alike:  # the same zero, another reference: turn back by ours, on by theirs
         (a, _), (ref, other) = joints[0], refs[0]
         axis, anchor = pair.align.mat @ left.jnt_axis[a], pair.align.of(left.jnt_pos[a])
-        wanted = wanted @ motion(int(left.jnt_type[a]) == SLIDE, axis, anchor, other - ref)
+        wanted = wanted @ motion(int(left.jnt_type[a]) == _SLIDE, axis, anchor, other - ref)
     if max(apart(wanted, theirs)) > NEAR:
         yield sides.elsewhere("body", pair.left, pair.right, wanted, theirs)
 
 
 def _ref(raw: Any, joint: int) -> float:
     """The position of a joint in which the body lies as its frame says; 0 of a ball."""
-    scalar = int(raw.jnt_type[joint]) in (SLIDE, HINGE)
+    scalar = int(raw.jnt_type[joint]) in (_SLIDE, _HINGE)
     return float(raw.qpos0[raw.jnt_qposadr[joint]]) if scalar else 0.0
 
 

@@ -21,7 +21,6 @@ from ..description.tree import together
 from ..records import BodyPair, Counterparts, Edit, ModelDifference
 from . import _fields as fields
 
-SLIDE, HINGE = 2, 3  # mjtJoint
 NEAR = 1e-10  # [m], and of entries of matrices: less is rounding
 _SAME_PLACE = 1e-15  # the same: what composing with frames that are none leaves
 NOBODY = -2  # in the place of an id that has no counterpart; -1 is that of nothing
@@ -36,14 +35,10 @@ Values = Iterable[tuple[Any, ...]]
 def same(left: Any, right: Any, slack: float = _ROUNDING) -> bool:
     """Whether two values are equal, but for rounding."""
     a, b = np.asarray(left), np.asarray(right)
-    if a.shape != b.shape:
-        return False
-    if a.dtype.kind != "f" and b.dtype.kind != "f":
+    if a.shape != b.shape or "f" not in (a.dtype.kind, b.dtype.kind):
         return bool(np.array_equal(a, b))
-    a, b = a.astype(float), b.astype(float)
-    with np.errstate(invalid="ignore"):
-        gap = np.where(a == b, 0.0, np.abs(a - b))
-    return bool((gap <= slack * np.maximum(np.abs(a), np.abs(b)) + 1e-15).all())
+    # A range without an end is told by its flag.
+    return bool((np.isclose(a, b, slack, 1e-15) | np.isinf(a) | np.isinf(b)).all())
 
 
 def plain(value: Any) -> Any:
@@ -87,11 +82,9 @@ def name_of(raw: Any, kind: str, index: int) -> str:
         first = int(raw.body_jntadr[carries])
         several = raw.body_jntnum[carries] > 1
         return f"joint {index - first + 1} of {body}" if several else f"the joint of {body}"
-    owner = raw.body(int(getattr(raw, f"{kind}_bodyid")[index])).name if kind in _OWNED else ""
+    on_body = kind in ("geom", "site")
+    owner = raw.body(int(getattr(raw, f"{kind}_bodyid")[index])).name if on_body else ""
     return f"{kind} {index}" + (f" on {owner}" if owner else "")
-
-
-_OWNED = ("geom", "site")
 
 
 def placed(pos: Array, quat: Array) -> Placement:
@@ -163,7 +156,9 @@ class Solids:
 
     def on(self, kind: str, index: int) -> Placement:
         """The frame of a geom or a site in that of its rigid part."""
-        body, pos, quat = (getattr(self.raw, f"{kind}_{of}")[index] for of in _FRAME)
+        body, pos, quat = (
+            getattr(self.raw, f"{kind}_{part}")[index] for part in ("bodyid", "pos", "quat")
+        )
         return self.place(int(body)) @ placed(pos, quat)
 
     def massive(self, head: int) -> list[int]:
@@ -174,9 +169,6 @@ class Solids:
     def inertial(self, *bodies: int) -> Inertial:
         """Bodies of a rigid part together, in its frame."""
         return together([inertial_of(self.raw, b).seen_from(self.place(b)) for b in bodies])
-
-
-_FRAME = ("bodyid", "pos", "quat")
 
 
 class Sides:
@@ -227,17 +219,19 @@ class Sides:
 
     def by_name(self, kind: str) -> Iterator[tuple[int, int]]:
         """Elements of one name, and those without in their order."""
-        left, right = ([view(k).name for k in range(n)] for view, n in self._views(kind))
+        left, right = self._names(kind)
         for k, name in enumerate(left):
             if name and name in right:
                 yield k, right.index(name)
             elif not name and k < len(right) and not right[k]:
                 yield k, k
 
-    def _views(self, kind: str) -> list[tuple[Callable[[int], Any], int]]:
-        """How an element of each model is looked at, and how many there are."""
-        word = _COUNTED.get(kind, kind)
-        return [(getattr(raw, word), getattr(raw, f"n{word}")) for raw in (self.left, self.right)]
+    def _names(self, kind: str) -> list[list[str]]:
+        """Names of the elements of each model."""
+        word, models = _COUNTED.get(kind, kind), (self.left, self.right)
+        return [
+            [getattr(raw, word)(k).name for k in range(getattr(raw, f"n{word}"))] for raw in models
+        ]
 
     def tell(
         self,
@@ -259,8 +253,8 @@ class Sides:
     def rows(
         self,
         kind: str,
-        rows: Sequence[fields.FieldRow],
         pairs: Pairs,
+        table: str = "",
         name: str = "",
         back: bool = False,
     ) -> Iterator[ModelDifference]:
@@ -268,13 +262,13 @@ class Sides:
 
         Args:
             kind: Of the elements.
-            rows: What is compared.
             pairs: Ids, or other places in these arrays.
+            table: Of `fields.ROWS`; else that of the kind.
             name: What they are called; else each by its own name.
             back: Whether it is the first that can be brought to the second.
         """
         for a, b in pairs:
-            for row in rows:
+            for row in fields.ROWS[table or kind]:
                 values = differing(row.fields, *self._entries(row.fields, a, b))
                 acts = not row.when or any(
                     np.any(entry)
@@ -305,8 +299,8 @@ class Sides:
         self, kind: str, pairs: Pairs, without: Callable[[Any, int], tuple[Edit, ...]]
     ) -> Iterator[ModelDifference]:
         """Elements that only one model has; `without` tells what takes the effect of one away."""
-        for side, (_, count) in enumerate(self._views(kind)):
-            for k in sorted({*range(count)} - {pair[side] for pair in pairs}):
+        for side, names in enumerate(self._names(kind)):
+            for k in sorted({*range(len(names))} - {pair[side] for pair in pairs}):
                 if edits := without((self.left, self.right)[side], k):
                     yield self.alone(side, kind, k, edits)
 

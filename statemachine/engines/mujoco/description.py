@@ -17,6 +17,7 @@ import numpy as np
 from ...backends import load
 from ...errors import ModelError
 from ...installed import require
+from ...interface import JointType
 from ...rotations import HERE
 from ..description.records import (
     Actuator,
@@ -30,11 +31,10 @@ from ..description.records import (
     moved,
 )
 from . import _shapes as shapes
-from ._sides import HINGE, inertial_of, name_of, placed
+from ._sides import inertial_of, name_of, placed
 from .differences import settings_of
 
 _FORMATS = {".mjb": "MJB", ".urdf": "URDF"}
-_JOINTS = ("free", "ball", "slide", "hinge")  # mjtJoint, in its order
 
 
 def read_file(path: Path, name: str) -> Robot:
@@ -167,12 +167,11 @@ def _links(raw: Any, body: int, above: str, actuators: tuple[Actuator, ...]) -> 
 
 
 def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
-    dof, kind = int(raw.jnt_dofadr[joint]), _JOINTS[int(raw.jnt_type[joint])]
-    spring = int(raw.jnt_qposadr[joint])
-    scalar = kind in ("slide", "hinge")
+    dof, kind = int(raw.jnt_dofadr[joint]), JointType(raw.jnt_type[joint])
+    scalar = kind in (JointType.SLIDE, JointType.HINGE)
     return RobotJoint(
         name=name_of(raw, "joint", joint),
-        kind=kind,
+        kind=kind.name.lower(),
         axis=np.array(raw.jnt_axis[joint]),
         anchor=np.array(raw.jnt_pos[joint]),
         limits=_limited(raw.jnt_range[joint], raw.jnt_limited[joint]),
@@ -182,7 +181,7 @@ def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
         damping=float(raw.dof_damping[dof]),
         friction=float(raw.dof_frictionloss[dof]),
         stiffness=float(raw.jnt_stiffness[joint]),
-        rest=float(raw.qpos_spring[spring]) if scalar else None,
+        rest=float(raw.qpos_spring[raw.jnt_qposadr[joint]]) if scalar else None,
         follows=_follows(raw, joint),
         number=joint,
     )
@@ -190,12 +189,12 @@ def _joint(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> RobotJoint:
 
 def _follows(raw: Any, joint: int) -> Follows | None:
     """Of an equality between two joints, if it is linear."""
-    for i in range(raw.neq):
-        if raw.eq_type[i] == 2 and raw.eq_obj1id[i] == joint and raw.eq_obj2id[i] >= 0:
-            offset, factor, *rest = map(float, raw.eq_data[i, :5])
-            if raw.eq_active0[i] and not any(rest):
-                other = raw.joint(int(raw.eq_obj2id[i])).name
-                return Follows(other, factor, offset, name_of(raw, "equality", i))
+    of_joints = (raw.eq_type == 2) & (raw.eq_obj2id >= 0) & (raw.eq_active0 != 0)  # mjEQ_JOINT
+    for i in np.flatnonzero(of_joints & (raw.eq_obj1id == joint)).tolist():
+        offset, factor, *rest = map(float, raw.eq_data[i, :5])
+        if not any(rest):
+            other = raw.joint(int(raw.eq_obj2id[i])).name
+            return Follows(other, factor, offset, name_of(raw, "equality", i))
     return None
 
 
@@ -216,11 +215,11 @@ def _notes(raw: Any, links: list[Link], actuators: tuple[Actuator, ...]) -> list
 
 def _beyond(raw: Any, i: int, drive: Actuator) -> str:
     """A servo that may be commanded to where its joint cannot go."""
-    joint = int(raw.actuator_trnid[i, 0])
+    joint, ends = int(raw.actuator_trnid[i, 0]), drive.controls
     kp, bias = raw.actuator_gainprm[i, 0], raw.actuator_biasprm[i, 1]
     servo = raw.actuator_trntype[i] == 0 and kp and bias == -kp and drive.gear == 1
-    ends = drive.controls
-    if not servo or ends is None or not raw.jnt_limited[joint] or raw.jnt_type[joint] != HINGE:
+    hinge = raw.jnt_limited[joint] and raw.jnt_type[joint] == JointType.HINGE
+    if not servo or ends is None or not hinge:
         return ""
     low, high = raw.jnt_range[joint]
     passed = max(low - ends[0], ends[1] - high)

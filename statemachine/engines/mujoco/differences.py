@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...installed import require
+from ...measures.text import grouped
 from ..records import Counterparts, Edit, ModelDifference
 from . import _fields as fields
 from ._drives import drives, sensors
@@ -120,39 +121,35 @@ def _masks(raw: Any) -> None:
 def _options(left: Any, right: Any, world: bool) -> Iterator[ModelDifference]:
     overrides = int(require("mujoco").mjtEnableBit.mjENBL_OVERRIDE)
     overridden = (left.opt.enableflags | right.opt.enableflags) & overrides
-    for subject, names in fields.OPTIONS.items():
+    ours, theirs = settings_of(left), settings_of(right)
+    for subject, options in fields.OPTIONS.items():
         idle = (not world and subject in ("gravity", "timestep")) or (
             subject == "contact override" and not overridden
         )
-        both = [(name, getattr(left.opt, name), getattr(right.opt, name)) for name in names]
-        differ = [] if idle else [row for row in both if not same(*row[1:])]
-        if differ:
-            values = tuple((name, _told(name, a), _told(name, b)) for name, a, b in differ)
-            edits = tuple((f"opt.{name}", (), copy.copy(a)) for name, a, _ in differ)
+        names = [name for name in options if not (idle or same(ours[name], theirs[name]))]
+        if names:
+            values = tuple((name, ours[name], theirs[name]) for name in names)
+            edits = tuple((f"opt.{name}", (), copy.copy(getattr(left.opt, name))) for name in names)
             unit = fields.OPTION_UNITS.get(subject, "")
             yield ModelDifference(subject, "option", "", values, unit, edits)
     for field, word, bit in _flag_bits():
-        switches = [_switch(raw, field, bit) for raw in (left, right)]
-        if switches[0] != switches[1]:
-            values = ((f"flag {word}", *switches),)
+        name = f"flag {word}"
+        if ours[name] != theirs[name]:
             edits = ((f"opt.{field}", (bit,), bool(getattr(left.opt, field) & bit)),)
-            yield ModelDifference(word, "flag", "", values, edits=edits)
+            yield ModelDifference(word, "flag", "", ((name, ours[name], theirs[name]),), "", edits)
 
 
 def settings_of(raw: Any) -> dict[str, Any]:
-    """The options and flags of a compiled model by name, as they are told."""
+    """The options and flags of a compiled model by name; what is chosen from a list in words."""
     names = [name for group in fields.OPTIONS.values() for name in group]
-    options = {name: _told(name, getattr(raw.opt, name)) for name in names}
-    flags = {f"flag {word}": _switch(raw, field, bit) for field, word, bit in _flag_bits()}
-    return options | flags
-
-
-def _told(name: str, value: Any) -> Any:
-    """The value of an option; of one that is chosen from a list its name there."""
-    if name not in fields.CHOICES:
-        return plain(value)
-    chosen = getattr(require("mujoco"), fields.CHOICES[name])(int(value)).name
-    return chosen.partition("_")[2].lower()
+    settings = {name: plain(getattr(raw.opt, name)) for name in names}
+    for name, choices in fields.CHOICES.items():
+        chosen = getattr(require("mujoco"), choices)(settings[name]).name
+        settings[name] = chosen.partition("_")[2].lower()
+    for field, word, bit in _flag_bits():
+        raised = bool(getattr(raw.opt, field) & bit)
+        settings[f"flag {word}"] = "on" if raised == (field == "enableflags") else "off"
+    return settings
 
 
 def _flag_bits() -> Iterator[tuple[str, str, int]]:
@@ -162,11 +159,6 @@ def _flag_bits() -> Iterator[tuple[str, str, int]]:
         for name, bit in bits.__members__.items():
             if int(bit).bit_count() == 1 and "_" in name and name not in fields.IDLE_FLAGS:
                 yield field, name.partition("_")[2].lower(), int(bit)
-
-
-def _switch(raw: Any, field: str, bit: int) -> str:
-    raised = bool(int(getattr(raw.opt, field)) & bit)
-    return "on" if raised == (field == "enableflags") else "off"
 
 
 def _whole(left: Any, right: Any) -> Iterator[ModelDifference]:
@@ -179,33 +171,29 @@ def _whole(left: Any, right: Any) -> Iterator[ModelDifference]:
             yield ModelDifference(subject, "model", "", (("count", *counts),), refused=why)
 
 
+_GAINS = ("actuator_gainprm", "actuator_biasprm")
 # Fields whose entries mean something one by one, and what each is called; a name with {} is of all.
-_AXES, _ENDS, _NUMBERED = ("x", "y", "z"), ("lower end", "upper end"), ("{}[{}]",)
 _SPLIT: dict[str, Sequence[str]] = {
     **dict.fromkeys(
         (
             *("body_ipos", "body_pos", "jnt_pos", "geom_pos", "site_pos", "geom_surfacevel"),
             *("opt.gravity", "opt.wind", "opt.magnetic"),
         ),
-        _AXES,
+        ("x", "y", "z"),
     ),
     **dict.fromkeys(
         (
             *("jnt_range", "jnt_actfrcrange", "tendon_range", "tendon_actfrcrange"),
             *("actuator_ctrlrange", "actuator_forcerange", "actuator_actrange"),
         ),
-        _ENDS,
+        ("lower end", "upper end"),
     ),
-    **dict.fromkeys(
-        ("body_inertia", "geom_size", "geom_friction", "pair_friction", "actuator_gear"), _NUMBERED
-    ),
-    **dict.fromkeys(("actuator_gainprm", "actuator_biasprm"), _NUMBERED),
+    **dict.fromkeys(("geom_size", "geom_friction", "pair_friction"), ("{}[{}]",)),
+    **dict.fromkeys(("actuator_gear", *_GAINS), ("{}[{}]",)),
+    "body_inertia": ("diaginertia[{1}]",),
 }
-_CALLED = {"body_inertia": "diaginertia"}
 # A difference that sets one of these is a thing of one piece: the rest means something else then.
 _KINDS = ("geom_type", "actuator_gaintype", "actuator_biastype", "actuator_dyntype", "body_iquat")
-_GAINS, _KP = ("actuator_gainprm", "actuator_biasprm"), ("gainprm[0]", "biasprm[1]")
-_TURNS = ("body_quat", "geom_quat", "site_quat")
 
 
 def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
@@ -227,27 +215,31 @@ def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, .
     gains = [edit for edit in edits if edit[0] in _GAINS]
     both = [[edit[2] for edit in gains], [_read(right, edit) for edit in gains]]
     servo = len(gains) == 2 and all(_is_servo(*arrays) for arrays in both)
-    parts: dict[str, ModelDifference] = {}
-    for word, left, other, unit, edit in (row for part in edits for row in _by_entry(right, part)):
-        called = "kp" if servo and word in _KP else word
-        known = parts.get(called)
-        parts[called] = replace(
-            known or difference,
-            subject=f"{difference.subject} ({called})",
-            values=known.values if known else ((called, left, other),),
-            unit=unit or difference.unit,
-            edits=(*(known.edits if known else ()), edit),
+    parts = grouped(
+        ("kp" if servo and entry[0] in ("gainprm[0]", "biasprm[1]") else entry[0], entry)
+        for edit in edits
+        for entry in _by_entry(right, edit)
+    )
+    if len(parts) < 2:
+        return (difference,)
+    return tuple(
+        replace(
+            difference,
+            subject=f"{difference.subject} ({name})",
+            values=((name, *rows[0][1:3]),),
+            unit=rows[0][3] or difference.unit,
+            edits=tuple(row[4] for row in rows),
         )
-    return tuple(parts.values()) if len(parts) > 1 else (difference,)
+        for name, rows in parts.items()
+    )
 
 
 def _by_entry(right: Any, edit: Edit) -> Iterator[tuple[str, Any, Any, str, Edit]]:
     """What an entry is called, both values, its unit if that is another, what brings it over."""
     (name, index, value), old = edit, _read(right, edit)
     kind, _, rest = name.partition("." if name.startswith("opt.") else "_")
-    word = _CALLED.get(name, rest or kind)
-    names = _SPLIT.get(name)
-    if name in _TURNS:
+    word, names = rest or kind, _SPLIT.get(name)
+    if name in ("body_quat", "geom_quat", "site_quat"):
         angle = 2 * float(np.arccos(np.clip(abs(np.dot(value, old)), 0.0, 1.0)))
         yield "turn", 0.0, angle, "rad", edit
     elif names is None or not np.ndim(value):
@@ -256,7 +248,7 @@ def _by_entry(right: Any, edit: Edit) -> Iterator[tuple[str, Any, Any, str, Edit
     else:
         for k in range(len(value)):
             if not same(value[k], old[k]):
-                called = names[0].format(word, k) if names is _NUMBERED else names[k]
+                called = names[0].format(word, k) if len(names) == 1 else names[k]
                 left, other = float(value[k]), float(old[k])
                 yield called, left, other, "", (name, (*index, k), left)
 
