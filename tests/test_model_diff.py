@@ -557,7 +557,7 @@ def test_frames_that_were_given(pair: Pair) -> None:
 
 
 def test_an_engine_that_nothing_reads() -> None:
-    with pytest.raises(UnknownNameError, match="no backend named 'newton'"):
+    with pytest.raises(UnknownNameError, match="named 'newton'"):
         read("so101", "newton")
 
 

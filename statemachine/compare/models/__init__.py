@@ -214,13 +214,13 @@ def compare(
     posed, notes = diff(book, trees[0], trees[1], frames, seed)
     if matched:
         skipped += enter_rest(book, matched, robots, max(tree.reach for tree in trees))
-    for question, left, right in own_ways(*engines):
-        book.differ("engine", "", question, (left, right), share=0.5)
+    for question, *answers in own_ways(*engines):
+        book.differ("engine", "", question, answers, share=0.5)
     result = Found(
         differences=book.ordered(),
         agreements=tuple(book.agreements()),
         posed=posed,
-        mass=(_mass(robots[0]), _mass(robots[1])),
+        mass=(robots[0].mass, robots[1].mass),
         notes=tuple(dict.fromkeys(notes)),
     )
     versions = {
@@ -228,13 +228,22 @@ def compare(
         "numpy": np.__version__,
         "python": platform.python_version(),
     }
-    for robot in robots:
-        if robot.format != "URDF":  # which no engine has read
-            engine, _, version = robot.reader.partition(" ")
-            versions[engine] = version
-    return Compared(
-        _side(trees[0].robot), _side(robots[1]), result, digits, versions, tuple(skipped)
-    )
+    # A URDF was read by no engine.
+    readers = [robot.reader.partition(" ") for robot in robots if robot.format != "URDF"]
+    versions |= {engine: version for engine, _, version in readers}
+    left, right = [
+        DescribedFile(
+            file=robot.name,
+            format=robot.format,
+            reader=robot.reader,
+            links=len(robot.links),
+            joints=len(robot.joints),
+            shapes=sum(len(link.shapes) for link in robot.links),
+            notes=robot.notes,
+        )
+        for robot in (trees[0].robot, robots[1])
+    ]
+    return Compared(left, right, result, digits, versions, tuple(skipped))
 
 
 def own_ways(one: str | None, two: str | None) -> tuple[tuple[str, str, str], ...]:
@@ -256,19 +265,3 @@ def own_ways(one: str | None, two: str | None) -> tuple[tuple[str, str, str], ..
         for asked in conventions.probe(engines, _ASKED).questions
     ]
     return tuple((title, a, b) for title, a, b in answers if a and b and a != b)
-
-
-def _mass(robot: Robot) -> float:
-    return sum(link.inertial.mass for link in robot.links[robot.rooted :] if link.inertial)
-
-
-def _side(robot: Robot) -> DescribedFile:
-    return DescribedFile(
-        file=robot.name,
-        format=robot.format,
-        reader=robot.reader,
-        links=len(robot.links),
-        joints=len(robot.joints),
-        shapes=sum(len(link.shapes) for link in robot.links),
-        notes=robot.notes,
-    )

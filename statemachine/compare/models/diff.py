@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...engines.description.match import Matching, frame_names, match
+from ...engines.description.records import SCALAR
 from ...engines.description.tree import Group, GroupTree
 from ...measures.text import rounded
 from ...rotations import HERE
@@ -64,13 +65,19 @@ def diff(
     reach = max(left.reach, right.reach)
     notes = [*matching.notes(), *_structure(book, left, right, matching), *_suggestions(matching)]
     for pair in matching.pairs:
-        above = matching.of(pair.left.parent) if pair.left.parent >= 0 and not pair.moved else None
-        if pair.by != "root" and above is not None:
-            geometry.of_joints(book, pair, above, left, reach)
         notes += geometry.of_masses(book, pair, left, right, reach)
         geometry.of_shapes(book, pair, left, right, reach)
-        if pair.by != "root":
-            figures.of_joints(book, pair, left, right)
+        a, b = pair.left.joint, pair.right.joint
+        if pair.by == "root" or a is None or b is None:
+            continue
+        above = None if pair.moved else matching.of(pair.left.parent)
+        if a.kind == b.kind:
+            if above and a.kind in SCALAR:
+                geometry.of_joints(book, pair, (a, b), above, left, reach)
+            figures.of_joints(book, pair, (a, b), left, right)
+        elif above:
+            keys = [("joint", a.name, "extra joint"), ("body", pair.left.name, "joints")]
+            book.differ("places", a.name, "kind", (a.kind, b.kind), keys=keys)
     figures.of_loose_drives(book, left, right)
     notes += geometry.of_frames(book, matching, left, right, named, reach)
     notes += figures.of_settings(book, left, right)
@@ -141,7 +148,7 @@ def _posed(matching: Matching, left: GroupTree, right: GroupTree, seed: int) -> 
     ranges: dict[tuple[str, str], tuple[float, float]] = {}
     for pair in matching.pairs:
         a, b = pair.left.joint, pair.right.joint
-        if a and b and pair.by != "root" and a.kind in ("hinge", "slide"):
+        if a and b and pair.by != "root" and a.kind in SCALAR:
             wide = math.pi if a.kind == "hinge" else 0.1
             ends = zip(*(joint.limits or (-wide, wide) for joint in (a, b)), strict=True)
             low, high = (choose(values) for choose, values in zip((max, min), ends, strict=True))

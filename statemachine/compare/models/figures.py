@@ -13,7 +13,7 @@ from itertools import zip_longest
 import numpy as np
 
 from ...engines.description.match import Pair
-from ...engines.description.records import Actuator, RobotJoint, Setting
+from ...engines.description.records import SCALAR, Actuator, RobotJoint, Setting
 from ...engines.description.tree import GroupTree
 from ...measures.text import few, milliseconds, rounded
 from .ledger import Ledger, Telling
@@ -94,13 +94,17 @@ class _Driven:
         return rounded(value, _FORCE[self.slides])
 
 
-def of_joints(book: Ledger, pair: Pair, left: GroupTree, right: GroupTree) -> None:
-    """Everything but where the joint is."""
-    a, b = pair.left.joint, pair.right.joint
-    if a is None or b is None or a.kind != b.kind:
-        return
+def of_joints(
+    book: Ledger,
+    pair: Pair,
+    joints: tuple[RobotJoint, RobotJoint],
+    left: GroupTree,
+    right: GroupTree,
+) -> None:
+    """Everything but where the joint is, of two of a kind."""
+    a, b = joints
     sides = _Driven(left, pair.left.number, a), _Driven(right, pair.right.number, b)
-    scalar = a.kind in ("hinge", "slide")
+    scalar = a.kind in SCALAR
     if scalar:
         _limits(book, a, b)
         words = [
@@ -109,8 +113,12 @@ def of_joints(book: Ledger, pair: Pair, left: GroupTree, right: GroupTree) -> No
             else "nothing"
             for j in (a, b)
         ]
-        ties = [("equality", j.follows.label) for j in (a, b) if j.follows]
-        keys = [(*tie, word) for tie in ties for word in ("extra equality", "what it keeps")]
+        keys = [
+            ("equality", joint.follows.label, word)
+            for joint in (a, b)
+            if joint.follows
+            for word in ("extra equality", "what it keeps")
+        ]
         if words[0] != words[1]:
             book.differ("structure", a.name, "follows", words, keys=keys)
     for subject, figure, field, units, called in _JOINT:
@@ -191,11 +199,10 @@ def of_loose_drives(book: Ledger, left: GroupTree, right: GroupTree) -> None:
 def of_settings(book: Ledger, left: GroupTree, right: GroupTree) -> Iterator[str]:
     """Settings of the simulation; where a format has none, what the other would change."""
     robots = left.robot, right.robot
-    settings = [robot.settings for robot in robots]
     says = next((robot for robot in robots if robot.settings), robots[0])
     silent = [robot.format for robot in robots if robot.settings is None]
     for name, value in (says.settings or {}).items():
-        values = [None if known is None else known.get(name) for known in settings]
+        values = [(robot.settings or {}).get(name) for robot in robots]
         other, effect = says.defaults.get(name) if silent else values[1], ""
         if silent and other is not None:
             taken = other if isinstance(other, str) else " ".join(f"{x:g}" for x in np.ravel(other))
@@ -213,11 +220,10 @@ def of_settings(book: Ledger, left: GroupTree, right: GroupTree) -> Iterator[str
             f"a {silent[0]} says nothing of timestep, gravity and solver: the engine that "
             "loads it decides (--backends shows what it takes)"
         )
-    if not silent:
-        names = [{*(known or ())} for known in settings]
-        for which, alone in (("left", names[0] - names[1]), ("right", names[1] - names[0])):
-            if alone:
-                yield f"only the engine of the {which} has the settings {few(sorted(alone), 8)}"
+    names = [{*(robot.settings or ())} for robot in robots]
+    for which, alone in (("left", names[0] - names[1]), ("right", names[1] - names[0])):
+        if alone and not silent:
+            yield f"only the engine of the {which} has the settings {few(sorted(alone), 8)}"
 
 
 def _share(name: str, left: Setting, right: Setting) -> float:

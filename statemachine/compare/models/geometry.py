@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...engines.description.match import Matching, Pair
-from ...engines.description.records import CollisionShape
+from ...engines.description.records import CollisionShape, RobotJoint
 from ...engines.description.shapes import angle_between, bounds_of, laid_on, likest
 from ...engines.description.tree import GRAVITY, GroupTree
 from ...interface import Array
@@ -31,19 +31,18 @@ _CONTACT = {
 ShapePair = tuple[CollisionShape | None, CollisionShape | None]
 
 
-def of_joints(book: Ledger, pair: Pair, above: Pair, tree: GroupTree, reach: float) -> None:
-    """Where a joint is and how it is turned, at zero, in the parent's frame."""
-    a, b = pair.left.joint, pair.right.joint
-    if a is None or b is None:
-        return
+def of_joints(
+    book: Ledger,
+    pair: Pair,
+    joints: tuple[RobotJoint, RobotJoint],
+    above: Pair,
+    tree: GroupTree,
+    reach: float,
+) -> None:
+    """Where a hinge or a slide is and how it is turned, at zero, in the parent's frame."""
+    a, b = joints
     where, body = a.name, pair.left.name
     place: list[Key] = [("body", body, "place"), ("body", body, "zero")]
-    if a.kind != b.kind:
-        keys = [("joint", where, "extra joint"), ("body", body, "joints")]
-        book.differ("places", where, "kind", (a.kind, b.kind), keys=keys)
-        return
-    if a.kind not in ("hinge", "slide"):
-        return
     # The first one's frame as the second one would have it, in the second one's own.
     off = pair.right.place.inverse @ above.align @ pair.left.place @ pair.align.inverse
     anchor, axis, hinge = b.anchor, b.axis, a.kind == "hinge"

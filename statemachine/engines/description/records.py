@@ -17,6 +17,7 @@ from ...interface import Array
 from ...rotations import HERE, Placement, rotation
 
 Range = tuple[float, float]
+SCALAR = ("hinge", "slide")  # kinds of a joint whose position is a number
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +206,11 @@ class Robot:
         return tuple(link.joint for link in self.links if link.joint)
 
     @property
+    def mass(self) -> float:
+        """Of all links but a root that is the world [kg]."""
+        return sum(link.inertial.mass for link in self.links[self.rooted :] if link.inertial)
+
+    @property
     def names(self) -> set[str]:
         """Of all joints, links and frames."""
         return {part.name for part in (*self.joints, *self.links, *self.frames)}
@@ -212,7 +218,7 @@ class Robot:
 
 def moved(joint: RobotJoint | None, amount: float) -> Placement:
     """Where a joint takes its link at a position, in the frame that the link has at zero."""
-    if joint is None or not amount or joint.kind not in ("hinge", "slide"):
+    if joint is None or not amount or joint.kind not in SCALAR:
         return HERE
     return motion(joint.kind == "slide", joint.axis, joint.anchor, amount)
 
