@@ -86,7 +86,6 @@ class TimestepConvergence:
 def convergence(
     run: Callable[[int], tuple[Trace, Trace]],
     *,
-    tip: str | None = None,
     progress: Progress = silent,
 ) -> TimestepConvergence:
     """Run two sides with their steps as given, halved and quartered.
@@ -94,7 +93,6 @@ def convergence(
     Args:
         run: Gives the traces of both sides, with rows as far apart as ever and so many times as
             many engine steps between them (`Model.replace(substeps=…)`).
-        tip: The site to compare; by default gripperframe, else the last one.
         progress: Told the fraction that is done.
 
     Raises:
@@ -112,7 +110,7 @@ def convergence(
                     f"{trace.header.ended}"
                 )
     one, two = runs[0]
-    tip = default_tip(one.header, two.header) if tip is None else tip
+    tip = default_tip(one.header, two.header)
     common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     time = common.time
     # Of the pairs of sides; then of each side's first runs and its finest.

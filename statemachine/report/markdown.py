@@ -29,15 +29,14 @@ from .terminal import together
 _SPECIAL = re.compile(r"(`[^`|\n]+`)|([\\`*\[\]<>|])")
 
 
-def markdown(page: Page, picture: Callable[[Picture], str], level: int = 1) -> str:
+def markdown(page: Page, picture: Callable[[Picture], str]) -> str:
     """A page as Markdown.
 
     Args:
         page: The page.
         picture: Where the file of a picture is, or a data address; "" to leave it out.
-        level: Of the page's heading.
     """
-    parts = [f"{'#' * level} {_escaped(page.title)}", *filter(None, body(page, picture))]
+    parts = [f"# {_escaped(page.title)}", *filter(None, body(page, picture))]
     return "\n\n".join(parts) + "\n"
 
 

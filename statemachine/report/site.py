@@ -57,16 +57,15 @@ def make_path(
     return written
 
 
-def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Path]:
+def make_reference(folder: Path) -> list[Path]:
     """Ask the installed engines for their conventions, run their calls, and write both down.
 
     Args:
         folder: Where the pages go.
-        say: Told what is being run.
     """
     folder.mkdir(parents=True, exist_ok=True)
     installed, _ = available()
-    say("asking the engines ...")
+    print("asking the engines ...")
     table = phrasebook.run(installed)
     pages = {
         "conventions": markdown(conventions.page(probe(installed)), lambda _: ""),
@@ -76,12 +75,11 @@ def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Pat
     return [_save(folder / f"{name}.md", text.encode()) for name, text in pages.items()]
 
 
-def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[Path]:
+def make_comparisons(folder: Path) -> list[Path]:
     """Write what `statemachine compare` says of the arm's experiments, and why.
 
     Args:
         folder: Where to; made if it is not there.
-        say: Told what is being made.
 
     Returns:
         The pages that were written.
@@ -89,7 +87,7 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name in ("hold", "gravity", "box"):
-        say(f"comparing: {name} ...")
+        print(f"comparing: {name} ...")
         run = run_sides(Request((name,)))
         one, two = run.traces
         page = comparison.page(

@@ -173,13 +173,11 @@ def causes(result: Explanation) -> list[Block]:
 
 def _located_note(place: Located) -> list[Block]:
     """How a feature that was left out on both sides, or an integrator, was found."""
-    left, right = place.values or (None, None)
     return template.blocks(
         "why_located",
         cause=None if place.values or place.is_still else place.name,
         idle=place.name if place.is_still and not place.values else None,
-        left=left,
-        right=right,
+        integrator=place.values and place.without,
     )
 
 

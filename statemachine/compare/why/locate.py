@@ -22,8 +22,9 @@ class Located:
 
     Attributes:
         name: What was left out, or chosen.
-        without: What a run without it is, in words; "" of a setting.
-        values: What the two sides have where it is a setting of one of them; else None.
+        without: What a run without it is, in words; of an integrator, the one that was chosen.
+        values: The integrators of the two sides as they come, or, of a setting, those that ran;
+            None of what was left out.
         share: The part of the gap that went.
         gap: What was left of it, in the unit of the gap.
         moved: How far the left's own motion is then from its motion as it comes; above zero
@@ -82,12 +83,22 @@ def locate(
         if not rest < _LEAST * left:
             continue
         without, integrator = more, best
-        name, words = (feature.name, feature.without) if feature else ("integrator", "")
-        on_left, on_right = (best if side in trials.selects else "its own" for side in (0, 1))
-        values = None if feature else (on_left, on_right)
-        moved = trials.moved(quantity, without, integrator)
-        still = bool(without) and trials.extent(quantity, without) < _STILL * extent
         setting = len(trials.selects) == 1 and not feature and not without
-        rows.append(Located(name, words, values, (left - rest) / gap, rest, moved, still, setting))
+        on_left, on_right = (
+            best if setting and side in trials.selects else trials.integrator_of(side)
+            for side in (0, 1)
+        )
+        rows.append(
+            Located(
+                name=feature.name if feature else "integrator",
+                without=feature.without if feature else best,
+                values=None if feature else (on_left, on_right),
+                share=(left - rest) / gap,
+                gap=rest,
+                moved=trials.moved(quantity, without, integrator),
+                is_still=trials.extent(quantity, without) < _STILL * extent,
+                is_setting=setting,
+            )
+        )
         left = rest
     return tuple(rows)

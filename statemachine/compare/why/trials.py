@@ -245,10 +245,20 @@ class Trials:
         return tuple(k for k in (0, 1) if self._models[k].capabilities.integrators)
 
     @property
-    def integrators(self) -> tuple[str, ...]:
+    def integrators(self) -> list[str]:
         """Those that all sides with several have."""
-        choices = [self._models[side].capabilities.integrators for side in self.selects]
-        return tuple(name for name in (choices or [()])[0] if all(name in own for own in choices))
+        choices = [set(self._models[side].capabilities.integrators) for side in self.selects]
+        return sorted(set[str].intersection(*choices)) if choices else []
+
+    def integrator_of(self, side: int) -> str:
+        """What a side integrates with as it comes; "its own" where that has no name."""
+        model: Any = self._models[side]
+        names = {
+            model.replace(integrator=name).compiled.opt.integrator: name
+            for name in model.capabilities.integrators
+            if model.compiled is not None
+        }
+        return names.get(model.compiled.opt.integrator, "its own") if names else "its own"
 
     def can_be_without(self, feature: Feature) -> bool:
         """Whether a feature can be left out on both sides, and is not what the experiment sets."""

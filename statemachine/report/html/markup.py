@@ -68,9 +68,9 @@ def tag(name: str, *content: object, **attributes: object) -> Html:
     return Html(f"<{name}{said}>{inner}</{name}>")
 
 
-def joined(parts: Iterable[object], between: str = "") -> Html:
+def joined(parts: Iterable[object]) -> Html:
     """Parts one after the other."""
-    return Html(escaped(between).join(escaped(part) for part in parts))
+    return Html("".join(escaped(part) for part in parts))
 
 
 def filled(name: str, slots: Mapping[str, object]) -> Html:
