@@ -356,8 +356,13 @@ def test_a_mistake_in_a_function_is_one_line_about_it(files: Path, name: str, sa
     arm = Side(str(files / "arm.xml"))
     with one_line_error(BadInputError, match=says):
         run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))
-    with pytest.raises(BadInputError, match=r"no controller file.*Did you mean own.py"):
-        function_scenario(str(files / "owm.py:hold"))
+    refused(
+        (
+            BadInputError,
+            r"no controller file.*Did you mean own.py",
+            lambda: function_scenario(str(files / "owm.py:hold")),
+        )
+    )
 
 
 # Closed loop and open loop.

@@ -113,7 +113,7 @@ def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
         (text.signed(0.5, 1), "+0.5"),
         (text.vector([-0.0, 1.0], 1), "[0.0 1.0]"),
         (text.milliseconds(1 / 240), "4.167 ms"),
-        (text.percent(1e-9), "< 1e-6 %"),
+        (text.percent(-4e-4), "< 0.1 %"),
         (text.count(1, "step"), "1 step"),
         (text.count(2000, "step"), "2,000 steps"),
         (text.count(0, "limit", zero="no"), "no limits"),

@@ -60,6 +60,15 @@ def test_a_line_break_in_a_name_breaks_no_table(capsys: pytest.CaptureFixture[st
     assert rows == [["a?b.xml", "1"]] * 3 + [["?a?b.xml", "1"]]
 
 
+def test_a_line_breaks_no_name_and_parts_no_figure_from_its_unit(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    row = ("bias " * 12, "0.123456789", "0.123456789", "shoulder_lift_joint (limit)", "x y " * 20)
+    table = Table(("what", "n", "m", "where", "why"), [row], words=frozenset({0, 3, 4}))
+    terminal.show(Page("t", "o", [table, Text("x" * 77 + " 12 mm")]))
+    assert_in(capsys.readouterr().out, "shoulder_lift_joint", "x\n12 mm\n")
+
+
 def test_what_follows_a_heading_is_folded_under_its_words() -> None:
     asked = Question("Which?", ("x", "y"), 1, "So it is.")
     page = Page("t", "o", [asked, Printed({"a": "1\n"}), Text("p"), Heading("More*"), Text("q")])

@@ -118,8 +118,7 @@ def test_what_an_engine_does_not_tell_is_refused(
     with held(model) as data:
         for verb in (sm.step, sm.forward):
             verb(model, data)
-            with pytest.raises(UnsupportedError, match=said):
-                getattr(data, name)
+            refused((UnsupportedError, said, lambda: getattr(data, name)))
             assert data.qfrc_bias.any()
 
 
@@ -147,7 +146,6 @@ def test_an_input_that_is_read_only_is_found_before_the_world_moves(model: sm.Mo
     with held(model) as data:
         before = sm.get_state(model, data)
         data.qvel.setflags(write=False)
-        with pytest.raises(ReadOnlyError, match="qvel was made read-only"):
-            sm.step(model, data)
+        refused((ReadOnlyError, "qvel was made read-only", lambda: sm.step(model, data)))
         data.qvel.setflags(write=True)
         assert sm.get_state(model, data) == before

@@ -336,7 +336,7 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
 
 def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     located = explanation_of(hold, shares=(), explained=0.0, located=1.0)
-    assert answer(located).startswith("Contact: 50.0 % of the 2.58° is localised")
+    assert answer(located).startswith("50.0 % of the 2.58° comes from contact")
     stays = explanation_of(hold, shares=(), found_in=(), explained=0.0, located=0.0, unexplained=1)
     assert answer(stays) == "The cause was not found: 100.0 % of the 2.58° is unexplained"
     for shares in ((-217.0, 127.0), (127.0, -126.5)):

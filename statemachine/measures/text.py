@@ -136,14 +136,12 @@ def duration(seconds: float) -> str:
 
 
 def percent(part: float | None) -> str:
-    """A part of a whole; tiny ones with their power of ten."""
+    """A part of a whole; of a small one only that it is small."""
     if part is None:
         return NONE
     value = 100 * part
-    if 0 < abs(value) < 1e-6:
-        return "< 1e-6 %"
     if 0 < abs(value) < 0.05:
-        return f"{value:.0e} %".replace("e-0", "e-")
+        return "< 0.1 %"
     if 99.95 <= value < 100:
         return "> 99.9 %"
     return f"{value:.1f} %" if 0 < abs(value) < 1000 else f"{value:z.0f} %"

@@ -170,7 +170,7 @@ def _stages(result: StepComparison) -> Table:
 
 def _stage_cells(gap: StageGap) -> tuple[str, ...]:
     if not gap.told or not gap.unit:
-        return NONE, NONE, gap.reason or NONE, NONE, NONE, NONE, NONE, NONE
+        return NONE, NONE, NONE, NONE, gap.reason or NONE, NONE, NONE, NONE
     return (
         str(gap.beyond),
         str(gap.leads),

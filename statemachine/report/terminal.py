@@ -61,6 +61,11 @@ ASCII = str.maketrans(
 # What would make a terminal do something instead of showing it (a student's text may hold it).
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 _CODE = re.compile(r"`([^`\n]+)`")
+# A blank between a figure and its unit or sign.
+_INSIDE = re.compile(
+    r"(?<=\d) (?=(?:%|deg|[mµu]?s|m?m|k?N|J|W|V|kg|rad|Hz|[kMG]?B)(?!\w))|(?<=[<>±]) (?=\d)"
+)
+_NO_BREAK = "\ue000"  # of no language, and as wide as a blank
 _WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
@@ -119,6 +124,11 @@ def spelled(error: Any) -> tuple[str, int]:
     return lacking.encode("ascii", "replace").decode(), error.end
 
 
+def non_breaking(text: str) -> str:
+    """A text whose figures stay on one line with their units and signs."""
+    return _INSIDE.sub("\u00a0", text)
+
+
 def judged(question: Question, choice: int) -> Text:
     """What became of a prediction; the marks of a verdict are for what the run claims."""
     if choice == question.right:
@@ -140,7 +150,7 @@ def _write(tell: Callable[[str], object], blocks: Sequence[Page | Block]) -> Non
         for block in _unfolded(blocks):
             for line in _drawn(block, plain, console.width):
                 console.print(line, soft_wrap=isinstance(block, Code | Printed))
-    text = captured.get()
+    text = captured.get().replace(_NO_BREAK, " ")
     if piped and text:  # cells are padded with blanks that only a terminal needs
         text = "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
     tell(text)
@@ -172,7 +182,7 @@ def _drawn(block: Page | Block, plain: bool, width: int) -> list[RenderableType]
     match block:
         case Page(title, origin):
             heading = RichText(_shown(title, plain), "bold")
-            return ["", heading, RichText(_shown(origin, plain), "dim")]
+            return ["", heading, _coded(_shown(origin, plain), "dim")]
         case Heading(text):
             return ["", _coded(_shown(text, plain), "bold")]
         case Text(text, (_, linked)):
@@ -203,6 +213,8 @@ def _coded(text: str, style: str = "") -> RichText:
     """A text in which what stands between backticks is shown as code."""
     from rich.text import Text as RichText
 
+    # Rich breaks lines at a no-break space, too.
+    text = non_breaking(text).replace("\u00a0", _NO_BREAK)
     parts = enumerate(_CODE.split(text))  # every second part is code
     return RichText.assemble(*((part, "cyan" if k % 2 else "") for k, part in parts), style=style)
 
@@ -224,13 +236,13 @@ def _grid(block: Table, plain: bool, width: int) -> RenderableType:
         pad_edge=False,
         show_edge=False,
     )
-    name = _whole_name(block, width)
+    widths = _widths(block, width)
     for k, header in enumerate(block.headers):
         grid.add_column(
             _shown(header, plain),
             justify="left" if k in block.words else "right",
             overflow="fold",
-            min_width=name if k == 0 else None,
+            min_width=widths[k],
         )
     for k, row in enumerate(block.rows):
         cells = (_shown(_loud(cell), plain) for cell in row)
@@ -244,24 +256,19 @@ def _loud(cell: str) -> str:
     return cell.upper() if differs else cell
 
 
-def _whole_name(block: Table, width: int) -> int | None:
-    """The least width of a first column of names that breaks none, if there is room for it."""
+def _widths(block: Table, width: int) -> list[int | None]:
+    """The least widths at which columns break no name and no number, if there is room for them."""
     from rich.cells import cell_len
 
-    if 0 not in block.words or not block.rows:
-        return None
+    def widest(cells: Sequence[str], words: bool) -> int:
+        # Words of a column may wrap; numbers must not.
+        parts = [part for cell in cells for part in (cell.split() if words else [cell])]
+        return max(map(cell_len, parts), default=0)
 
-    def widest_part(cells: Sequence[str]) -> int:
-        return max(cell_len(part) for cell in cells for part in cell.split() or [""])
-
-    first, *others = zip(block.headers, *block.rows, strict=True)
-    # Words of other columns may wrap; numbers must not.
-    widths = [
-        widest_part(cells) if k in block.words else max(map(cell_len, cells))
-        for k, cells in enumerate(others, start=1)
-    ]
-    name = widest_part(first)
-    return name if name + sum(widths) + 3 * len(widths) <= width else None
+    columns = zip(block.headers, *block.rows, strict=True)
+    widths = [widest(cells, k in block.words) for k, cells in enumerate(columns)]
+    fits = sum(widths) + 3 * (len(widths) - 1) <= width
+    return [each if fits else None for each in widths]
 
 
 def _hanging(mark: str | RichText, text: str) -> RenderableType:

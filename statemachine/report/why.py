@@ -39,7 +39,7 @@ ANSWERS = {
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
     "masked": "No single difference causes the {gap}: the differences hide one another",
-    "located": "{cause}: {part} of the {gap} is localised there, not explained",
+    "located": "{part} of the {gap} comes from {cause}: no setting that differs makes it",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
 }
 TOUCH = (
@@ -80,7 +80,8 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         files=if_true(stays and not refused and len(engines) == 1),
         parts=three_parts(result)[1:],
         holds=not refused if result.is_rounding else result.is_explained,
-        verdict=answer(result) if result.is_rounding else parts(result),
+        answer=answer(result),
+        three=None if result.is_rounding else parts(result),
     )
 
 
@@ -107,7 +108,7 @@ def answer(result: Explanation) -> str:
     kind = max(parts, key=parts.__getitem__)
     part, cause, left, right = percent(parts[kind]), "", NONE, NONE
     if kind == "located":
-        cause = capital(places[0].name)
+        cause = f"the {places[0].name}" if places[0].values else places[0].name
     elif kind == "cause":
         cause, (left, right) = capital(causes[0].name), _values(causes[0])
         # A share below zero hides others; one far above the whole gap does only what they hide.

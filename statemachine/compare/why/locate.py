@@ -68,16 +68,18 @@ def locate(
     """
     rows: list[Located] = []
     without, integrator = frozenset[str](), ""
-    extent = trials.extent(quantity)
-    able = [feature for feature in FEATURES if trials.can_be_without(feature)]
+    able = filter(trials.can_be_without, FEATURES)
     # None: an integrator is chosen. A run that was made already is not made again.
     for feature in (None, *(choice for one_able in able for choice in (one_able, None))):
         if left <= max(_NOTHING * gap, bound):
             break
         more = without | {feature.name} if feature else without
         choices = [integrator] if feature or integrator else trials.integrators
-        gaps = {choice: trials.gaps(brought, more, choice) for choice in choices}
-        rests = {choice: getattr(own[quantity], measure) for choice, own in gaps.items() if own}
+        rests = {
+            choice: getattr(gaps[quantity], measure)
+            for choice in choices
+            if (gaps := trials.gaps(brought, more, choice))
+        }
         best = min(rests, key=rests.__getitem__, default="")
         rest = rests.get(best, left)
         if not rest < _LEAST * left:
@@ -96,7 +98,7 @@ def locate(
                 share=(left - rest) / gap,
                 gap=rest,
                 moved=trials.moved(quantity, without, integrator),
-                is_still=trials.extent(quantity, without) < _STILL * extent,
+                is_still=trials.extent(quantity, without) < _STILL * trials.extent(quantity),
                 is_setting=setting,
             )
         )

@@ -22,7 +22,8 @@ from ...page import (
     Verdict,
 )
 from ..robot_pictures import inline
-from .markup import Html, joined, non_breaking, tag
+from ..terminal import non_breaking
+from .markup import Html, joined, tag
 
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
 _FULL = 1.0  # share that fills a bar

@@ -38,11 +38,6 @@ def literal(text: object) -> Html:
     return Html(html.escape(_printable(str(text))))
 
 
-def non_breaking(text: str) -> str:
-    """A text whose figures stay on one line with their units and signs."""
-    return re.sub(r"(?<=\d) (?=(?:%|mm|ms|s|N|J|kg|m)(?!\w))|(?<=[<>]) (?=\d)", "\u00a0", text)
-
-
 def tag(name: str, *content: object, **attributes: object) -> Html:
     """An element.
 

@@ -16,9 +16,10 @@ from ...page import Block, Interactive, Items, Page, Section, Text
 from ...runs.whole import check_place, replace_text
 from ..finding import long_labels
 from ..over_time import BothRuns, QuantityChart
+from ..terminal import non_breaking
 from .blocks import drawn, headline_as_html
 from .charts import quantity_row
-from .markup import Html, data_of, filled, joined, non_breaking, tag, template
+from .markup import Html, data_of, filled, joined, tag, template
 from .scene import Look
 from .stage import StagePart, staged
 

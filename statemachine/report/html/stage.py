@@ -12,8 +12,9 @@ from ...interface import Ints
 from ...measures.text import figure, on, reading, short_time
 from ..finding import long_labels, short_labels
 from ..over_time import BothRuns, QuantityChart, spans
+from ..terminal import non_breaking
 from .geometry import packed
-from .markup import Html, filled, joined, non_breaking, tag
+from .markup import Html, filled, joined, tag
 from .scene import Look, moments_of, scene_of
 
 _TICKS = 6  # of the axis of time
