@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from ..interface import Array, Model
 from ..rotations import Placement
@@ -63,32 +64,29 @@ class WayBack:
 Setting = Literal["model", "off"]  # of a dial; one that is not named is as it comes
 
 
-class Dials(Protocol):
+class Dials(ABC):
     """What can be set in an engine's own way or in the model's.
 
     Attributes:
         model: The model as it comes, with the options of an experiment.
         emulated: The same file behind the contract, with the same options.
         words: What the engine's own setting of a factor is, in a few words.
-        frictions: (nsolid,) friction that the engine tells of each body that touches.
     """
 
     words: Mapping[str, str]
 
-    @property
-    def model(self) -> Model: ...
-    @property
-    def emulated(self) -> Model: ...
-    @property
-    def frictions(self) -> Array: ...
+    def __init__(self, model: Model, emulated: Model) -> None:
+        """Of a Model as it comes, and of its file behind the contract."""
+        self.model, self.emulated = model, emulated
 
-    def of(self, model: Model, emulated: Model) -> Dials:
-        """The same of another Model as it comes, and of its file behind the contract."""
-        ...
+    @property
+    @abstractmethod
+    def frictions(self) -> Array:
+        """(nsolid,) friction that the engine tells of each body that touches."""
 
+    @abstractmethod
     def build(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         """A Model with some of them turned."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

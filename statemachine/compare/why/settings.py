@@ -136,7 +136,7 @@ class OwnSettings:
             **dict.fromkeys(names, "model"),
             **dict.fromkeys(without, "off"),
         }
-        return self._dials.of(model, emulated).build(settings, values)
+        return type(self._dials)(model, emulated).build(settings, values)
 
     def _own_word(self, name: str) -> str:
         """What the engine has of a setting, in a few words."""

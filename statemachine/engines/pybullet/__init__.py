@@ -44,10 +44,7 @@ class PybulletEngine(RawEngine):
         if not isinstance(model, backend.PybulletModel) or model.defaults != "engine":
             return None
         emulated = backend.load(model.path).replace(**options)
-        return PybulletDials(
-            cast("backend.PybulletModel", model.replace(**options)),
-            cast("backend.PybulletModel", emulated),
-        )
+        return PybulletDials(model.replace(**options), emulated)
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
         """A function of `conventions`."""

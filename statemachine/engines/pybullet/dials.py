@@ -22,7 +22,7 @@ from ...backends._bullet_plan import Plan
 from ...backends._bullet_world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
-from ..records import Setting
+from ..records import Dials, Setting
 
 # What a fresh body has: a single-precision literal in the engine.
 BODY_DAMPING = float(np.float32(0.04))
@@ -32,14 +32,8 @@ _FASTEST = 100.0  # [rad/s]
 _WIDE = 1e6  # [rad or m] a range that no joint leaves
 
 
-class PybulletDials:
-    """One file on PyBullet, and all that can be set in the engine's way or in the model's.
-
-    Attributes:
-        model: As it comes: `load(…, defaults="engine")`.
-        emulated: The same file behind the contract.
-        words: The engine's own setting of a factor.
-    """
+class PybulletDials(Dials):
+    """One file on PyBullet, and all that can be set in the engine's way or in the model's."""
 
     words: Mapping[str, str] = {
         "inertia": "of shapes",
@@ -50,14 +44,6 @@ class PybulletDials:
         "integrator": "its own",
         "contact": "its own",
     }
-
-    def __init__(self, model: PybulletModel, emulated: PybulletModel) -> None:
-        """Of a Model with `defaults="engine"`, and of the same file behind the contract."""
-        self.model, self.emulated = model, emulated
-
-    def of(self, model: Model, emulated: Model) -> PybulletDials:
-        """The dials of an edited file."""
-        return PybulletDials(cast("PybulletModel", model), cast("PybulletModel", emulated))
 
     def build(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         """A Model with some dials at "model" or "off", the others as the engine comes.
@@ -82,13 +68,15 @@ class PybulletDials:
             "inertia": partial(_set_inertias, inertias=raw.body_inertia),
             "damping": partial(_set_damping, body=0.0, joint=joint),
             "limits": partial(_set_limits, ranges=None),
-            "surfaces": partial(_set_surfaces, surfaces=self.emulated.plan.surfaces),
+            "surfaces": partial(
+                _set_surfaces, surfaces=cast("PybulletModel", self.emulated).plan.surfaces
+            ),
             "contact": World.meet,  # nothing meets anything
         }
         return _dialled(model, [act for name, act in acts.items() if name in dials])
 
     def _with_law(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
-        own, fresh = self.emulated, self.model.compiled
+        own, fresh = cast("PybulletModel", self.emulated), self.model.compiled
         ways: dict[str, Act] = {
             "damping": partial(_set_damping, body=BODY_DAMPING, joint=fresh.dof_damping),
             "limits": partial(_set_limits, ranges=_ranges(self.model)),
@@ -126,7 +114,6 @@ class PybulletDials:
 
     @property
     def frictions(self) -> Array:
-        """(nsolid,) lateral friction that the engine tells of each link that touches."""
         with self.model._make_data() as data:
             world = data.raw
             frictions = [
