@@ -218,12 +218,16 @@ class TestReleases:
         assert main(["compare", "--models", *sides[1:]]) == 0
         assert "loaded into mujoco 3.3.7" in capsys.readouterr().out
 
-    def test_between_which_releases_it_changed(self, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_between_which_releases_it_changed(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
         versions = ("--versions", "3.3.7," + SAME.partition("==")[2], "--model", "so101")
         assert main(["compare", "hold", *versions, "--json"]) == SAYS_NO
         (found,) = json.loads(capsys.readouterr().out)
         assert [side["backend"] for side in (found["one"], found["two"])] == [OLD, "mujoco"]
-        assert main(["compare", "hold", *versions]) == SAYS_NO
+        picture = tmp_path / "releases.svg"
+        assert main(["compare", "hold", *versions, "--plot", str(picture)]) == SAYS_NO
+        assert f"3.3.7 to {engine_version('mujoco')}" in picture.read_text("utf-8")
         assert "between MuJoCo 3.3.7 and 4.0.0" in " ".join(capsys.readouterr().out.split())
         assert main(["compare", "fall", *versions]) == 0
         assert "is the same" in capsys.readouterr().out

@@ -6,7 +6,6 @@ drives it, is the same for every release.
 
 from __future__ import annotations
 
-import base64
 import functools
 import pickle
 import sys
@@ -71,7 +70,7 @@ Simulation = SentWorld
 
 
 def load(file, text, names):
-    """The world that a Model's opener makes, which is sent as text."""
+    """The world that a Model's opener makes, which is sent in the place of a text."""
     world = _opener(text)()
     said = {"version": version("pybullet"), "memory": world.memory_layout}
     return [world], {**said, "untold": sorted(world.untold)}, {}
@@ -79,4 +78,4 @@ def load(file, text, names):
 
 @functools.lru_cache(8)
 def _opener(text):
-    return pickle.loads(base64.b64decode(text))
+    return pickle.loads(text)

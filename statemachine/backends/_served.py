@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 import os
 import pickle
 import threading
 import weakref
+from collections import deque
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
@@ -56,7 +56,7 @@ class Server:
     def __init__(self, engine: ServedEngine) -> None:
         command = [engine.python, "-I", "-u", _FILE, engine.child]
         self._turn, self.lives = threading.RLock(), True
-        self.forgotten: list[int] = []  # models and worlds that it is to forget at the next call
+        self.forgotten = deque[int]()  # models and worlds that it is to forget at the next call
         self._process = PipedChild(command, {**os.environ, "MUJOCO_GL": "disable"})
         self.pid = self._process.pid
 
@@ -80,7 +80,7 @@ class Server:
         """
         try:
             with self._turn:
-                free, self.forgotten = self.forgotten, []
+                free = [self.forgotten.popleft() for _ in range(len(self.forgotten))]
                 _child_server.send(self._process.to, {"verb": verb, "free": free, **job}, arrays)
                 answer, values = _child_server.receive(self._process.out)
         except (OSError, ValueError, EOFError, pickle.UnpicklingError) as error:
@@ -139,7 +139,7 @@ class ServedWorld(HiddenWorld):
         self.memory_layout = tuple((name, int(length)) for name, length in said["memory"])
         self.untold = frozenset(said.get("untold", ()))
         # No call: it may be collected in the midst of another.
-        self._end = weakref.finalize(self, _forget, self._server, model, self._world)
+        self._end = weakref.finalize(self, self._server.forgotten.extend, (model, self._world))
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
@@ -205,12 +205,7 @@ class ServedWorld(HiddenWorld):
         self._end()
 
 
-def _forget(server: Server, *numbers: int) -> None:
-    server.forgotten.extend(numbers)
-
-
 def sent(opener: bytes, server: Server) -> tuple[int, dict[str, Any]]:
     """A pickled opener of worlds, told to a process that has this package."""
-    text = base64.b64encode(opener).decode()
-    said, _ = server.ask("load", file="", text=text, fields=[])
+    said, _ = server.ask("load", file="", text=opener, fields=[])
     return said["model"], said

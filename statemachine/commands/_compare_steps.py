@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ._common import PROGRAM, Row, refuse, show
+from ._compare_pictures import checked
 
 OPTIONS: tuple[Row, ...] = (
     (
@@ -97,11 +98,13 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
     from ..measures import parse_tolerances
     from ..releases import backends_of, published
     from ..report import steps
+    from ..report.figures import write_pictures
     from ..report.progress import progress
     from ..runs.drive import part_of
 
     tolerances = parse_tolerances(options.tolerance)
     check_junit(options)
+    checked(options)
 
     def compared(pair: tuple[str, str], *bar: Any) -> Any:
         traces = run_sides(replace(request, backends=pair), *bar).traces
@@ -118,7 +121,10 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
             for k, pair in enumerate(pairs)
         ]
     write_junit(options, comparisons)
-    return show(steps.versions(comparisons, _name(request)), comparisons, options.json)
+    page = steps.versions(comparisons, _name(request))
+    if options.plot is not None:
+        write_pictures(page.blocks, options.plot)
+    return show(page, comparisons, options.json)
 
 
 def _around_a_change(

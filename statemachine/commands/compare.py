@@ -135,7 +135,7 @@ RULES: tuple[Rule, ...] = (
     ("frame all digits", NEEDS, "models"),
     ("uncertainty", EXCLUDES, "no_chaos"),
     ("one_step converge", EXCLUDES, "why html plot film models uncertainty tolerance"),
-    ("versions", EXCLUDES, "why html plot film models uncertainty backends"),
+    ("versions", EXCLUDES, "why html film models uncertainty backends"),
     ("one_step", EXCLUDES, "converge"),
     ("junit", EXCLUDES, "why one_step converge models"),
     ("bisect", NEEDS, "versions"),

@@ -30,7 +30,6 @@ _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
 _SHOWN = 12  # numbers of qpos that fit in a line
 _THERE = np.radians(0.1)  # rad, or m
-_STEPS = (1e-3, 1.0)  # [°] between the answers about another release
 OLDER = "mujoco==3.3.7"  # its servos damp where their force is at its limit, too
 
 
@@ -155,10 +154,9 @@ def _on_older_release(
 ) -> OlderRelease | None:
     """The run (n, nq) of the course on another release of its engine; joints: names, of qpos."""
     known, here = shipped("hold", OLDER), is_here(OLDER)
-    same_file = known.header.provenance.model_sha256 == model_digest(model.path)
-    if not (same_file and model.backend == DEFAULT and known.qpos.shape == qpos.shape):
+    if model.backend != DEFAULT or known.header.provenance.model_sha256 != model_digest(model.path):
         return None
-    if not np.array_equal(known.ctrl[-1], ctrl):
+    if known.qpos.shape != qpos.shape or not np.array_equal(known.ctrl[-1], ctrl):
         return None
     if here:
         known = record_scenario(SCENARIOS["hold"], load(model.path, OLDER))
@@ -203,7 +201,7 @@ def slots(result: Hold) -> dict[str, Any]:
         "free_worst": _farthest(result, free_gaps),
         "older": older,
         "installed": result.provenance.versions[result.provenance.backend],
-        "older_right": sum(older.gap > np.radians(limit) for limit in _STEPS) if older else 0,
+        "older_right": sum(older.gap > np.radians(limit) for limit in (1e-3, 1)) if older else 0,
         "older_recorded": older and older.recorded,
         "older_gap": position(older.gap, False) if older else "",
     }

@@ -8,7 +8,7 @@ from ..compare import Comparison, QuantityLimit, StepComparison, TimestepConverg
 from ..compare.one_step import StageGap
 from ..compare.stages import FORCES
 from ..measures.text import NONE, figure, listed, milliseconds, quantity, sentence, short_time
-from ..page import Headline, Items, Page, Table
+from ..page import Bars, Headline, Items, Page, Table
 from . import template
 from .finding import leading, moment, name_of
 from .template import if_true
@@ -187,9 +187,10 @@ def versions(comparisons: Sequence[Comparison], experiment: str) -> Page:
     """What each comparison of a release with the next one found."""
     sides = [(found.one, found.two) for found in comparisons]
     pairs = [tuple(s.provenance.versions[s.backend] for s in both) for both in sides]
-    rows, changed = [], []
+    rows, changed, bars = [], [], []
     for (left, right), found in zip(pairs, comparisons, strict=True):
         cells, worst = (NONE,) * 4, leading(found)
+        bars.append((worst.max / worst.tolerance if worst and worst.tolerance else 0.0, None))
         if worst is not None:
             largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
             cells = (name_of(worst.name), largest, short_time(worst.at), tolerance)
@@ -205,4 +206,10 @@ def versions(comparisons: Sequence[Comparison], experiment: str) -> Page:
         last=pairs[-1][1],
         until=max(found.until for found in comparisons),
         steps=Table(heads, rows, "From release to release", words=frozenset({0, 1, 2, 6})),
+        bars=Bars(
+            "How far a release is from the next",
+            "largest gap [tolerances]",
+            [f"{left} to {right}" for left, right in pairs],
+            {"farthest beyond its tolerance": bars},
+        ),
     )
