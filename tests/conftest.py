@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import linecache
 import os
@@ -27,6 +28,7 @@ from statemachine.installed import ENGINES, engine_version, require
 from statemachine.interface import Data, Model, make_data, reset, step
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import take
+from statemachine.measures.readings import readings
 from statemachine.page import Page
 from statemachine.report import terminal
 
@@ -191,6 +193,22 @@ def around(owner: Any, name: str) -> Callable[[Callable[..., Any]], Patch]:
         return apply
 
     return decorate
+
+
+def bits(data: Data) -> list[bytes]:
+    """Everything that a Data says."""
+    found = []
+    for value in readings(data).values():
+        parts = [value] if isinstance(value, np.ndarray) else vars(value).values()
+        found += [np.array(part).tobytes() for part in parts]
+    return found
+
+
+def bullet_clients() -> set[int]:
+    """The worlds of PyBullet in this process that nobody closed or lost."""
+    gc.collect()
+    pb: Any = require("pybullet")
+    return {client for client in range(1024) if pb.isConnected(client)}
 
 
 def written(file: Path, text: str) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import gc
 import math
 import tempfile
 import threading
@@ -34,7 +33,7 @@ from statemachine.probes.audit.points import points
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
-from .conftest import Cli, Patch, around, assert_in, need_engine, registered
+from .conftest import Cli, Patch, around, assert_in, bullet_clients, need_engine, registered
 from .small_models import loaded, model_of
 
 SCENE = "so101/scene_box"
@@ -624,14 +623,8 @@ def test_a_broken_promise_is_exit_code_1(
 @pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_no_file_and_no_world_stay(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    pb: Any = require("pybullet")
-
-    def worlds() -> set[int]:
-        gc.collect()
-        return {client for client in range(1024) if pb.isConnected(client)}
-
-    before = worlds()
+    before = bullet_clients()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     audit.run(sm.load(SCENE, backend="pybullet"), steps=5)
-    assert worlds() == before
+    assert bullet_clients() == before
     assert list(tmp_path.iterdir()) == []

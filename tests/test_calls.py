@@ -512,8 +512,7 @@ def test_a_getter_that_moves_the_world_is_seen(monkeypatch: pytest.MonkeyPatch) 
 def test_a_refusal_ends_the_run(engine: str) -> None:
     code = "print('here')\nsm.step(model, data, -1)\nprint('not here')"
     recording = record(SHORT.format(engine=engine, code=code), engine)
-    assert recording.error is not None
-    assert "nstep" in recording.error
+    assert "nstep" in str(recording.error)
     assert recording.printed == "here\n"
     assert recording.statements[-1].source == "sm.step(model, data, -1)"
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import gc
 import json
 import tempfile
 from functools import partial
@@ -34,6 +33,7 @@ from .conftest import (
     Cli,
     Patch,
     around,
+    bullet_clients,
     in_its_own_python,
     need_engine,
     refused,
@@ -447,18 +447,12 @@ def test_an_engine_that_behaved_otherwise(name: str, monkeypatch: pytest.MonkeyP
 # What is left behind.
 
 
-def worlds() -> set[int]:
-    """The clients of this process that are connected."""
-    gc.collect()
-    return {client for client in range(64) if pybullet().isConnected(client)}
-
-
 @pytest.mark.usefixtures("bullet")
 def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     # Worlds of other tests may still wait for the garbage collector.
-    before = worlds()
+    before = bullet_clients()
     probe(["pybullet"])
     phrasebook.run(["pybullet"])
 
@@ -472,7 +466,7 @@ def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     found = {call.concept: call for call in phrasebook.run(["pybullet"]).engines["pybullet"]}
     assert found["state"].works
     assert found["step"].said == "RuntimeError: as seeded"
-    assert worlds() <= before
+    assert bullet_clients() <= before
     assert not list(tmp_path.iterdir())
 
 

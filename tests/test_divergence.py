@@ -73,7 +73,6 @@ def test_no_motor_drives_a_joint_beyond_the_bound(
 def test_the_bound_follows_the_timestep_and_the_size(tmp_path: Path) -> None:
     """1000 rad, or 1000 times the extent, in a timestep."""
     model = loaded(tmp_path, ROTOR.format(timestep=1e-4, actuator=""), gravity=[0, 0, 0])
-    assert model.compiled is not None
     extent = float(model.compiled.stat.extent)
     assert bound(model) == pytest.approx([1e7] + [1e7 * extent] * 4 + [1e7] * 3)
     assert bound(model.replace(timestep=2e-4))[0] == pytest.approx(5e6)
@@ -182,5 +181,4 @@ def test_both_sides_may_diverge(tmp_path: Path) -> None:
     assert found.one.ended
     assert found.two.ended
     headline = report.page(found, one, two).headline
-    assert headline is not None
     assert "ended early" in headline.text

@@ -28,15 +28,18 @@ from statemachine.report.site import make_path
 from .conftest import ROOT, assert_in, refused
 
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
-_PICTURES = [
-    Traces("t", "x", "y", {"one": ([0, 1, 2], [3, 4, 5])}),
-    Traces("t", "x", "y", {"a": ([0, 1], [0.0, 1e-9]), "b": ([0, 1], [1e-3, 1e-6])}, log=True),
-    Slots("s", {"qpos": [("a", 0, 1), ("b", 1, 8)], "qvel": [("a", 0, 1), ("b", 1, 7)]}),
-    Pipeline("p", (("stored", ["qpos"]), ("derived", ["xpos"])), (("forward", 0, 1),)),
-]
 
 
-@pytest.mark.parametrize("picture", _PICTURES, ids=lambda each: type(each).__name__)
+@pytest.mark.parametrize(
+    "picture",
+    [
+        Traces("t", "x", "y", {"one": ([0, 1, 2], [3, 4, 5])}),
+        Traces("t", "x", "y", {"a": ([0, 1], [0.0, 1e-9]), "b": ([0, 1], [1e-3, 1e-6])}, log=True),
+        Slots("s", {"qpos": [("a", 0, 1), ("b", 1, 8)], "qvel": [("a", 0, 1), ("b", 1, 7)]}),
+        Pipeline("p", (("stored", ["qpos"]), ("derived", ["xpos"])), (("forward", 0, 1),)),
+    ],
+    ids=lambda each: type(each).__name__,
+)
 def test_a_picture_is_the_same_each_time(picture: Traces) -> None:
     text = svg(picture)
     assert text == svg(picture)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -24,7 +25,7 @@ def _volume(shape: Surface | Part) -> float:
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
-def _area(shape: Surface | Part) -> float:
+def area_of(shape: Any) -> float:
     a, b, c = (shape.vertices[shape.faces[:, k]].astype(float) for k in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
@@ -74,7 +75,7 @@ def test_round_shapes_approach_their_closed_forms(make, volume, area, half) -> N
     assert 0 < errors[0] < 0.03 * volume
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.03)
     if area is not None:
-        missing = [area - _area(shape) for shape in (coarse, fine)]
+        missing = [area - area_of(shape) for shape in (coarse, fine)]
         assert 0 < missing[0] < 0.02 * area
         assert missing[0] / missing[1] == pytest.approx(4, rel=0.03)
     for shape in (coarse, fine):
@@ -87,13 +88,13 @@ def test_flat_shapes_are_exact() -> None:
     box = _shapes.box([0.1, 0.2, 0.3])
     assert _is_closed(box)
     assert _volume(box) == pytest.approx(8 * 0.1 * 0.2 * 0.3)
-    assert _area(box) == pytest.approx(8 * (0.1 * 0.2 + 0.2 * 0.3 + 0.3 * 0.1))
+    assert area_of(box) == pytest.approx(8 * (0.1 * 0.2 + 0.2 * 0.3 + 0.3 * 0.1))
     rectangle = _shapes.rectangle(2, 3)
-    assert _area(rectangle) == pytest.approx(24)
+    assert area_of(rectangle) == pytest.approx(24)
     a, b, c = rectangle.vertices[rectangle.faces[0]]
     assert np.cross(b - a, c - a)[2] > 0
     tilted = _shapes.terrain([[0, 1, 2], [0, 1, 2]], 1, 1)  # a plane that rises 1 m a metre
-    assert _area(tilted) == pytest.approx(4 * math.sqrt(2))
+    assert area_of(tilted) == pytest.approx(4 * math.sqrt(2))
     a, b, c = tilted.vertices[tilted.faces[-1]]
     assert np.cross(b - a, c - a)[2] > 0
 

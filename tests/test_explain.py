@@ -310,12 +310,11 @@ def test_what_cannot_be_brought_over_stays_unexplained(tmp_path):
     assert found.unmatched[1]["joint"] == ("more",)
 
 
-ACROSS = ("mass", "gains", "damping", "gear", "place", "armature")
 FLOOR = '<geom name="floor" type="plane" size="2 2 0.1"/>'
 
 
 @pytest.mark.usefixtures("bullet")
-@pytest.mark.parametrize("name", ACROSS)
+@pytest.mark.parametrize("name", ["mass", "gains", "damping", "gear", "place", "armature"])
 def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):
     bare = ARM.replace(FLOOR, "")
     case = ALONE[name]

@@ -21,14 +21,13 @@ from statemachine.errors import (
 )
 from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.measures import Gap
-from statemachine.measures.readings import readings
 from statemachine.probes import freshness
 from statemachine.probes.freshness import Scratch
 from statemachine.probes.stale_rows import gaps, gaps_text, table
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 
-from .conftest import ROOT, assert_in, opened, refused, runs_in_silence, started, written
+from .conftest import ROOT, assert_in, bits, opened, refused, runs_in_silence, started, written
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 BODY = """<mujoco><option timestep="0.005" integrator="{integrator}"/>
@@ -53,15 +52,6 @@ def held(box: Model) -> Iterator[Data]:
 
 def sizes(found: tuple[Gap, ...]) -> dict[str, float | None]:
     return {gap.unit: gap.size for gap in found}
-
-
-def bits(data: Data) -> list[bytes]:
-    """Everything that a Data says."""
-    found = []
-    for value in readings(data).values():
-        parts = [value] if isinstance(value, np.ndarray) else vars(value).values()
-        found += [np.array(part).tobytes() for part in parts]
-    return found
 
 
 def test_forward_makes_everything_of_now(box: Model, held: Data) -> None:

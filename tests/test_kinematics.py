@@ -277,13 +277,16 @@ def _poses_agree(model: sm.Model, kinematics: sm.Kinematics) -> float:
         for seed in range(4):
             data.qpos = np.random.default_rng(seed).normal(size=model.nq)
             sm.forward(model, data)
-            for k, name in enumerate(sites):
-                pose = kinematics.pose(data.qpos, name)
-                gaps = pose.pos - data.site_xpos[k], pose.mat.ravel() - data.site_xmat[k]
-                worst = max(worst, *(float(np.abs(gap).max()) for gap in gaps))
-            for k, name in enumerate(bodies):
-                pose = kinematics.pose(data.qpos, name, "body")
-                gaps = pose.pos - data.xpos[k], pose.mat - matrix_from_quat(data.xquat[k])
+            kinds: Any = (
+                ("site", sites, data.site_xpos, data.site_xmat),
+                ("body", bodies, data.xpos, matrix_from_quat(data.xquat)),
+            )
+            for kind, names, places, mats in kinds:
+                poses = [kinematics.pose(data.qpos, name, kind) for name in names]
+                gaps = [pose.pos - place for pose, place in zip(poses, places, strict=True)]
+                gaps += [
+                    pose.mat.ravel() - mat.ravel() for pose, mat in zip(poses, mats, strict=True)
+                ]
                 worst = max(worst, *(float(np.abs(gap).max()) for gap in gaps))
     return worst
 

@@ -556,11 +556,6 @@ def test_frames_that_were_given(pair: Pair) -> None:
     assert found.size == pytest.approx(0.01)
 
 
-def test_an_engine_that_nothing_reads() -> None:
-    with pytest.raises(UnknownNameError, match="named 'newton'"):
-        read("so101", "newton")
-
-
 PENDULUM = """<mujoco><compiler angle="radian" autolimits="true"/><option {option}/><worldbody>
   <body name="a"><joint name="j" type="{kind}" axis="0 1 0" {joint}/>
   <inertial pos="0.5 0 0" mass="2" diaginertia="{inertia}"/>

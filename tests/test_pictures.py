@@ -12,6 +12,7 @@ import sys
 import time
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 from xml.etree import ElementTree
 
 import numpy as np
@@ -373,12 +374,8 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
         (MissingEngineError, r"apt-get|driver", lambda: probe.renderer_here("mujoco")),
         (UnknownNameError, "Did you mean 'mujoco'", lambda: probe.renderer_here("mujcoo")),
     )
-
-    def require(name: str) -> None:
-        if name == "pybullet":
-            raise MissingEngineError("pybullet is not installed here", engine=name)
-
-    monkeypatch.setattr(pybullet_room, "require", require)
+    missing = Mock(side_effect=MissingEngineError("pybullet is not installed here"))
+    monkeypatch.setattr(pybullet_room, "require", missing)
     with one_line_error(MissingEngineError, match="nothing here can draw"):
         probe.renderer_here()
     monkeypatch.setattr(pybullet_room, "require", lambda name: None)

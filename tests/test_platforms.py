@@ -75,24 +75,6 @@ def asked(platform: str, python: str, lines: Iterable[str]) -> dict[str, Require
     return {r.name: r for r in found}
 
 
-def _resolve(platform: str, python: str) -> subprocess.CompletedProcess[str]:
-    """The versions of ours that an installer would take there, from wheels alone."""
-    command = (
-        "uv", "pip", "compile", "-q", "--no-header", "--no-annotate", "--only-binary", ":all:",
-        "--python-platform", platform, "--python-version", python, ROOT / "pyproject.toml",
-    )  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, "-m", *map(str, command)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
-    if done.returncode and re.search(r"[Ff]ailed to fetch|error sending request", done.stderr):
-        pytest.skip(f"no package index can be reached: {done.stderr.splitlines()[0]}")
-    return done
-
-
 def versions(platform: str, python: str) -> dict[str, str]:
     """The engines that a platform has besides MuJoCo, and their versions, "" for any."""
     wanted = (name.partition("==") for name in PLATFORMS[platform, python])
@@ -133,7 +115,19 @@ def test_what_the_engines_say_to_install_is_what_the_markers_take(
 @pytest.mark.network
 @pytest.mark.parametrize(("platform", "python"), PLATFORMS)
 def test_what_is_installed_needs_no_compiler(platform: str, python: str) -> None:
-    done = _resolve(platform, python)
+    command = (
+        "uv", "pip", "compile", "-q", "--no-header", "--no-annotate", "--only-binary", ":all:",
+        "--python-platform", platform, "--python-version", python, ROOT / "pyproject.toml",
+    )  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-m", *map(str, command)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    if done.returncode and re.search(r"[Ff]ailed to fetch|error sending request", done.stderr):
+        pytest.skip(f"no package index can be reached: {done.stderr.splitlines()[0]}")
     assert done.returncode == 0, done.stderr
     found = dict(re.findall(r"^([\w-]+)==(\S+)", done.stdout, re.MULTILINE))
     wanted = versions(platform, python)

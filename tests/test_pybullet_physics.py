@@ -173,13 +173,13 @@ def test_a_static_base_meets_what_its_joint_carries(tmp_path: Path) -> None:
     assert ends[1] == pytest.approx(ends[0], abs=1e-3)
 
 
-def _cube(folder: Path) -> str:
-    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-    faces = "1 2 4, 1 4 3, 5 7 8, 5 8 6, 1 5 6, 1 6 2, 3 4 8, 3 8 7, 1 3 7, 1 7 5, 2 6 8, 2 8 4"
-    text = "".join(f"v {x * 0.05} {y * 0.05} {z * 0.05}\n" for x, y, z in corners)
-    text += "".join(f"f {face.strip()}\n" for face in faces.split(","))
-    (folder / "cube.obj").write_text(text)
-    return '<asset><mesh name="cube" file="cube.obj"/></asset>'
+_CORNERS = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
+HULLS = f'''<asset>
+  <mesh name="bare" vertex="{_CORNERS}" scale=".1 .1 .1"/>
+  <mesh name="moved" vertex="{_CORNERS}" scale=".1 .1 .1" refpos=".3 .2 .1"
+    refquat=".9 .1 .3 .2"/>
+  <mesh name="cube" vertex="{_CORNERS}" scale=".05 .05 .05"/>
+</asset>'''
 
 
 @pytest.mark.parametrize(
@@ -193,9 +193,8 @@ def _cube(folder: Path) -> str:
 )
 def test_everything_rests_at_its_own_height(tmp_path: Path, geom: str) -> None:
     """Round and pointed shapes come with a millimetre of their own unless told otherwise."""
-    asset = _cube(tmp_path) if "mesh" in geom else ""
     body = f'{FLOOR}<body pos="0 0 .052"><freejoint/><geom {geom}/></body>'
-    _, model = both(tmp_path, body, rest=asset)
+    _, model = both(tmp_path, body, rest=HULLS)
     with opened(model, nstep=1000) as (_, data):
         assert data.qpos[2] == pytest.approx(0.05, abs=5e-5)
 
@@ -240,14 +239,6 @@ def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:
     assert (text.count("friction of"), text.count(" more")) == (3, 1)
     with warnings.catch_warnings(action="error"):
         sm.load("so101/scene_box", backend="pybullet")
-
-
-_CORNERS = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
-HULLS = f'''<asset>
-  <mesh name="bare" vertex="{_CORNERS}" scale=".1 .1 .1"/>
-  <mesh name="moved" vertex="{_CORNERS}" scale=".1 .1 .1" refpos=".3 .2 .1"
-    refquat=".9 .1 .3 .2"/>
-</asset>'''
 
 
 @pytest.mark.parametrize("joint", ["freejoint", 'joint type="slide" axis="0 0 1"'])

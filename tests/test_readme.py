@@ -176,14 +176,16 @@ PRINTS = {
 
 
 LONG = ("docs/gym.md",)  # what runs for seconds
-GUIDES = [
-    pytest.param(name, marks=[pytest.mark.slow] if name in LONG else [])
-    for name, code in PYTHON.items()
-    if code and name != "README.md"
-]
 
 
-@pytest.mark.parametrize("page", GUIDES)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in LONG else [])
+        for name, code in PYTHON.items()
+        if code and name != "README.md"
+    ],
+)
 def test_the_code_of_a_guide_runs(page: str, tmp_path: Path) -> None:
     if '"pybullet"' in PYTHON[page] or page in LONG:
         need_engine("pybullet")

@@ -52,7 +52,8 @@ from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
-from .conftest import ROOT, assert_in, refused
+from .conftest import ROOT, assert_in, refused, soon
+from .test_drawing import area_of
 
 LIMIT = 2_000_000  # bytes
 Made = tuple[Comparison, Trace, Trace, Look]
@@ -173,7 +174,6 @@ def test_it_asks_for_nothing_and_nothing_is_wrong(page: Path) -> None:
 def test_its_policy_lets_nothing_in(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     policy = re.search(r'Content-Security-Policy" content="([^"]+)"', text)
-    assert policy
     assert policy[1].startswith("default-src 'none'")
     assert "http" not in policy[1]
     assert "unsafe-inline'; script" in policy[1]  # styles alone
@@ -407,10 +407,8 @@ def test_who_presses_on_what(hold: Made) -> None:
 
 
 def test_what_was_commanded(hold: Made) -> None:
-    (section,) = commanded(hold[1], hold[2], ("left", "right"))
-    assert isinstance(section, Section)
-    (table,) = section.blocks
-    assert isinstance(table, Table)
+    sections: Any = commanded(hold[1], hold[2], ("left", "right"))
+    ((table,),) = [section.blocks for section in sections]
     for row, value, last in zip(table.rows, hold[1].ctrl[0], hold[1].qpos[-1], strict=True):
         far = quantity(abs(float(last - value)), "rad")
         assert row[1] == row[2] == ("0°" if value == 0 else f"{np.degrees(value):.1f}°")
@@ -440,7 +438,6 @@ def test_charts_show_what_was_compared_and_are_few(hold: Made) -> None:
     assert [chart.curve.name for chart in charts] == [curve.name for curve in curves]
     lift = next(chart for chart in charts if chart.title == "shoulder_lift")
     values = lift.values()
-    assert values is not None
     for (_, shown), trace in zip(values.curves.values(), (one, two), strict=True):
         np.testing.assert_allclose(shown, np.degrees(trace.qpos[:, 1]))
     ((_, gap),) = lift.gap().curves.values()
@@ -464,7 +461,6 @@ def test_between_compared_moments_the_figures_are_of_the_last_one() -> None:
     text = page_of(of(one, shipped("hold", "pybullet", "engine")))
     assert_in(text, "at the first common moment already, 0.025\u00a0s", "meet every 25\u00a0ms")
     data = re.search(r'id="data">(.*?)</script>', text, re.S)
-    assert data
     data = json.loads(data[1])
     shown, compared = (np.frombuffer(base64.b64decode(data[name])) for name in ("time", "compared"))
     assert compared == pytest.approx(0.025 * np.floor(shown / 0.025 + 1e-6), abs=1e-9)
@@ -490,7 +486,6 @@ def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
 def test_it_opens_near_the_tool_where_the_gap_is_small(hold: Made, tmp_path: Path) -> None:
     def begins_near(made: Made) -> bool:
         data = re.search(r'id="data">(.*?)</script>', page_of(made), re.S)
-        assert data
         return json.loads(data[1])["scene"]["begin_near"]
 
     assert begins_near(hold)  # 7 mm
@@ -584,19 +579,10 @@ def test_the_sides_are_drawn_where_they_are(hold: Made, seen: Seen) -> None:
     assert (ghost & ~solid).sum() > 0.5 * ghost.sum()
 
 
-def until(tab: Tab, holds: Callable[[], bool]) -> None:
-    """Wait for something; the page's policy keeps the browser from doing it itself."""
-    for _ in range(300):
-        if holds():
-            return
-        tab.wait_for_timeout(50)
-    pytest.fail("it did not happen")
-
-
 def moved(tab: Tab, since: float) -> float:
     """The row once the slider has gone on by itself."""
     slider = tab.locator("#slider")
-    until(tab, lambda: float(slider.input_value()) > since)
+    assert soon(lambda: float(slider.input_value()) > since)
     return float(slider.input_value())
 
 
@@ -616,7 +602,7 @@ def test_it_plays_and_pauses(tab: Tab) -> None:
     tab.wait_for_timeout(400)
     assert float(tab.locator("#slider").input_value()) == then
     assert cursors(tab)[0] == pytest.approx(then / 400, abs=0.004)
-    until(tab, lambda: tab.locator("#said").text_content().startswith("Paused at "))
+    assert soon(lambda: tab.locator("#said").text_content().startswith("Paused at "))
 
 
 @pytest.mark.slow
@@ -660,11 +646,11 @@ def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
         text = button.inner_text()
         button.click()
         clock = tab.locator("#clock")
-        until(tab, lambda: clock.inner_text() == text)
+        assert soon(lambda: clock.inner_text() == text)
         area = tab.locator("#curves .area").first
         area.click(position={"x": 0.75 * area.bounding_box()["width"], "y": 20})
         # A pixel of the chart is about as wide as a row.
-        until(tab, lambda: abs(float(clock.inner_text().rstrip(" s")) - 1.5) < 0.011)
+        assert soon(lambda: abs(float(clock.inner_text().rstrip(" s")) - 1.5) < 0.011)
 
 
 @pytest.mark.slow
@@ -947,14 +933,9 @@ def test_a_page_without_matplotlib_says_where_its_charts_are(
 def test_a_mesh_keeps_its_surface() -> None:
     drawing = drawing_of(sm.load("so101/scene"))
     mesh = mesh_of(drawing)
-    wanted = sum(area(p.vertices, p.faces) for p in drawing.parts if not p.endless)
-    assert area(mesh.vertices, mesh.faces) == pytest.approx(wanted, rel=1e-5)
+    wanted = sum(area_of(p) for p in drawing.parts if not p.endless)
+    assert area_of(mesh) == pytest.approx(wanted, rel=1e-5)
     assert not mesh.simplified
-
-
-def area(vertices: Any, faces: Any) -> float:
-    a, b, c = (vertices[faces[:, k]].astype(float) for k in range(3))
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
 def test_too_many_triangles_are_made_fewer() -> None:

@@ -11,6 +11,7 @@ import sys
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -191,29 +192,20 @@ def test_a_gap_of_rounding_is_no_gap_of_engines(tmp_path: Path) -> None:
     assert not BackendRow(without_contacts=gap).unexplained
     # One link is calm, and what is more than rounding stays a gap.
     calm = load(written(tmp_path / "calm.xml", chaos(1)))
-    other = gaps.run_gap(calm, calm.replace(gravity=[0, 0, -9.9]), 0)
-    assert other.floor is not None
+    other: Any = gaps.run_gap(calm, calm.replace(gravity=[0, 0, -9.9]), 0)
     assert 0 < other.floor < 1e-6 < other.largest
     assert not other.is_rounding
 
 
 def test_files_are_named_too(folder: Path) -> None:
     good, binary = folder / "good.xml", folder / "binary.mjb"
+    (folder / "empty").mkdir()
     assert [each.path for each in find([good, binary, good])] == [good, binary]
     refused(
         (BadInputError, "no file or folder", lambda: find([folder / "none"])),
         (BadInputError, "is no model", lambda: find([folder / "notes.txt"])),
-        (
-            BadInputError,
-            "no models",
-            lambda: find([folder / ".git" / "..", folder / ".git"][:0] or [_empty(folder)]),
-        ),
+        (BadInputError, "no models", lambda: find([folder / "empty"])),
     )
-
-
-def _empty(folder: Path) -> Path:
-    (folder / "empty").mkdir()
-    return folder / "empty"
 
 
 @pytest.mark.slow
@@ -236,12 +228,9 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
     assert pybullet.restores
     assert pybullet.equals_engine is None
     gap = pybullet.without_contacts
-    assert gap is not None
     assert gap.moved > 0.1
-    assert gap.hinge is not None
     assert gap.hinge < 1e-9
     assert gap.slide is None
-    assert pybullet.with_contacts is not None
     assert not good.faults
     assert not mujoco.scenarios  # quick
     assert rows["tendon.xml"].backends["pybullet"].features == ("tendon",)
@@ -268,7 +257,6 @@ def test_scenarios_and_costs(folder: Path) -> None:
     for backend in row.backends.values():
         assert backend.scenarios["gravity"] == "runs"
         assert set(backend.scenarios) == {"hold", "gravity", "droop", "waves"}
-        assert backend.cost is not None
         assert backend.cost > 0
     assert not row.faults
 

@@ -69,17 +69,9 @@ NEGATIVE = {
     "kp of actuator servo": _servo('position kp="-1"'),
     "kv of actuator servo": _servo('velocity kv="-1"'),
 }
+
+
 # What is unusual, and all right.
-UNUSUAL = [
-    *(
-        _model(joint=f' armature=".1" limited="true" range="{ends}"')
-        for ends in ("-inf 1", "0 inf", "-inf inf", "5 inf", "-1.5e308 1.5e308")
-    ),
-    _servo('position kp="1" forcerange="-inf inf" forcelimited="true"'),
-    _model('<option timestep="1e-6"/>', joint=' armature="0"'),
-]
-
-
 @pytest.mark.filterwarnings("ignore::statemachine.errors.EngineWarning")
 @pytest.mark.parametrize("named", STRANGE)
 def test_a_strange_number_is_refused_by_name(named: str, backend: str, tmp_path: Path) -> None:
@@ -106,7 +98,17 @@ def test_a_negative_number_that_engines_take_is_told(
     assert caught[0].filename == __file__
 
 
-@pytest.mark.parametrize("text", UNUSUAL)
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            _model(joint=f' armature=".1" limited="true" range="{ends}"')
+            for ends in ("-inf 1", "0 inf", "-inf inf", "5 inf", "-1.5e308 1.5e308")
+        ),
+        _servo('position kp="1" forcerange="-inf inf" forcelimited="true"'),
+        _model('<option timestep="1e-6"/>', joint=' armature="0"'),
+    ],
+)
 def test_an_unusual_number_is_taken(text: str, backend: str, tmp_path: Path) -> None:
     with opened(model_of(tmp_path, text, backend=backend), nstep=20) as (_, data):
         assert np.isfinite(data.qpos).all()

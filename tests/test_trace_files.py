@@ -136,68 +136,75 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
         tracemalloc.stop()
 
 
-HEADERS: list[tuple[Any, str]] = [
-    ({"schema": 99}, "this version reads 1"),
-    ({"joints": ["a"]}, "entries"),
-    ({"provenance": {}}, "no header"),
-    ({"joints": ["gripper"] * 7}, "two joints of the trace are called 'gripper'"),
-    ({"jnt_qposadr": [12] * 7}, "no place in qpos"),
-    ({"jnt_type": [9] * 7}, "jnt_type of the trace names"),
-    ({"body_parentid": [99] * 10}, "names one that is not there"),
-    # What no run writes.
-    *(
-        (change, "of the trace is")
-        for change in (
-            {"nq": -1},
-            {"nq": "7"},
-            {"timestep": 0},
-            {"options": {"self": 1}},
-            {"options": {"damping": [[1, 2], [3]]}},
-            {"options": {"damping": {"a": 1}}},
-            {"options": {"timestep": float("nan")}},
-            {"options": {"gravity": [1e308, 0, 0]}},
-            {"gravity": [10**400, 0, 0]},
-            {"gravity": [float("nan")] * 3},
-            {"rewritten": 10**4000},
-            {"experiment": "\ud800"},
-            {"experiment": "x" * 10**6},
-        )
-    ),
-]
-ENTRIES: list[tuple[Any, str]] = [
-    ({"header": None}, "no header"),
-    ({"header": np.frombuffer(b"{}", dtype=np.uint8)}, "schema None"),
-    ({"header": np.frombuffer(b"\xff\xfe", dtype=np.uint8)}, "is no trace"),
-    ({"qpos": np.zeros((3, 3))}, "shape"),
-    ({"qpos": np.array(["a"])}, "not numbers"),
-    ({"qpos": np.array([{}], dtype=object)}, "not numbers"),
-    ({"qpos": None}, "needs the column 'qpos'"),
-    ({"time": None}, "a column 'time'"),
-    ({"qvel": put(np.nan)}, "not a finite number"),
-    ({"contact_row": put(0)}, "ascending"),
-    ({"contact_geom": put(999)}, "geom that is not there"),
-    ({"contact_dist": None}, "contacts only"),
-    ({"speed": np.zeros(3)}, "no column 'speed'"),
-    ({"qpos": b"hello"}, "is no trace"),  # what is no array
-    ({"qpos": claim(10**12)}, "shape"),
-    ({"qpos": claim(0, 10**18)}, "shape"),
-    ({"qpos": claim(21, 13)}, "is no trace"),  # and nothing after it
-    ({"qpos": b"\x93NUMPY\x01\x00\x10\x00__import__('os')"}, "is no trace"),
-    ({"qpos": b"\x93NUMPY\x09\x00\x10\x00"}, "npy version"),
-    ({"time": put(0.005, 2)}, "time does not go on after row 1"),
-    # Numbers that no run gives.
-    *(
-        ({name: put(value, 3)}, f"column '{name}' has an entry beyond")
-        for name, value in (("qpos", 1e308), ("ctrl", 1e300), ("xpos", 1e308), ("xpos", np.inf))
-    ),
-]
-
-
 @pytest.mark.parametrize(
     ("header", "entries", "says"),
     [
-        *((header, {}, says) for header, says in HEADERS),
-        *(({}, entries, says) for entries, says in ENTRIES),
+        *(
+            (header, {}, says)
+            for header, says in [
+                ({"schema": 99}, "this version reads 1"),
+                ({"joints": ["a"]}, "entries"),
+                ({"provenance": {}}, "no header"),
+                ({"joints": ["gripper"] * 7}, "two joints of the trace are called 'gripper'"),
+                ({"jnt_qposadr": [12] * 7}, "no place in qpos"),
+                ({"jnt_type": [9] * 7}, "jnt_type of the trace names"),
+                ({"body_parentid": [99] * 10}, "names one that is not there"),
+                # What no run writes.
+                *(
+                    (change, "of the trace is")
+                    for change in (
+                        {"nq": -1},
+                        {"nq": "7"},
+                        {"timestep": 0},
+                        {"options": {"self": 1}},
+                        {"options": {"damping": [[1, 2], [3]]}},
+                        {"options": {"damping": {"a": 1}}},
+                        {"options": {"timestep": float("nan")}},
+                        {"options": {"gravity": [1e308, 0, 0]}},
+                        {"gravity": [10**400, 0, 0]},
+                        {"gravity": [float("nan")] * 3},
+                        {"rewritten": 10**4000},
+                        {"experiment": "\ud800"},
+                        {"experiment": "x" * 10**6},
+                    )
+                ),
+            ]
+        ),
+        *(
+            ({}, entries, says)
+            for entries, says in [
+                ({"header": None}, "no header"),
+                ({"header": np.frombuffer(b"{}", dtype=np.uint8)}, "schema None"),
+                ({"header": np.frombuffer(b"\xff\xfe", dtype=np.uint8)}, "is no trace"),
+                ({"qpos": np.zeros((3, 3))}, "shape"),
+                ({"qpos": np.array(["a"])}, "not numbers"),
+                ({"qpos": np.array([{}], dtype=object)}, "not numbers"),
+                ({"qpos": None}, "needs the column 'qpos'"),
+                ({"time": None}, "a column 'time'"),
+                ({"qvel": put(np.nan)}, "not a finite number"),
+                ({"contact_row": put(0)}, "ascending"),
+                ({"contact_geom": put(999)}, "geom that is not there"),
+                ({"contact_dist": None}, "contacts only"),
+                ({"speed": np.zeros(3)}, "no column 'speed'"),
+                ({"qpos": b"hello"}, "is no trace"),  # what is no array
+                ({"qpos": claim(10**12)}, "shape"),
+                ({"qpos": claim(0, 10**18)}, "shape"),
+                ({"qpos": claim(21, 13)}, "is no trace"),  # and nothing after it
+                ({"qpos": b"\x93NUMPY\x01\x00\x10\x00__import__('os')"}, "is no trace"),
+                ({"qpos": b"\x93NUMPY\x09\x00\x10\x00"}, "npy version"),
+                ({"time": put(0.005, 2)}, "time does not go on after row 1"),
+                # Numbers that no run gives.
+                *(
+                    ({name: put(value, 3)}, f"column '{name}' has an entry beyond")
+                    for name, value in (
+                        ("qpos", 1e308),
+                        ("ctrl", 1e300),
+                        ("xpos", 1e308),
+                        ("xpos", np.inf),
+                    )
+                ),
+            ]
+        ),
     ],
 )
 def test_a_broken_file_is_one_line(

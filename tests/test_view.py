@@ -466,12 +466,10 @@ class Viewer:
 
     def line(self) -> str:
         """The next line that it says."""
-        assert self.process.stdout is not None
         return self.process.stdout.readline()
 
     def end(self) -> str:
         """The rest of what it said; it ended well, and complained of nothing."""
-        assert self.process.stdout is not None
         rest = self.process.stdout.read()
         code = self.process.wait(timeout=30)
         self._said.seek(0)

@@ -184,7 +184,6 @@ def test_one_changed_default_is_one_row_and_its_line_is_found(tmp_path: Path) ->
     row = explain(one, two, HOLD, uncertain=None).shares[0]
     assert (row.name, row.share) == ("armature of 6 joints", 1.0)
     line = next(k for k, line in enumerate(text.splitlines(), 1) if 'armature="0.028"' in line)
-    assert row.place is not None
     assert (row.place.file, row.place.line) == ("so101.xml", line)
     # What the file does not say, because an option does, has no line there.
     row = explain(one, one.replace(armature=0.042), HOLD, uncertain=None).shares[0]

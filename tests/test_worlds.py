@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -180,14 +181,6 @@ SPOILS = {
 }
 
 
-class Row:
-    """One world, with the inputs as a Data has them."""
-
-    def __init__(self, worlds: many.Worlds, world: int) -> None:
-        self.qpos, self.qvel = worlds.qpos[world], worlds.qvel[world]
-        self.ctrl = worlds.ctrl[world]
-
-
 @pytest.mark.parametrize("what", SPOILS)
 @pytest.mark.parametrize("recorded", [False, True])
 def test_a_world_that_diverges_leaves_the_others_alone(
@@ -195,7 +188,8 @@ def test_a_world_that_diverges_leaves_the_others_alone(
 ) -> None:
     model = worlds.model
     many.reset(worlds, keyframe=0)
-    SPOILS[what](Row(worlds, 1))
+    row = {name: getattr(worlds, name)[1] for name in ("qpos", "qvel", "ctrl")}
+    SPOILS[what](SimpleNamespace(**row))
     wanted = single_error(model, SPOILS[what], 1 if recorded else 20)
     rows = {}
     with warnings.catch_warnings(record=True) as told:
@@ -335,28 +329,52 @@ def test_arguments_are_checked(worlds: many.Worlds) -> None:
 
 
 ORDERS = ({700.0: 0, 900.0: 1}, {700.0, 900.0}, "ab", 3.0, np.array(3.0))
-REFUSED: list[tuple[Callable[[Any], object], type[Exception], str]] = [
-    (lambda w: many.record(w, 1, ["qpo"]), UnknownNameError, "Did you mean 'qpos'"),
-    (lambda w: many.record(w, 2, None), BadInputError, "names of fields are wanted"),  # pyright: ignore
-    (lambda w: many.record(w, 10**9, ("qpos", "time")), BadInputError,
-     r"1000000000 rows of qpos, time takes .* GB"),
-    (lambda w: many.make_worlds(w.model, 2, timestep=[0.001, -1]), BadInputError,
-     "world 1: timestep"),
-    *((partial(lambda kp, w: many.make_worlds(w.model, 2, kp=kp), values), BadInputError,
-       "kp wants 2 values") for values in ORDERS),
-    (lambda w: setattr(w, "ctrl", np.zeros((3, 6))), BadInputError,
-     r"ctrl wants 24 numbers, shape \(4, 6\)"),
-    *((partial(lambda name, w: delattr(w, name), name), ReadOnlyError, "cannot be deleted")
-      for name in ("ctrl", "xpos", "nosuch")),
-    (lambda w: sm.step(w.model, w), TypeError,
-     r"got Worlds, which statemachine\.worlds\.step takes"),
-    (pickle.dumps, TypeError, "get_state"),
-    *((partial(lambda world, w: w.model_of(world), world), BadInputError, "there is no world")
-      for world in (4, -1, "x", 1.5, True)),
-]  # fmt: skip
 
 
-@pytest.mark.parametrize(("call", "error", "says"), REFUSED)
+@pytest.mark.parametrize(
+    ("call", "error", "says"),
+    [
+        (lambda w: many.record(w, 1, ["qpo"]), UnknownNameError, "Did you mean 'qpos'"),
+        (lambda w: many.record(w, 2, None), BadInputError, "names of fields are wanted"),  # pyright: ignore
+        (
+            lambda w: many.record(w, 10**9, ("qpos", "time")),
+            BadInputError,
+            r"1000000000 rows of qpos, time takes .* GB",
+        ),
+        (
+            lambda w: many.make_worlds(w.model, 2, timestep=[0.001, -1]),
+            BadInputError,
+            "world 1: timestep",
+        ),
+        *(
+            (
+                partial(lambda kp, w: many.make_worlds(w.model, 2, kp=kp), values),
+                BadInputError,
+                "kp wants 2 values",
+            )
+            for values in ORDERS
+        ),
+        (
+            lambda w: setattr(w, "ctrl", np.zeros((3, 6))),
+            BadInputError,
+            r"ctrl wants 24 numbers, shape \(4, 6\)",
+        ),
+        *(
+            (partial(lambda name, w: delattr(w, name), name), ReadOnlyError, "cannot be deleted")
+            for name in ("ctrl", "xpos", "nosuch")
+        ),
+        (
+            lambda w: sm.step(w.model, w),
+            TypeError,
+            r"got Worlds, which statemachine\.worlds\.step takes",
+        ),
+        (pickle.dumps, TypeError, "get_state"),
+        *(
+            (partial(lambda world, w: w.model_of(world), world), BadInputError, "there is no world")
+            for world in (4, -1, "x", 1.5, True)
+        ),
+    ],
+)
 def test_what_is_refused_is_said(
     worlds: many.Worlds, call: Callable[[Any], object], error: type[Exception], says: str
 ) -> None:
