@@ -59,7 +59,7 @@ def test_forward_makes_everything_of_now(box: Model, held: Data) -> None:
     assert not sm.freshness(box, held)
     sm.forward(box, held)
     fresh = sm.freshness(box, held)
-    assert fresh, fresh
+    assert fresh
     assert fresh.stale == ()
     assert [row.name for row in fresh.rows] == [*DERIVED, "contacts"]
     assert {(row.of, row.steps, row.gaps) for row in fresh.rows} == {("now", 0, ())}
@@ -174,7 +174,6 @@ def test_a_write_is_no_step(box: Model, held: Data) -> None:
     held.qpos[0] += 1e-4
     found = sm.freshness(box, held)
     assert found["xpos"].of == "an earlier state"
-    assert "does not lead to these poses" in str(found)
     # Nor where all is so near that rounding could have it lead here.
     held.qvel[:] = 0
     sm.forward(box, held)
@@ -334,7 +333,6 @@ def test_an_engine_that_does_not_tell_forces() -> None:
             "qfrc_actuator",
             "contacts",
         ]
-        assert "does not tell: qacc," in str(found)
         assert found["site_xpos"].of == "1 step ago"
         sm.forward(model, data)
         assert sm.freshness(model, data)
@@ -684,7 +682,6 @@ def test_a_model_without_names_sites_or_motors(tmp_path: Path) -> None:
         "</body></body></worldbody></mujoco>",
     )
     with opened(sm.load(path)) as (model, data):
-        assert "never computed" in str(sm.freshness(model, data))
         data.qvel[:] = (1, 2, 3, 0.5)
         sm.step(model, data, 30)
         found = sm.freshness(model, data)

@@ -684,23 +684,23 @@ assert go_on(data) == go_on(alone)
 # Ctrl-C.
 
 
-def _stop(*_: object) -> None:
-    raise KeyboardInterrupt
-
-
 def interrupted(
     monkeypatch: pytest.MonkeyPatch, name: str, good: int, call: Callable[[], Any]
 ) -> None:
-    """Call something, and be interrupted at a function of PyBullet's, after so many calls."""
+    """Call something, and be interrupted at a function of the engine or the law, after calls."""
     from statemachine.backends._bullet_client import pb
+    from statemachine.backends._bullet_law import Law
 
-    right, counted = getattr(pb, name), iter([True] * good)
+    owner: Any = Law if name == "command" else pb
+    right, counted = getattr(owner, name), iter([True] * good)
 
     def function(*arguments: Any, **named: Any) -> Any:
-        return right(*arguments, **named) if next(counted, False) else _stop()
+        if next(counted, False):
+            return right(*arguments, **named)
+        raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(pb, name, function)
+        patch.setattr(owner, name, function)
         with pytest.raises(KeyboardInterrupt):
             call()
 
@@ -709,6 +709,7 @@ def interrupted(
 @pytest.mark.parametrize(
     ("name", "good"),
     [
+        ("command", 0),
         ("calculateInverseDynamics", 0),
         ("setJointMotorControlArray", 4),
         ("getJointStates", 0),
@@ -725,9 +726,10 @@ def test_an_interrupted_step_leaves_nothing_in_the_engine(
             each.ctrl[0] += 0.1
         interrupted(monkeypatch, name, good, lambda: sm.step(model, data, 10))
         assert np.array_equal(data.qpos, other.qpos)
-        if then == "reset":
-            for each in (data, other):
+        for each in (data, other):
+            if then == "reset":
                 sm.reset(model, each, keyframe=0)
+            sm.step(model, each, 10)
         assert digest(model, data, 40, seed=8) == digest(model, other, 40, seed=8)
 
 
@@ -833,24 +835,6 @@ def test_an_interrupted_reset_of_the_engines_own_can_be_repeated(
         sm.step(model, data, 5)
         sm.step(model, other, 5)
         assert sm.get_state(model, data) == sm.get_state(model, other)
-
-
-def test_an_interrupted_command_is_taken_by_the_next_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.backends._bullet_law import Law
-
-    model = load("so101")
-    ends = []
-    for stop in (False, True):
-        with sm.make_data(model) as data:
-            data.ctrl = HOLD
-            if stop:
-                with monkeypatch.context() as patch:
-                    patch.setattr(Law, "command", _stop)
-                    with pytest.raises(KeyboardInterrupt):
-                        sm.step(model, data)
-            sm.step(model, data, 20)
-            ends.append(data.qpos.copy())
-    assert np.array_equal(ends[0], ends[1])
 
 
 # Writes.
