@@ -21,7 +21,7 @@ from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
 from statemachine.engines.futures import FutureGap, gap
 from statemachine.engines.mujoco.audit import MujocoDriver
-from statemachine.errors import BadInputError, EngineWarning
+from statemachine.errors import BadInputError, EngineError, EngineWarning
 from statemachine.installed import require
 from statemachine.interface import JointType
 from statemachine.measures import JointPlaces
@@ -33,7 +33,16 @@ from statemachine.probes.audit.points import points
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
-from .conftest import Cli, Patch, around, assert_in, bullet_clients, need_engine, registered
+from .conftest import (
+    Cli,
+    Patch,
+    around,
+    assert_in,
+    bullet_clients,
+    need_engine,
+    refused,
+    registered,
+)
 from .small_models import loaded, model_of
 
 SCENE = "so101/scene_box"
@@ -254,10 +263,12 @@ def test_components_of_other_models_are_tried(tmp_path: Path) -> None:
     assert found.smallest is True
 
 
-def test_a_model_without_anything_that_moves_is_refused(tmp_path: Path) -> None:
-    still = loaded(tmp_path, '<geom size="1"/>')
-    with pytest.raises(BadInputError, match="nothing moves"):
-        audit.run(still)
+def test_what_cannot_be_audited_is_one_line(tmp_path: Path) -> None:
+    failed = "a fresh process failed: ValueError"  # of a seed that is none
+    refused(
+        (BadInputError, "nothing moves", lambda: audit.run(loaded(tmp_path, '<geom size="1"/>'))),
+        (EngineError, failed, lambda: elsewhere.run(sm.load(SCENE), -1, 10, {}, ())),
+    )
 
 
 @pytest.mark.slow
@@ -538,11 +549,6 @@ def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch
     assert {each.experiment for each in engine.findings if not each.holds} == {"process"}
     assert "pickled State" in {each.experiment for each in interface.findings if not each.holds}
     assert not report.page({"mujoco": result}).holds
-
-
-def test_a_process_that_fails_is_one_line() -> None:
-    with pytest.raises(sm.errors.EngineError, match="a fresh process failed: ValueError"):
-        elsewhere.run(sm.load(SCENE), -1, 10, {}, ())  # no seed
 
 
 # Conclusions follow from findings, and a page from conclusions.

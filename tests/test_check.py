@@ -28,7 +28,6 @@ from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.grading.watch import engine_watched
 from statemachine.grading.worlds import ExerciseWorld, Scenes
 
-<<<<<<< HEAD
 from .conftest import (
     ROOT,
     Cli,
@@ -36,12 +35,10 @@ from .conftest import (
     in_its_own_python,
     need_engine,
     processes_with,
+    soon,
     written,
     written_all,
 )
-=======
-from .conftest import ROOT, Cli, assert_in, need_engine, processes_with, soon, written_all
->>>>>>> a9c7425 (Tests: one reading of all that a Data says, one count of PyBullet's worlds; helpers with one caller stand where they are called; what is None fails by itself)
 from .exercises import RIGHT, WRONG, Attempt
 
 for _module in ("gravity", "state", "forward", "replay"):
@@ -60,19 +57,13 @@ def _verdict(attempt: Attempt, prepared: Prepared) -> Judgement:
         with tempfile.TemporaryDirectory() as folder:
             worlds = judge_of(attempt.solves).worlds(Scenes("mujoco", Path(folder)))
     with engine_watched(worlds[0].model.backend):
-<<<<<<< HEAD
         answers = (
             answer
             if isinstance(answer, FaultError)
             else decode(json.loads(json.dumps(answer)))  # as from another process
             for answer in answers_of(attempt.function, worlds)
         )
-        verdict = judged(attempt.solves, worlds, rights, answers)
-    assert verdict is not None
-=======
-        answers = (_through_text(each) for each in answers_of(attempt.function, worlds))
         verdict: Any = judged(attempt.solves, worlds, rights, answers)
->>>>>>> a9c7425 (Tests: one reading of all that a Data says, one count of PyBullet's worlds; helpers with one caller stand where they are called; what is None fails by itself)
     return verdict
 
 

@@ -73,15 +73,6 @@ def test_who_comes_first_and_what_has_no_name(tmp_path: Path) -> None:
     assert names.pair(below, other) == "body 2 on world"
 
 
-def test_the_geoms_of_one_pair_stand_together() -> None:
-    assert together(["a on b (c)", "d on b", "a on b (e)"]) == "a on b (c, e), d on b"
-    assert together([]) == ""
-
-
-def test_pairs_of_two_models_are_called_alike() -> None:
-    assert same_pairs({"a on b": 1}, {"b on a": 2, "c on d": 3}) == {"a on b": 2, "c on d": 3}
-
-
 def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
     trace = record(
         model_of(tmp_path, WALL_AND_FLOOR),
@@ -95,7 +86,7 @@ def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "expected"),
+    ("found", "expected"),
     [
         (text.quantity(np.pi / 180, "rad"), "1.00°"),
         (text.quantity(0.0, "m"), "0 mm"),
@@ -122,22 +113,18 @@ def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
         (text.sentence("it is so"), "It is so."),
         (text.command(["see", "a b"], ("--n", 1, 1), ("--m", 2, 1), ("--x", True, False)),
          "see 'a b' --m 2 --x"),
+        (together(["a on b (c)", "d on b", "a on b (e)"]), "a on b (c, e), d on b"),
+        (together([]), ""),
+        (same_pairs({"a on b": 1}, {"b on a": 2, "c on d": 3}), {"a on b": 2, "c on d": 3}),
+        (largest(np.array([1.0, 3.0, 2.0])), (3.0, 1)),
+        (largest(np.array([1.0, np.nan, np.inf]))[1], 1),
+        (str(Gap.of(np.array([0.001, 0.002]), "m", ["a", "b"])), "2 mm at b"),
+        (nearest(np.arange(3.0), np.array([-1.0, 0.4, 0.6, 5.0])).tolist(), [0, 0, 1, 2]),
+        (nearest(np.zeros(1), np.array([0.0, 3.0])).tolist(), [0, 0]),
     ],
 )  # fmt: skip
-def test_numbers_and_lists_as_text(said: str, expected: str) -> None:
-    assert said == expected
-
-
-def test_the_largest_and_where_and_what_is_no_number() -> None:
-    assert largest(np.array([1.0, 3.0, 2.0])) == (3.0, 1)
-    assert largest(np.array([1.0, np.nan, np.inf]))[1] == 1
-    assert str(Gap.of(np.array([0.001, 0.002]), "m", ["a", "b"])) == "2 mm at b"
-
-
-def test_the_nearest_row() -> None:
-    time = np.array([0.0, 1.0, 2.0])
-    assert nearest(time, np.array([-1.0, 0.4, 0.6, 5.0])).tolist() == [0, 0, 1, 2]
-    assert nearest(time[:1], np.array([0.0, 3.0])).tolist() == [0, 0]
+def test_what_is_measured_and_how_it_is_said(found: Any, expected: Any) -> None:
+    assert found == expected
 
 
 @pytest.mark.parametrize(

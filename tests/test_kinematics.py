@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -109,9 +110,8 @@ WORLD = "<mujoco><worldbody>{}</worldbody></mujoco>"
     ],
 )
 def test_what_it_does_not_read_is_said_in_one_line(tmp_path: Path, text: str, word: str) -> None:
-    with one_line_error(ModelError) as caught:
+    with one_line_error(ModelError, match=re.escape(word)):
         sm.Kinematics(_write(tmp_path, text))
-    assert word in str(caught.value)
 
 
 def test_bad_input_is_refused(tmp_path: Path) -> None:

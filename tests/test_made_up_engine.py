@@ -6,7 +6,6 @@ last tests, a room, both declared as entry points, and a row in the table of eng
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -17,7 +16,7 @@ import pytest
 from statemachine import backends, engines
 from statemachine.installed import ENGINES
 
-from .conftest import ROOT, Cli, assert_in, distribution, one_line
+from .conftest import ROOT, Cli, distribution, one_line
 
 NAME = "hidden"
 ON = ("--backend", NAME)
@@ -66,35 +65,40 @@ def said(here: Cli) -> Said:
     return run
 
 
-def _slow(*words: str) -> object:
-    return pytest.param(words, marks=pytest.mark.slow, id=" ".join(words))
+def _slow(*row: object) -> object:
+    return pytest.param(*row, marks=pytest.mark.slow)
 
 
-LESSONS = [
-    ("objects", "--worlds", "3"),
-    ("state",),
-    ("write",),
-    ("forward",),
-    ("hold",),
-    _slow("gravity", "--seconds", "0.5", "--longer", "0"),
-    ("reset",),
-    ("replay", "--steps", "100"),
-    ("time",),
-    ("speed", "--steps", "200"),
-    ("worlds", "--most", "2"),
-    _slow("questions"),
+# Words of a command, its exit code, and what it says.
+COMMANDS = [
+    ("lesson objects --worlds 3", 0, NAME),
+    ("lesson state", 0, NAME),
+    ("lesson write", 0, NAME),
+    ("lesson forward", 0, NAME),
+    ("lesson hold", 0, NAME),
+    ("lesson hold --json", 0, f'"{NAME}": {{'),
+    _slow("lesson gravity --seconds 0.5 --longer 0", 0, NAME),
+    ("lesson reset", 0, NAME),
+    ("lesson replay --steps 100", 0, NAME),
+    ("lesson time", 0, NAME),
+    ("lesson speed --steps 200", 0, NAME),
+    ("lesson worlds --most 2", 0, NAME),
+    _slow("lesson questions", 0, NAME),
+    ("conventions", 0, "not asked"),
+    ("conventions --calls", 0, "not asked"),
+    ("conventions quaternion", 0, "not asked"),
+    _slow("audit --steps 3", 0, f"{NAME} itself, by its own functions, was not asked."),
+    _slow("audit --steps 3", 0, f"this interface on {NAME}"),
+    _slow(f"check {ROOT}/exercises/step_loop.py", SAYS_NO, f"step_loop.py on {NAME}"),
+    _slow(f"check {ROOT}/exercises/step_loop.py", SAYS_NO, "4 not written yet"),
+    (f"check --mutants {ROOT}/tests/test_arm.py", BAD_INPUT, "are made for mujoco and pybullet"),
 ]
 
 
 @pytest.mark.usefixtures("engine")
-@pytest.mark.parametrize("lesson", LESSONS, ids=" ".join)
-def test_every_lesson_runs_on_it(said: Said, lesson: tuple[str, ...]) -> None:
-    assert NAME in said("lesson", *lesson, *ON)
-
-
-@pytest.mark.usefixtures("engine")
-def test_a_lesson_as_json(said: Said) -> None:
-    assert list(json.loads(said("lesson", "hold", *ON, "--json"))) == [NAME]
+@pytest.mark.parametrize(("words", "code", "says"), COMMANDS)
+def test_a_command_runs_on_it(said: Said, words: str, code: int, says: str) -> None:
+    assert says in said(*words.split(), *ON, code=code)
 
 
 @pytest.mark.usefixtures("engine")
@@ -104,11 +108,10 @@ def test_a_lesson_as_json(said: Said) -> None:
         ("hold", *BESIDE, *SHORT),
         ("hold", *BESIDE, *SHORT, "--defaults", "engine"),
         ("hold", *BESIDE, *SHORT, "--why"),
-        _slow("hold", *BESIDE, *SHORT, "--plot", "hold.svg"),
-        _slow("hold", *BESIDE, *SHORT, "--html", "hold.html"),
-        _slow("hold", *BESIDE, *SHORT, "--film", "hold.webp", "--size", "320x240"),
+        _slow(("hold", *BESIDE, *SHORT, "--plot", "hold.svg")),
+        _slow(("hold", *BESIDE, *SHORT, "--html", "hold.html")),
+        _slow(("hold", *BESIDE, *SHORT, "--film", "hold.webp", "--size", "320x240")),
     ],
-    ids=" ".join,
 )
 def test_a_comparison_finds_that_it_is_the_same(said: Said, words: tuple[str, ...]) -> None:
     if "--film" in words:
@@ -121,10 +124,10 @@ def test_a_comparison_finds_that_it_is_the_same(said: Said, words: tuple[str, ..
 
 
 @pytest.mark.usefixtures("engine")
-def test_what_it_makes_of_a_file_is_not_known(said: Said) -> None:
-    for words in ((f"so101@{NAME}", "so101"), ("so101", *BESIDE)):
-        line = said("compare", "--models", *words, code=BAD_INPUT)
-        assert "cannot be read here; known: mujoco, pybullet" in line
+@pytest.mark.parametrize("words", [(f"so101@{NAME}", "so101"), ("so101", *BESIDE)])
+def test_what_it_makes_of_a_file_is_not_known(said: Said, words: tuple[str, ...]) -> None:
+    line = said("compare", "--models", *words, code=BAD_INPUT)
+    assert "cannot be read here; known: mujoco, pybullet" in line
 
 
 @pytest.mark.usefixtures("room", "bullet", "pinocchio")
@@ -134,12 +137,11 @@ def test_what_it_makes_of_a_file_is_not_known(said: Said) -> None:
         ("compare", "--models", f"so101@{NAME}", "so101"),
         ("compare", "--models", "so101", *BESIDE),
         ("fingertip", *ON, "--poses", "5"),
-        _slow("lesson", "hold", "--backend", "all"),
-        _slow("compare", "hold", "--backends", "pybullet", NAME, *SHORT, "--defaults", "engine",
-              "--why"),
-        _slow("doctor"),
+        _slow(("lesson", "hold", "--backend", "all")),
+        _slow(("compare", "hold", "--backends", "pybullet", NAME, *SHORT, "--defaults", "engine",
+               "--why")),
+        _slow(("doctor",)),
     ],
-    ids=" ".join,
 )  # fmt: skip
 def test_what_is_said_of_it(said: Said, words: tuple[str, ...]) -> None:
     assert NAME in said(*words)
@@ -168,15 +170,6 @@ def test_its_traces_are_drawn(said: Said) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("engine")
-def test_it_is_audited_through_the_interface(said: Said) -> None:
-    text = said("audit", *ON, "--steps", "3")
-    assert_in(
-        text, f"{NAME} itself, by its own functions, was not asked.", "this interface on hidden"
-    )
-
-
-@pytest.mark.slow
 @pytest.mark.usefixtures("room")
 def test_it_is_audited_by_its_room(said: Said) -> None:
     text = said("audit", *ON, "--steps", "3")
@@ -184,38 +177,8 @@ def test_it_is_audited_by_its_room(said: Said) -> None:
     assert "mj_copyData" in text
 
 
-@pytest.mark.usefixtures("engine")
-@pytest.mark.parametrize("words", [(), ("--calls",), ("quaternion",)], ids=" ".join)
-def test_what_it_takes_for_granted_is_not_asked(said: Said, words: tuple[str, ...]) -> None:
-    assert "not asked" in said("conventions", *words, *ON)
-
-
 @pytest.mark.slow
-@pytest.mark.usefixtures("engine")
-<<<<<<< HEAD
-def test_exercises_are_judged_on_it(capsys: Output) -> None:
-    assert_in(
-        said(capsys, "check", str(ROOT / "exercises" / "step_loop.py"), *ON, code=SAYS_NO),
-        f"step_loop.py on {NAME}",
-        "4 not written yet",
-    )
-=======
-def test_exercises_are_judged_on_it(said: Said) -> None:
-    text = said("check", str(ROOT / "exercises" / "step_loop.py"), *ON, code=SAYS_NO)
-    assert_in(text, f"step_loop.py on {NAME}", "4 not written yet")
->>>>>>> a9c7425 (Tests: one reading of all that a Data says, one count of PyBullet's worlds; helpers with one caller stand where they are called; what is None fails by itself)
-
-
-@pytest.mark.usefixtures("engine")
-def test_no_faults_are_made_for_it(said: Said) -> None:
-    tests = str(ROOT / "tests" / "test_arm.py")
-    line = said("check", "--mutants", tests, *ON, code=BAD_INPUT)
-    assert "the faults are made for mujoco and pybullet" in line
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("engine")
-def test_it_is_viewed(said: Said) -> None:
-    pytest.importorskip("viser")
-    assert "http://" in said("view", *ON, "--seconds", "0.3")
-    assert "http://" in said("view", *ON, "--ghost", "mujoco", "--seconds", "0.3")
+@pytest.mark.usefixtures("engine", "viser")
+@pytest.mark.parametrize("ghost", [(), ("--ghost", "mujoco")])
+def test_it_is_viewed(said: Said, ghost: tuple[str, ...]) -> None:
+    assert "http://" in said("view", *ON, *ghost, "--seconds", "0.3")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -104,9 +105,8 @@ def test_nothing_is_lost_in_silence(
     tmp_path: Path, changes: dict[str, str], how: str, says: str
 ) -> None:
     if how == "refused":
-        with pytest.raises(UnsupportedError) as caught:
+        with pytest.raises(UnsupportedError, match=re.escape(says)):
             both(tmp_path, changes)
-        assert says in str(caught.value)
         return
     one, two, told = both(tmp_path, changes)
     note = two.capabilities.behaviours["contacts"].note

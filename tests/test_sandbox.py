@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -86,18 +87,6 @@ def test_a_flood_is_read_and_dropped() -> None:
 def test_a_flood_without_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sandbox, "_FLOOD", 5_000_000)
     assert _python("import os\nwhile True: os.write(1, b'x' * 65536)").end == "flood"
-
-
-@POSIX
-def test_a_crash_is_a_signal() -> None:
-    done = _python("import ctypes; ctypes.string_at(0)")
-    assert (done.end, done.code) == ("signal", 11)
-    assert done.how == "crashed the process (SIGSEGV)"
-
-
-@POSIX
-def test_memory_is_limited() -> None:
-    assert _python("x = bytearray(10**9)", memory_most=500_000_000).end == "memory"
 
 
 @LINUX
@@ -207,7 +196,10 @@ def test_shut_in_nothing_escapes(folder: Path) -> None:
     assert done.wall < 20
 
 
-def test_shut_in_signals_and_limits_are_told_alike(folder: Path) -> None:
+@POSIX
+@pytest.mark.parametrize("shut_in", [False, True])
+def test_signals_and_limits_are_told_alike(shut_in: bool, request: pytest.FixtureRequest) -> None:
+    run = partial(_shut_in, request.getfixturevalue("folder")) if shut_in else _python
     for code, end, number, limits in (
         ("import ctypes; ctypes.string_at(0)", "signal", 11, {}),
         ("import os; os.abort()", "signal", 6, {}),
@@ -216,7 +208,7 @@ def test_shut_in_signals_and_limits_are_told_alike(folder: Path) -> None:
         ("x = bytearray(10**9)", "memory", 1, {"memory_most": 500_000_000}),
         ("import time; time.sleep(60)", "clock", 0, {"wall": 1.0}),
     ):
-        done = _shut_in(folder, code, **limits)
+        done = run(code, **limits)
         assert (done.end, done.code) == (end, number)
 
 

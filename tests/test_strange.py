@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -172,17 +173,21 @@ def test_a_load_gives_back_the_handler_of_others(tmp_path: Path) -> None:
         mujoco.set_mju_user_warning(before)
 
 
-@pytest.mark.parametrize("model", [5, None, b"so101", ["so101"], 1.5, object()])
-def test_what_is_no_name_of_a_model(model: Any) -> None:
-    with one_line_error(TypeError, match="its name or a path"):
-        sm.load(model)
-
-
-@pytest.mark.parametrize("word", [[], {}, None, 5, np.array([1, 2]), b"mujoco", "mujcoo"])
-@pytest.mark.parametrize("argument", ["backend", "defaults"])
-def test_what_is_no_name_of_a_backend_or_of_defaults(argument: str, word: Any) -> None:
-    with pytest.raises(StateMachineError, match=f"no {argument} named"):
-        sm.load("so101", **{argument: word})
+@pytest.mark.parametrize(
+    ("load", "error", "says"),
+    [
+        *((partial(sm.load, model), TypeError, "its name or a path")  # pyright: ignore
+          for model in (5, None, b"so101", ["so101"], 1.5, object())),
+        *((partial(sm.load, "so101", **{argument: word}), StateMachineError, f"no {argument} named")
+          for argument in ("backend", "defaults")
+          for word in ([], {}, None, 5, np.array([1, 2]), b"mujoco", "mujcoo")),
+    ],
+)  # fmt: skip
+def test_what_is_no_name_of_a_model_a_backend_or_defaults(
+    load: Any, error: type[Exception], says: str
+) -> None:
+    with one_line_error(error, match=says):
+        load()
 
 
 @pytest.mark.parametrize(
