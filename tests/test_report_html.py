@@ -919,7 +919,7 @@ def test_a_page_without_matplotlib_says_where_its_charts_are(
     hold: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "statemachine.report.html.charts.chart",
+        "statemachine.report.html.blocks.chart",
         Mock(side_effect=MissingEngineError("a figure needs matplotlib")),
     )
     text = page_of(hold)

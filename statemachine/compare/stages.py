@@ -115,12 +115,10 @@ class StageReader:
         model, dofs = self._models[side], self._dofs[side]
         # After a step, derived arrays are of the state before its last engine step.
         stale = model.capabilities.behaviours["stale after a step"].support != "unsupported"
-        if stale and model.substeps == 1:
-            step(model, data)
-            values, contacts = self._read(side, data, qpos), self._contacts(side, data)
-        else:
-            forward(model, data)
-            values, contacts = self._read(side, data, qpos), self._contacts(side, data)
+        stale = stale and model.substeps == 1
+        (step if stale else forward)(model, data)
+        values, contacts = self._read(side, data, qpos), self._contacts(side, data)
+        if not stale:
             step(model, data)
         rate = (data.qvel - qvel) / model.timestep
         return StepReading([*values, rate[dofs, None]], contacts)

@@ -143,8 +143,8 @@ def _over_time(
 ) -> BothRuns:
     """The scene and a chart for each quantity that is a number throughout."""
     charts = charts_of(comparison, one, two, curves, floor)
-    of, most = subject(comparison, explanation), leading(comparison)
-    lead = [k for k, chart in enumerate(charts) if most and chart.curve.name == most.name]
+    _, _, at, _ = subject(comparison, explanation)
+    lead = [k for k, c in enumerate(charts) if c.curve.name == leading(comparison).name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
     return BothRuns(
         comparison.one.experiment,
@@ -152,7 +152,7 @@ def _over_time(
         two,
         comparison,
         default_tip(one.header, two.header) if tip is None else tip,
-        0.0 if of is None else of.at,
+        at,
         tuple(events),
         charts,
         tuple(dict.fromkeys(lead))[:2] or (0,),

@@ -57,7 +57,8 @@ class Overlay:
         self._low = 2 * round(STRIP * size[1] / 2) if strip is not None else 0
         self._high = 2 * round(1.6 * self._text)
         self.inner = (size[0], size[1] - self._high - self._low)
-        self._speed = "real time" if slow == 1 else f"{_ratio(slow)} of real time"
+        ratio = f"1/{slow:.0f}" if slow > 1 and slow == round(slow) else f"{1 / slow:.3g} ×"
+        self._speed = "real time" if slow == 1 else f"{ratio} of real time"
         points = 72 / _DOTS * self._text
         content = saved(
             lambda: self._paper(title, labels, points),
@@ -126,10 +127,3 @@ def _gap_at(strip: QuantityChart, time: float) -> str:
     gap = quantity(float(curve.difference[row]), curve.unit)
     tolerance = quantity(strip.agreement.tolerance, curve.unit)
     return f"{strip.title}: {gap} apart; dotted: the tolerance, {tolerance}"
-
-
-def _ratio(slow: float) -> str:
-    """The speed at which simulated time is shown: "1/4", or "2 ×"."""
-    if slow > 1 and slow == round(slow):
-        return f"1/{slow:.0f}"
-    return f"{1 / slow:.3g} ×"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +25,6 @@ LEADS = {
     "agree": "The two runs agree for {until:g} s: nothing leaves its tolerance",
     "ended": "{sides} ended early; until {until:g} s {agrees} of {total} quantities are within "
     "tolerance",
-    "differ": "The two runs differ",
     "apart": "{what} is up to {far} apart between {left} and {right}, at {at}{parting}",
     "contact": "{what}: {far}{parting}",
 }
@@ -42,16 +40,6 @@ ENDS = {
     "changing": "On average over {window} {what} is still {far} apart, and still changing: {last} "
     "at the last moment.",
 }
-
-
-@dataclass(frozen=True)
-class MainDifference:
-    """The difference to speak of: its name, the largest value as text, and when [s]."""
-
-    named: str
-    far: str
-    at: float
-    found: Agreement | None
 
 
 def headline(
@@ -74,15 +62,13 @@ def headline(
             total=len(agreements),
         )
         return Headline(lead, holds=False)
-    main = subject(comparison, explanation)
-    if main is None:
-        return Headline(LEADS["differ"], holds=False)
-    contact = main.found if main.found and main.found.kind == "contact" else None
+    what, far, at, agreement = subject(comparison, explanation)
+    contact = agreement if agreement and agreement.kind == "contact" else None
     left, right = short_labels(comparison)
     lead = LEADS["contact" if contact else "apart"].format(
-        what=name_of(contact.name) if contact else main.named,
-        far=contact.note or main.far if contact else main.far,
-        at=short_time(main.at),
+        what=name_of(contact.name) if contact else what,
+        far=(contact and contact.note) or far,
+        at=short_time(at),
         left=left,
         right=right,
         parting=_parting(comparison, events),
@@ -133,11 +119,13 @@ def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
     if not known:
         return ENDS["within"].format(window=over) if motion and not differ else ""
     most = max(known, key=lambda a: a.settled / (a.tolerance or 1e-300))
-    far = quantity(most.settled, most.unit)
     last = next((_last(curve, most) for curve in curves if curve.name == most.name), None)
-    kind = "settled" if last is None else "changing"
-    last_one = quantity(last, most.unit)
-    return ENDS[kind].format(window=over, what=named(most), far=far, last=last_one)
+    return ENDS["settled" if last is None else "changing"].format(
+        window=over,
+        what=named(most),
+        far=quantity(most.settled, most.unit),
+        last=quantity(last, most.unit),
+    )
 
 
 def _last(curve: Series, agreement: Agreement) -> float | None:
@@ -167,13 +155,16 @@ def named(agreement: Agreement) -> str:
 
 def subject(
     comparison: Comparison, explanation: Explanation | None = None
-) -> MainDifference | None:
-    """The largest difference: that whose causes were looked for, else the leading one."""
+) -> tuple[str, str, float, Agreement | None]:
+    """The largest difference: that whose causes were looked for, else the leading one.
+
+    Returns:
+        Its name, the largest value as text, when that is [s], and the figures of the comparison;
+        None where they have no such quantity.
+    """
     if explanation is None or explanation.is_rounding:
         lead = leading(comparison)
-        if lead is None:
-            return None
-        return MainDifference(named(lead), quantity(lead.max, lead.unit), lead.at, lead)
+        return named(lead), quantity(lead.max, lead.unit), lead.at, lead
     gap, quantities = explanation.first[explanation.quantity], explanation.quantity
     kind = {"joints": "joint", "slides": "slide"}.get(quantities)
     same = [
@@ -183,26 +174,23 @@ def subject(
         and abs(agreement.max - gap.worst) <= 1e-6 * gap.worst
     ]
     who = f"one of the {quantities}" if kind else f"the {quantities}"
-    far = quantity(gap.worst, explanation.unit)
     first = same[0] if same else None
-    return MainDifference(named(first) if first else who, far, gap.at, first)
+    far = quantity(gap.worst, explanation.unit)
+    return named(first) if first else who, far, gap.at, first
 
 
-def leading(comparison: Comparison) -> Agreement | None:
+def leading(comparison: Comparison) -> Agreement:
     """The quantity farthest beyond its tolerance: a coordinate, of which --why speaks, if any is.
 
-    Else one of the motion, as the fingertip; else any.
+    Else one of the motion, as the fingertip; else any. What is no number comes last.
     """
     beyond = [a for a in comparison.agreements if a.verdict != "agrees"]
     own = [a for a in beyond if QUANTITIES[a.kind].own]
     motion = [a for a in beyond if QUANTITIES[a.kind].moves]
-    return max(own or motion or beyond, key=_finite_first, default=comparison.worst)
-
-
-def _finite_first(agreement: Agreement) -> float:
-    """How many tolerances it is beyond; what is no number comes last."""
-    share = agreement.tolerances()
-    return share if np.isfinite(share) else -1.0
+    return max(
+        own or motion or beyond or comparison.agreements,
+        key=lambda a: np.nan_to_num(a.tolerances(), posinf=-1.0),
+    )
 
 
 def parting(comparison: Comparison) -> float | None:
@@ -225,11 +213,11 @@ def in_words(comparison: Comparison) -> list[Block]:
         cut=if_true(cut),
         unlike=if_true(unlike),
         **{kind: counts[kind] for kind in ("agrees", "settles", "differs")},
-        far=worst and quantity(worst.max, worst.unit),
-        tolerance=worst and quantity(worst.tolerance, worst.unit),
-        at=worst and short_time(worst.at),
-        nearest=name_of(worst.name) if worst and holds and worst.max else None,
-        farthest=named(worst) if worst and unlike and worst.kind != "contact" else None,
+        far=quantity(worst.max, worst.unit),
+        tolerance=quantity(worst.tolerance, worst.unit),
+        at=short_time(worst.at),
+        nearest=name_of(worst.name) if holds and worst.max else None,
+        farthest=named(worst) if unlike and worst.kind != "contact" else None,
         first=parted[0] if cut and parted else None,
         parted=short_time(first or 0.0),
     )

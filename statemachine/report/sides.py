@@ -87,15 +87,12 @@ def _ends(trace: Trace) -> Array:
 
 def contact_words(comparison: Comparison, touches: Sequence[Touch]) -> Table:
     """How hard each pair of bodies presses in the end on each side, and how deep it overlaps."""
-
-    def size(touch: Touch) -> tuple[float, float]:
-        return (
-            max(touch.one.force, touch.two.force),
-            max(touch.one.deepest, touch.two.deepest),
-        )
-
     labels = short_labels(comparison)
-    hardest = sorted(touches, key=size, reverse=True)[:_PAIRS_SHOWN]
+    hardest = sorted(
+        touches,
+        key=lambda t: (max(t.one.force, t.two.force), max(t.one.deepest, t.two.deepest)),
+        reverse=True,
+    )[:_PAIRS_SHOWN]
     return Table(
         ("bodies", "side", "force, N", "with friction, N", "deepest", "at, s", "last touch"),
         [

@@ -189,11 +189,10 @@ def versions(comparisons: Sequence[Comparison], experiment: str) -> Page:
     pairs = [tuple(s.provenance.versions[s.backend] for s in both) for both in sides]
     rows, changed, bars = [], [], []
     for (left, right), found in zip(pairs, comparisons, strict=True):
-        cells, worst = (NONE,) * 4, leading(found)
-        bars.append((worst.max / worst.tolerance if worst and worst.tolerance else 0.0, None))
-        if worst is not None:
-            largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
-            cells = (name_of(worst.name), largest, short_time(worst.at), tolerance)
+        worst = leading(found)
+        bars.append((worst.max / worst.tolerance if worst.tolerance else 0.0, None))
+        largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
+        cells = name_of(worst.name), largest, short_time(worst.at), tolerance
         rows.append((left, right, *cells, "agrees" if found.agrees else "DIFFERS"))
         changed += [] if found.agrees else [f"MuJoCo {left} and {right}"]
     heads = ("release", "next", "quantity", "largest", "at", "tolerance", "verdict")

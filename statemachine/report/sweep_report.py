@@ -75,25 +75,6 @@ def _headline(found: SweepReport) -> Headline:
     return Headline(lead, tuple(causes), holds=found.agreed == len(found.settings))
 
 
-def _quantities(found: SweepReport) -> Table:
-    return Table.of(
-        found.quantities,
-        {
-            "gap of": lambda gaps: gaps.says,
-            "within": lambda gaps: rounded(gaps.tolerance, gaps.unit, 2),
-            "agree": lambda gaps: str(gaps.counts.get("agrees", 0)),
-            "some seeds": lambda gaps: str(gaps.counts.get("some seeds", 0)),
-            "chaos": lambda gaps: str(gaps.counts.get("chaos", 0)),
-            "differ": lambda gaps: str(gaps.counts.get("differs", 0)),
-            "median": lambda gaps: quantity(gaps.median, gaps.unit),
-            "worst": lambda gaps: quantity(gaps.worst, gaps.unit),
-        },
-        f"How many settings, of {len(found.settings)}",
-        emphasis=lambda gaps: gaps.name == found.quantity.name,
-        wide={"median"},
-    )
-
-
 def _floor_slots(found: SweepReport) -> dict[str, Any]:
     """How high the chaos floor is, and how it was made; or why it is not known."""
     floor = found.floor
@@ -112,7 +93,22 @@ def _where(found: SweepReport) -> list[Block]:
     chart = found.map
     return template.blocks(
         "sweep_map",
-        quantities=_quantities(found),
+        quantities=Table.of(
+            found.quantities,
+            {
+                "gap of": lambda gaps: gaps.says,
+                "within": lambda gaps: rounded(gaps.tolerance, gaps.unit, 2),
+                "agree": lambda gaps: str(gaps.counts.get("agrees", 0)),
+                "some seeds": lambda gaps: str(gaps.counts.get("some seeds", 0)),
+                "chaos": lambda gaps: str(gaps.counts.get("chaos", 0)),
+                "differ": lambda gaps: str(gaps.counts.get("differs", 0)),
+                "median": lambda gaps: quantity(gaps.median, gaps.unit),
+                "worst": lambda gaps: quantity(gaps.worst, gaps.unit),
+            },
+            f"How many settings, of {len(found.settings)}",
+            emphasis=lambda gaps: gaps.name == found.quantity.name,
+            wide={"median"},
+        ),
         tables=_map_tables(found, chart) if chart else [],
         legend=if_true(chart),
         others=(chart and listed(chart.others)) or None,

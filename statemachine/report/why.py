@@ -46,6 +46,7 @@ TOUCH = (
     "Until the first touch, {what} at {time}, the two are {before} apart: what parts them acts "
     "where they touch."
 )
+TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"
 PARTS = "{explained} of the gap is explained, {located} is localised, {unexplained} is unexplained"
 
 
@@ -208,7 +209,12 @@ def three_parts(result: Explanation) -> list[Block]:
 
 def _table(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
     """The differences, the largest share first; those without an effect folded away."""
-    small = [] if result.is_rounding else [row for row in able if not _counts(row)]
+    small = [
+        row
+        for row in able
+        if not result.is_rounding
+        and max(abs(part or 0.0) for part in (row.share, row.alone, row.last)) < _NO_PART
+    ]
     small = small if len(small) > 1 else []
     rows = [_row(result, row) for row in able if row not in small]
     for place in result.found_in:  # what a feature takes away when it is left out on both sides
@@ -220,19 +226,17 @@ def _table(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
         rows.append((f"{len(small)} more, none above 0.1 %", NONE, NONE, explains, NONE, NONE))
     title = "What differs"
     if not result.is_rounding:
-        title += f", and its part of the {_amount(result, result.gap)} of the {result.quantity} "
-        title += f"({_MEASURES[result.measure]})"
+        title = TITLE.format(
+            gap=_amount(result, result.gap),
+            quantity=result.quantity,
+            measure=_MEASURES[result.measure],
+        )
     words = frozenset({0, 1, 2})
     most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
     heading = f"{len(rows) - most} more differences, with smaller parts"
     more = Table(_HEADS, rows[most:], heading, words=words)
     folded = [Section("", heading, [more], folded=True)] if more.rows else []
     return [Table(_HEADS, rows[:most], title, words=words), *folded] if rows else []
-
-
-def _counts(row: CauseShare) -> bool:
-    """Whether a cause has a row of its own."""
-    return max(abs(part or 0.0) for part in (row.share, row.alone, row.last)) >= _NO_PART
 
 
 def _row(result: Explanation, row: CauseShare) -> tuple[str, ...]:

@@ -261,6 +261,15 @@ def explain(
     )
     shares = _shares(listed, divided, rest, two, nothing)
     explained, located, unexplained = _parts(gap, brought, rest, nothing)
+    # Each of them explains nearly all alone, and next to nothing after the others.
+    redundant = [
+        row.name
+        for row in shares
+        if row.alone is not None
+        and row.last is not None
+        and row.alone > 1.0 - UNEXPLAINED
+        and abs(row.last) < UNEXPLAINED
+    ]
     progress(1.0)
     return Explanation(
         experiment=scenario.name,
@@ -283,7 +292,7 @@ def explain(
         unexplained=unexplained,
         negligible=negligible,
         floor=floor,
-        redundant=_redundant(shares, explained),
+        redundant=tuple(redundant) if len(redundant) > 1 and explained > UNEXPLAINED else (),
         impossible=divided.impossible,
         unmatched=matched.only,
         missing=missing_parts(one, two),
@@ -400,19 +409,6 @@ def _still(listed: tuple[Cause, ...], model: Model, trace: Trace) -> tuple[str, 
         and kind in (JointType.HINGE, JointType.SLIDE)
         and np.ptp(trace.qpos[:, place]) < _STILL
     )
-
-
-def _redundant(shares: tuple[CauseShare, ...], explained: float) -> tuple[str, ...]:
-    """Causes each of which explains nearly all alone, and next to nothing after the others."""
-    names = [
-        row.name
-        for row in shares
-        if row.alone is not None
-        and row.last is not None
-        and row.alone > 1.0 - UNEXPLAINED
-        and abs(row.last) < UNEXPLAINED
-    ]
-    return tuple(names) if len(names) > 1 and explained > UNEXPLAINED else ()
 
 
 def _labels(one: Model, two: Model) -> Sequence[str]:

@@ -46,13 +46,11 @@ class Feature:
     """Something that both engines compute, each in its own way, and that can be left out.
 
     Attributes:
-        name: What it is called in a result.
-        title: In words; without: what a run without it is, in words.
+        name: What it is called in a result; without: what a run without it is, in words.
         option: That of `Model.replace`; value: what leaves the feature out.
     """
 
     name: str
-    title: str
     without: str
     option: str
     value: Any
@@ -61,12 +59,12 @@ class Feature:
 # What acts now and then comes first. Gravity and the servos are not among them: they drive the
 # motion, and with it goes whatever there is between two sides.
 FEATURES = (
-    Feature("contact", "contact", "nothing touches", "contacts", False),
-    Feature("limits", "joint limits", "no joint limits", "limits", False),
-    Feature("frictionloss", "dry friction", "no dry friction", "frictionloss", 0.0),
-    Feature("damping", "damping", "no damping", "damping", 0.0),
-    Feature("armature", "armature", "no armature", "armature", 0.0),
-    Feature("timestep", "timestep", f"steps {_FINER} times finer", "substeps", _FINER),
+    Feature("contact", "nothing touches", "contacts", False),
+    Feature("limits", "no joint limits", "limits", False),
+    Feature("frictionloss", "no dry friction", "frictionloss", 0.0),
+    Feature("damping", "no damping", "damping", 0.0),
+    Feature("armature", "no armature", "armature", 0.0),
+    Feature("timestep", f"steps {_FINER} times finer", "substeps", _FINER),
 )
 
 

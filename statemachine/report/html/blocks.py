@@ -1,10 +1,18 @@
-"""The blocks of a page as HTML: each kind in one way, whatever the page is about."""
+"""The blocks of a page as HTML: each kind in one way, whatever the page is about.
+
+The charts of a quantity over time have a cursor that follows the slider.
+"""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Iterable
 
+import numpy as np
+
+from ...errors import MissingEngineError
+from ...measures import largest
+from ...measures.text import figure, reading
 from ...page import (
     Bars,
     Block,
@@ -21,27 +29,38 @@ from ...page import (
     Traces,
     Verdict,
 )
+from ..figures import INK, SIDES, chart
+from ..over_time import QuantityChart
 from ..robot_pictures import inline
 from ..terminal import non_breaking
 from .markup import Html, joined, tag
 
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
-_FULL = 1.0  # share that fills a bar
-Draw = Callable[[Interactive], Html]
+_ROWS = 21  # of the table under a chart
+_ROUNDING = 1e-6  # of a tolerance
+_SIZE = (4.0, 1.3)  # inches
+_BOX = (0.12, 0.18, 0.85, 0.75)  # of its axes: left, bottom, width, height
+# So that the theme of the page changes the colours.
+_COLOURS = {
+    INK: "var(--ink)",
+    SIDES[0]["color"]: "var(--one)",
+    SIDES[1]["color"]: "var(--two)",
+    "#f0f0f0": "var(--shade)",
+}
 
 
-def drawn(blocks: Iterable[Block], draw: Draw, level: int = 2) -> Html:
+def drawn(blocks: Iterable[Block], stage: Html, level: int = 2) -> Html:
     """Blocks one after the other.
 
     Args:
         blocks: Of a page.
-        draw: Draws what follows the slider.
+        stage: The scene with its slider, where both runs stand.
         level: Of a section's heading.
     """
-    return joined(_block(block, draw, level) for block in blocks)
+    return joined(_block(block, stage, level) for block in blocks)
 
 
-def _block(block: Block, draw: Draw, level: int) -> Html:
+def _block(block: Block, stage: Html, level: int) -> Html:
     match block:
         case Heading(text):
             return tag("h3", text)
@@ -58,9 +77,11 @@ def _block(block: Block, draw: Draw, level: int) -> Html:
         case Verdict(text, holds):
             return tag("p", f"{'✓' if holds else '✗'} {text}", class_="verdict")
         case Section():
-            return _section(block, draw, level)
+            return _section(block, stage, level)
+        case QuantityChart():
+            return quantity_row(block)
         case Interactive():
-            return draw(block)
+            return stage
         case HeatMap() | Bars() | Traces():
             return _picture(block)
         case _:
@@ -75,10 +96,10 @@ def _picture(picture: HeatMap | Bars | Traces) -> Html:
     return figure if source else Html("")
 
 
-def _section(block: Section, draw: Draw, level: int) -> Html:
+def _section(block: Section, stage: Html, level: int) -> Html:
     if not block.heading:
-        return drawn(block.blocks, draw, level)
-    inside = drawn(block.blocks, draw, level + 1)
+        return drawn(block.blocks, stage, level)
+    inside = drawn(block.blocks, stage, level + 1)
     if block.folded:
         return tag("details", tag("summary", block.heading), inside)
     name = block.name or None
@@ -101,18 +122,24 @@ def headline_as_html(headline: Headline) -> Html:
 
 def table(block: Table) -> Html:
     """A table whose first column names its rows, as wide as it needs to be."""
-    signed = _signed(block.rows)
-    top = tag(
-        "tr",
-        *(
-            tag("th", text, scope="col", class_=_look(k, block) if k else "word")
-            for k, text in enumerate(block.headers)
-        ),
-    )
+    looks = ["word" if k in block.words else None for k in range(len(block.headers))]
+    # Columns whose bars go to both sides.
+    signed = {
+        k
+        for row in block.rows
+        for k, cell in enumerate(row)
+        if isinstance(cell, TableCell) and (cell.share or 0.0) < -0.005
+    }
+    heads = zip(("word", *looks[1:]), block.headers, strict=True)
+    top = tag("tr", *(tag("th", text, scope="col", class_=look) for look, text in heads))
     rows = [
         tag(
             "tr",
-            *(_cell(k, cell, block, signed) for k, cell in enumerate(row)),
+            tag("th", _content(row[0], 0 in signed), scope="row"),
+            *(
+                tag("td", _content(row[k], k in signed), class_=looks[k])
+                for k in range(1, len(row))
+            ),
             class_="most" if n in block.emphasis else None,
         )
         for n, row in enumerate(block.rows)
@@ -126,18 +153,6 @@ def table(block: Table) -> Html:
         role="region",
         aria_label=block.title,
     )
-
-
-def _look(place: int, block: Table) -> str | None:
-    """The class of a column's cells: words are aligned to the left."""
-    return "word" if place in block.words else None
-
-
-def _cell(place: int, text: str, block: Table, signed: frozenset[int]) -> Html:
-    content = _content(text, place in signed)
-    if place == 0:
-        return tag("th", content, scope="row")
-    return tag("td", content, class_=_look(place, block))
 
 
 def _content(text: str, signed: bool) -> object:
@@ -160,20 +175,12 @@ def badge(verdict: str) -> Html:
     return tag("span", sign, f" {verdict}", class_=f"badge {verdict}")
 
 
-def _signed(rows: Sequence[Sequence[str]]) -> frozenset[int]:
-    """Columns whose bars go to both sides."""
-    cells = itertools.chain.from_iterable(enumerate(row) for row in rows)
-    return frozenset(
-        k for k, cell in cells if isinstance(cell, TableCell) and (cell.share or 0.0) < -0.005
-    )
-
-
 def _bar(share: float, text: str, signed: bool) -> Html:
     """A share as a bar from a line of zero, to the left if it is below zero."""
-    length = 100 * min(_FULL, abs(share)) / (2 if signed else 1)
+    length = 100 * min(1.0, abs(share)) / (2 if signed else 1)
     left = 0.0 if not signed else 50.0 - (length if share < 0 else 0.0)
     look = "bar signed" if signed else "bar"
-    if abs(share) > _FULL:
+    if abs(share) > 1:
         look += " cut " + ("down" if share < 0 else "up")
     fill = tag("i", style=f"left:{left:.1f}%;width:{length:.1f}%")
     return tag(
@@ -182,3 +189,81 @@ def _bar(share: float, text: str, signed: bool) -> Html:
         tag("span", non_breaking(text), class_="percent"),
         class_="measure",
     )
+
+
+def quantity_row(quantity: QuantityChart) -> Html:
+    """A row of a quantity: how far apart over time, both sides, and the figures on demand."""
+    values, agreement = quantity.values(), quantity.agreement
+    one, two = quantity.labels
+    keys = tag("i", class_="key one"), f"{one} ", tag("i", class_="key two"), two
+    gap = f"how far apart, {quantity.unit}; log axis; dotted: the tolerance"
+    if quantity.floor is not None:
+        gap += "; grey: the chaos floor"
+    return tag(
+        "section",
+        tag("h3", tag("span", quantity.title, class_="quantity"), badge(agreement.verdict)),
+        tag(
+            "div",
+            _figure(quantity.gap(), gap, quantity.said),
+            _figure(values, joined((f"{values.title}: ", *keys)), values.title) if values else None,
+            class_="charts",
+        ),
+        tag("p", quantity.foot, class_="foot") if quantity.foot else None,
+        tag("details", tag("summary", f"The figures of {quantity.title}"), data_table(quantity),
+            class_="data"),
+        class_="quantity-row",
+    )  # fmt: skip
+
+
+def _figure(picture: Traces, caption: str, said: str) -> Html:
+    """A chart with the cursor of time over its axes; a line where matplotlib is not installed."""
+    try:
+        text = chart(picture, "svg", _SIZE, _BOX).decode()
+    except MissingEngineError as error:
+        return tag("p", f"No chart: {error}.", class_="foot")
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r' id="[a-z]+[\d_]+"', "", text)
+    text = re.sub(r"(\d\.\d)\d{3,}", r"\1", text)  # tenths of a point are seen, no more
+    for colour, name in _COLOURS.items():
+        text = text.replace(colour, name)
+    left, bottom, width, height = (100 * share for share in _BOX)
+    place = f"left:{left:g}%;width:{width:g}%;bottom:{bottom:g}%;height:{height:g}%"
+    area = tag("div", tag("i", class_="cursor"), class_="area", style=place)
+    return tag(
+        "figure",
+        tag("figcaption", caption),
+        tag("div", Html(text), area, class_="plot", role="img", aria_label=said),
+    )
+
+
+def data_table(quantity: QuantityChart) -> Html:
+    """The figures of its charts: moments evenly spaced, and that of the largest difference."""
+    time, tolerance = quantity.curve.time, quantity.agreement.tolerance
+    rows = np.linspace(0, len(time) - 1, min(_ROWS, len(time))).round().astype(int)
+    worst = largest(quantity.curve.difference)[1]
+    rows = np.unique([*rows, worst])
+    values = quantity.values()
+    columns = {**(values.curves if values else {}), **quantity.gap().curves}
+    scale = reading(quantity.curve.unit)[0]
+    cells = [
+        (
+            f"{time[row]:.3f}",
+            *(_number(float(y[row]), tolerance * scale) for _, y in columns.values()),
+        )
+        for row in rows.tolist()
+    ]
+    return table(
+        Table(
+            ("time, s", *(f"{name}, {quantity.unit}" for name in columns)),
+            cells,
+            f"{quantity.title}: {len(rows)} of {len(time)} moments, the largest difference bold",
+            emphasis=frozenset(np.flatnonzero(rows == worst).tolist()),
+        )
+    )
+
+
+def _number(value: float, tolerance: float) -> str:
+    if 0 < abs(value) < _ROUNDING * tolerance:
+        return "≈ 0"
+    return f"{value:.4f}" if abs(value) >= 1e-3 or value == 0 else figure(value)

@@ -15,13 +15,12 @@ from ...errors import BadInputError
 from ...page import Block, Interactive, Items, Page, Section, Text
 from ...runs.whole import check_place, replace_text
 from ..finding import long_labels
-from ..over_time import BothRuns, QuantityChart
+from ..over_time import BothRuns
 from ..terminal import non_breaking
 from .blocks import drawn, headline_as_html
-from .charts import quantity_row
 from .markup import Html, data_of, filled, joined, tag, template
 from .scene import Look
-from .stage import StagePart, staged
+from .stage import staged
 
 SUFFIXES = (".html", ".htm")
 _SCRIPTS = ("gl.js", "scene.js", "page.js")
@@ -36,33 +35,26 @@ def report(page: Page, looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK)) -> str:
         looks: What each of both runs is drawn as; the same object twice if both are of one model.
     """
     runs = next((block for block in page.blocks if isinstance(block, BothRuns)), None)
-    stage = None if runs is None else staged(runs, looks)
-
-    def draw(block: Interactive) -> Html:
-        if stage is not None and block is runs:
-            return stage.html
-        return quantity_row(block) if isinstance(block, QuantityChart) else Html("")
+    stage, data, notes = (Html(""), None, []) if runs is None else staged(runs, looks)
 
     opening = list(itertools.takewhile(_opens, page.blocks))
     rest: list[Block] = [*page.blocks[len(opening) :]]
-    if stage is not None and stage.notes:
-        rest.append(Section("picture", "Of the picture", [Items(stage.notes)]))
-    parts = [_header(page, opening, draw, runs), drawn(rest, draw)]
+    if notes:
+        rest.append(Section("picture", "Of the picture", [Items(notes)]))
+    parts = [_header(page, opening, stage, runs), drawn(rest, stage)]
     about = f"statemachine {__version__}; this file asks for nothing but itself."
     footer = tag("footer", tag("p", non_breaking(page.origin)), tag("p", about))
     body = joined((tag("main", *parts), footer))
     title = page.headline.lead if page.headline else page.title
-    return _assembled(title, body, stage)
+    return _assembled(title, body, data)
 
 
 def _opens(block: Block) -> bool:
     """Whether a block belongs to the opening of a page, above all sections."""
-    if isinstance(block, Section):
-        return not block.name
-    return not isinstance(block, Interactive)
+    return not (isinstance(block, Interactive) or (isinstance(block, Section) and block.name))
 
 
-def _header(page: Page, opening: Sequence[Block], draw: Any, runs: BothRuns | None) -> Html:
+def _header(page: Page, opening: Sequence[Block], stage: Html, runs: BothRuns | None) -> Html:
     name: list[object] = [tag("span", page.title, class_="experiment")]
     if runs is not None:
         one, two = (
@@ -79,15 +71,14 @@ def _header(page: Page, opening: Sequence[Block], draw: Any, runs: BothRuns | No
         tag("p", *name, class_="kicker"),
         headline_as_html(page.headline) if page.headline else tag("h1", page.title, id="finding"),
         *(tag("p", non_breaking(block.text), class_="says") for block in lead),
-        tag("div", drawn(opening[len(lead) :], draw), class_="words"),
+        tag("div", drawn(opening[len(lead) :], stage), class_="words"),
     )
 
 
-def _assembled(title: str, body: Html, stage: StagePart | None) -> str:
-    script, data = "", Html("{}")
-    if stage is not None:
-        script = "\n".join(template(name) for name in _SCRIPTS)
-        script, data = f"(() => {{\n'use strict';\n{script}\n}})();", data_of(stage.data)
+def _assembled(title: str, body: Html, data: dict[str, Any] | None) -> str:
+    """The file; without data for a script there is none."""
+    script = "\n".join(template(name) for name in _SCRIPTS)
+    script = "" if data is None else f"(() => {{\n'use strict';\n{script}\n}})();"
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
         f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
@@ -98,7 +89,7 @@ def _assembled(title: str, body: Html, stage: StagePart | None) -> str:
         "title": title,
         "style": Html(template("page.css")),
         "body": body,
-        "data": data,
+        "data": data_of(data or {}),
         "script": Html(script),
     }
     return filled("page.html", slots)

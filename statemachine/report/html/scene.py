@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -34,19 +33,9 @@ _CONTACTS = 9_000  # of one side, at all moments together
 _ASPECT = 1.45  # width of the picture through its height; the script has it too
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What is drawn.
-
-    Attributes:
-        data: For the script; None if the traces tell no poses.
-        notes: What a reader should know of the picture, in sentences.
-        strongest: The largest contact force that is drawn [N].
-    """
-
-    data: dict[str, Any] | None
-    notes: tuple[str, ...]
-    strongest: float = 0.0
+# What is drawn, for the script, None if the traces tell no poses; what a reader should know of the
+# picture, in sentences; and the largest contact force that is drawn [N].
+Scene = tuple[dict[str, Any] | None, list[str], float]
 
 
 def moments_of(one: Trace, two: Trace, must: Sequence[float] = ()) -> tuple[Array, int]:
@@ -97,7 +86,7 @@ def scene_of(
     """
     traces = runs.one, runs.two
     if any("xpos" not in trace or "xquat" not in trace for trace in traces):
-        return Scene(None, ("The traces tell no poses of the bodies: there is nothing to draw.",))
+        return None, ["The traces tell no poses of the bodies: there is nothing to draw."], 0.0
     labels = long_labels(runs.comparison)
     notes, drawings = _drawings(traces, looks, labels)
     shapes = list(dict.fromkeys(drawings))
@@ -112,7 +101,7 @@ def scene_of(
     poses = [_between(trace["xpos"], *place) for trace, place in zip(traces, places, strict=True)]
     finite = np.concatenate([pos[np.isfinite(pos).all(axis=2)] for pos in poses])
     if not len(finite):
-        return Scene(None, ("No pose of a body is a finite number: there is nothing to draw.",))
+        return None, ["No pose of a body is a finite number: there is nothing to draw."], 0.0
     middle = np.asarray(drawings[0].center)
     low = np.maximum(finite.min(axis=0), middle - _FAR * extent)
     span = np.maximum(np.minimum(finite.max(axis=0), middle + _FAR * extent) - low, 1e-6)
@@ -163,7 +152,7 @@ def scene_of(
         "meshes": [mesh_as_data(mesh) for mesh in meshes],
         "sides": sides,
     }
-    return Scene(data, tuple(notes), max(strongest for _, strongest, _ in contacts))
+    return data, notes, max(strongest for _, strongest, _ in contacts)
 
 
 def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,33 +18,23 @@ from .scene import Look, moments_of, scene_of
 
 _TICKS = 6  # of the axis of time
 _SEEN = 1 / 400  # of the axis: a narrower gap between two bars is not seen
+_TOOL = "gripperframe (tool frame)"
 ARROWS = (
     "Arrows: contact forces, each as long as the root of its force; the longest of the run is "
     "{force} N."
 )
 
 
-@dataclass(frozen=True, eq=False)
-class StagePart:
-    """What a page shows of both runs.
-
-    Attributes:
-        html: The scene, the slider and the lanes under it.
-        data: For the script.
-        notes: What a reader should know of the picture, in sentences.
-    """
-
-    html: Html
-    data: dict[str, Any]
-    notes: tuple[str, ...]
-
-
-def staged(runs: BothRuns, looks: Sequence[Look]) -> StagePart:
+def staged(runs: BothRuns, looks: Sequence[Look]) -> tuple[Html, dict[str, Any], list[str]]:
     """Both runs, drawn.
 
     Args:
         runs: The runs.
         looks: What each is drawn as.
+
+    Returns:
+        The scene, the slider and the lanes under it; the data for the script; and what a reader
+        should know of the picture, in sentences.
     """
     until = runs.comparison.until
     # Of these moments the page tells: they must be among those that can be shown.
@@ -53,7 +42,7 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> StagePart:
     moments = {t for a in agreements for t in (a.at, a.since) if t is not None}
     times, left_out = moments_of(runs.one, runs.two, sorted(moments))
     start = int(np.argmin(np.abs(times - runs.start)))
-    scene = scene_of(runs, looks, times, left_out, start)
+    scene, notes, strongest = scene_of(runs, looks, times, left_out, start)
     compared = runs.charts[0].curve.time if runs.charts else times
     rows = np.clip(np.searchsorted(compared, times + 1e-9, side="right") - 1, 0, None)
     data = {
@@ -63,12 +52,10 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> StagePart:
         "start": start,
         "quantities": [_quantity_data(chart, rows) for chart in runs.charts],
         "lead": list(runs.lead),
-        "scene": scene.data,
+        "scene": scene,
     }
     now, (one, two) = float(times[start]), long_labels(runs.comparison)
     short_one, short_two = short_labels(runs.comparison)
-    arrows = non_breaking(ARROWS.format(force=figure(scene.strongest))) if scene.strongest else ""
-    still = joined(tag("p", note) for note in scene.notes) if scene.data is None else ""
     slots = {
         "one": one,
         "two": two,
@@ -76,21 +63,16 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> StagePart:
         "short_two": short_two,
         "on_one": non_breaking(f"{until:g} s {on(one)}"),
         "on_two": on(two),
-        "tip": tip_name(runs.site),
+        "tip": _TOOL if runs.site == "gripperframe" else runs.site or "a site",
         "now": short_time(now),
-        "arrows": arrows,
+        "arrows": non_breaking(ARROWS.format(force=figure(strongest))) if strongest else "",
         "last": len(times) - 1,
         "start": start,
         "share": f"{now / until if until else 0.0:.6f}",
-        "still": still,
+        "still": joined(tag("p", note) for note in notes) if scene is None else "",
         "lanes": _lanes(runs),
     }
-    return StagePart(filled("stage.html", slots), data, scene.notes)
-
-
-def tip_name(tip: str) -> str:
-    """The site that is followed, as it is called in the model."""
-    return "gripperframe (tool frame)" if tip == "gripperframe" else tip or "a site"
+    return filled("stage.html", slots), data, notes
 
 
 def _lanes(runs: BothRuns) -> Html:
