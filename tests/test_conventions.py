@@ -17,7 +17,7 @@ from statemachine import engines
 from statemachine.cli import main
 from statemachine.compare.models import own_ways
 from statemachine.engines import room, samples
-from statemachine.engines.mujoco import pile
+from statemachine.engines.mujoco import conventions as mujoco_conventions
 from statemachine.engines.samples import TREE
 from statemachine.errors import MissingEngineError, UnknownNameError
 from statemachine.installed import ENGINES, available, require
@@ -358,7 +358,8 @@ def restore_loses_the_warm_start(right: Any, model: Any, data: Any, *state: Any)
 
 def no_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     flag = '<option><flag warmstart="disable"/></option><worldbody>'
-    monkeypatch.setattr(pile, "MJCF", pile.MJCF.replace("<worldbody>", flag))
+    text = mujoco_conventions.PILE_MJCF.replace("<worldbody>", flag)
+    monkeypatch.setattr(mujoco_conventions, "PILE_MJCF", text)
 
 
 @around(pybullet, "restoreState")

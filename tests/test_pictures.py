@@ -24,7 +24,7 @@ from statemachine.drawing.scene import Camera, framed
 from statemachine.drawing.shots import Shot, compose, smaller
 from statemachine.engines import pictures as probe
 from statemachine.engines import pybullet as pybullet_room
-from statemachine.engines.mujoco import _opengl
+from statemachine.engines.mujoco import rendering as mujoco_rendering
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.report.film import (
     Film,
@@ -367,9 +367,9 @@ def test_without_opengl_pybullet_draws_and_it_is_said(
 
 
 def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_opengl, "offscreen_opengl", lambda: "egl")
+    monkeypatch.setattr(mujoco_rendering, "offscreen_opengl", lambda: "egl")
     assert probe.renderer_here() == probe.Renderer("mujoco", "egl")
-    monkeypatch.setattr(_opengl, "offscreen_opengl", lambda: None)
+    monkeypatch.setattr(mujoco_rendering, "offscreen_opengl", lambda: None)
     refused(
         (MissingEngineError, r"apt-get|driver", lambda: probe.renderer_here("mujoco")),
         (UnknownNameError, "Did you mean 'mujoco'", lambda: probe.renderer_here("mujcoo")),

@@ -17,7 +17,6 @@ from .. import RawEngine, function_of
 if TYPE_CHECKING:
     from ...interface import Array, Data, Model
     from ..description.records import Robot
-    from ..measured import Phrases
 
 _OPTIONS = ("disableflags", "enableflags", "timestep", "gravity", "integrator")
 
@@ -29,6 +28,7 @@ class MujocoEngine(RawEngine):
     sharper = 2  # drawn so many times as large, and made smaller: edges are smooth then
     steps = ("mj_step", "mj_step2")
     forwards = ("mj_forward", "mj_kinematics", "mj_fwdPosition")
+    phrases = function_of(".mujoco.phrasebook:phrases")
     driver = function_of(".mujoco.audit:MujocoDriver")
     call_watch = function_of(".mujoco.calls:MujocoWatch")
     read_file = function_of(".mujoco.description:read_file")
@@ -39,8 +39,8 @@ class MujocoEngine(RawEngine):
     counts = function_of(".mujoco.given:counts")
     with_parts = function_of(".mujoco.given:with_parts")
     drawer = function_of(".mujoco.rendering:MujocoDrawer")
-    drawing_environment = function_of(".mujoco._opengl:environment")
-    drawing_diagnosis = function_of(".mujoco._opengl:diagnosis")
+    drawing_environment = function_of(".mujoco.rendering:environment")
+    drawing_diagnosis = function_of(".mujoco.rendering:diagnosis")
 
     def plain_run(self, path: Path, commands: Array, keyframe: int | None) -> Array | None:
         """By MjModel.from_xml_path and mj_step; None: it looks for no ROS packages."""
@@ -69,12 +69,6 @@ class MujocoEngine(RawEngine):
         from . import conventions
 
         return getattr(conventions, question, None)
-
-    def phrases(self) -> Phrases:
-        """A Model, a Data, and functions that take both."""
-        from .phrasebook import PHRASES
-
-        return PHRASES
 
     def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
         """That of the state that the derived arrays of `data` belong to."""
@@ -118,7 +112,7 @@ class MujocoEngine(RawEngine):
 
     def opengl(self) -> str:
         """The MUJOCO_GL that it draws with here."""
-        from ._opengl import offscreen_opengl, opengl_remedy
+        from .rendering import offscreen_opengl, opengl_remedy
 
         require("mujoco")
         opengl = offscreen_opengl()

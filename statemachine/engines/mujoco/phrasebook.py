@@ -69,7 +69,8 @@ _CELLS = {
     ),
     "many worlds": Cell("worlds = [mujoco.MjData(m) for _ in range(3)]", _apart),
 }
-PHRASES = Phrases(
+phrases = partial(
+    Phrases,
     ("arm.xml", PENDULUM_MJCF % '<actuator><motor joint="j"/></actuator>'),
     _CELLS,
 )

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from .. import RawEngine
-
-if TYPE_CHECKING:
-    from ..measured import Phrases
+from .. import RawEngine, function_of
 
 
 class PinocchioEngine(RawEngine):
     """Pinocchio: it computes, and runs nothing."""
+
+    phrases = function_of(".pinocchio.phrasebook:phrases")
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
         """A function of `conventions`."""
         from . import conventions
 
         return getattr(conventions, question, None)
-
-    def phrases(self) -> Phrases:
-        """A Model, functions of q and v, and a Data that holds what they computed last."""
-        from .phrasebook import PHRASES
-
-        return PHRASES

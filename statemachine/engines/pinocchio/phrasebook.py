@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -79,4 +80,4 @@ _CELLS = {
     ),
     "many worlds": Cell("worlds = [m.createData() for _ in range(3)]", _apart),
 }
-PHRASES = Phrases(("arm.urdf", PENDULUM_URDF), _CELLS)
+phrases = partial(Phrases, ("arm.urdf", PENDULUM_URDF), _CELLS)

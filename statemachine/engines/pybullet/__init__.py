@@ -15,7 +15,6 @@ from .. import RawEngine, function_of
 if TYPE_CHECKING:
     from ...backends import pybullet_backend as backend
     from ...interface import Array, Data, Model
-    from ..measured import Phrases
     from ..records import Dials
 
 
@@ -31,6 +30,7 @@ class PybulletEngine(RawEngine):
     terms = function_of(".pybullet.as_it_comes:terms")
     left_alone = function_of(".pybullet.as_it_comes:left_alone")
     ways_back = function_of(".pybullet.as_it_comes:ways_back")
+    phrases = function_of(".pybullet.phrasebook:phrases")
     driver = function_of(".pybullet.audit:PybulletDriver")
     call_watch = function_of(".pybullet.calls:PybulletWatch")
     read = function_of(".pybullet.reading:read")
@@ -51,12 +51,6 @@ class PybulletEngine(RawEngine):
         from . import conventions
 
         return getattr(conventions, question, None)
-
-    def phrases(self) -> Phrases:
-        """A world behind a number, bodies and joints by number, functions with both."""
-        from .phrasebook import PHRASES
-
-        return PHRASES
 
     def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
         """With the rotors that the backend adds.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from ..measured import ANGLE, Cell, Phrases, accelerated, near
@@ -107,4 +108,4 @@ _CELLS = {
     ),
     "many worlds": Cell("worlds = [pb.connect(pb.DIRECT) for _ in range(3)]", _apart),
 }
-PHRASES = Phrases(("arm.urdf", PENDULUM_URDF), _CELLS, _close)
+phrases = partial(Phrases, ("arm.urdf", PENDULUM_URDF), _CELLS, _close)
