@@ -136,13 +136,13 @@ def _subject(subject: str, differences: list[Difference], everything: bool) -> l
     groups = [
         rows
         for same in alike
-        for rows in ([same] if len(same) > 2 and not everything else [[each] for each in same])
+        for rows in ([same] if len(same) > 2 and not everything else [[row] for row in same])
     ]
     shown = groups if everything else groups[:_ROWS]
     rows = [_row(subject, group) for group in shown]
     headers = ("figure", "left", "right", "apart", _LAST.get(subject, ""))
     columns = [k for k in range(5) if k < 3 or any(row[k] for row in rows)]
-    worst = max(differences, key=lambda each: each.share)
+    worst = max(differences, key=lambda row: row.share)
     times = 1 / (1 - worst.share) if worst.share < 1 else math.inf
     lacks = subject == "armature" and 0 < worst.share < 1 and not (worst.one and worst.two)
     return template.blocks(
@@ -192,7 +192,7 @@ def _value(value: Value, unit: str) -> str:
         return value
     if isinstance(value, tuple):
         factor, shown = _SHOWN.get(unit, (1.0, "" if len(value) == 3 else f" {unit}"))
-        return (" ".join(significant(each * factor) for each in value) + shown).strip()
+        return (" ".join(significant(entry * factor) for entry in value) + shown).strip()
     return _number(value, unit, _SHOWN)
 
 

@@ -113,7 +113,7 @@ class Compared:
     @property
     def equal(self) -> bool:
         """Whether everything was compared, and nothing was found that matters."""
-        return not self.skipped and not any(each.matters for each in self.found.differences)
+        return not self.skipped and not any(row.matters for row in self.found.differences)
 
 
 def split(text: str) -> tuple[str, str | None]:

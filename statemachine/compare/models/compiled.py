@@ -19,7 +19,6 @@ from .ledger import Key, Ledger, Telling, Value
 
 _CALLED = {"com": "centre of mass", "moments": "inertia"}  # of a part that is cut otherwise
 _SETTINGS = ("option", "flag")
-_EXTRA_JOINT = ("joint", "extra joint")
 # What a difference is a matter of, where no reading enters it; and what readings tell of at all.
 _SUBJECTS: dict[str, dict[str, str]] = {
     "body": {
@@ -73,11 +72,11 @@ def compiled(
     Raises:
         StateMachineError: They cannot be matched.
     """
-    one, two = models
-    here = {*one.joint_names, *one.body_names, *one.site_names, *one.actuator_names}
-    matched = match_models(one, two, {a: b for a, b in names.items() if a in here})
+    left, right = models
+    here = {*left.joint_names, *left.body_names, *left.site_names, *left.actuator_names}
+    matched = match_models(left, right, {a: b for a, b in names.items() if a in here})
     differences: dict[Key, list[ModelDifference]] = {}
-    for difference in differences_of(one, two, matched):
+    for difference in differences_of(left, right, matched):
         kind, where = difference.kind, names.get(difference.where, difference.where)
         figures, usual = [name for name, _, _ in difference.values], difference.subject
         if kind == "body" and where in tree.at:
@@ -101,7 +100,7 @@ def enter_rest(book: Ledger, matched: Matched, robots: Sequence[Robot], reach: f
     """
     skipped = []
     drives = {drive.name: drive.joint for robot in robots for drive in robot.actuators or ()}
-    alone = {where for kind, where, word in book.compiled if (kind, word) == _EXTRA_JOINT}
+    alone = {where for _, where, word in book.compiled if word == "extra joint"}
     for key, differences in book.compiled.items():
         for difference in differences:
             if difference.kind == "model":
@@ -134,11 +133,10 @@ def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) ->
             continue  # the range says so
         metres = difference.unit == "m" and "[rad]" not in name
         more: Telling = {"keys": [key]} if metres else {"keys": [key], "share": 0.5}
-        scale = reach if metres else math.pi if "[rad]" in name else 0.0
         book.enter(
             *(subject, difference.where, name, [_value(value) for value in values]),
             difference.unit,
-            scale=scale,
+            scale=reach if metres else math.pi if "[rad]" in name else 0.0,
             slack=4,
             against=reach,
             **more,

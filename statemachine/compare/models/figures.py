@@ -16,7 +16,7 @@ from ...engines.description.match import Pair
 from ...engines.description.records import SCALAR, Actuator, RobotJoint, Setting
 from ...engines.description.tree import GroupTree
 from ...measures.text import few, milliseconds, rounded
-from .ledger import Ledger, Telling
+from .ledger import Ledger
 
 # Of each figure its subject and what of it it is, the field of a `RobotJoint` or an `Actuator`, its
 # unit of a hinge and of a slide, and what the compiled models call it.
@@ -156,9 +156,13 @@ def _limits(book: Ledger, a: RobotJoint, b: RobotJoint) -> None:
     span = max(high - low for low, high in (a.limits, b.limits))
     for figure, low, high in zip(("lower", "upper"), a.limits, b.limits, strict=True):
         further = "left" if (low > high) == (figure == "upper") else "right"
-        effect = f"the {further} goes {rounded(abs(low - high), unit)} further"
-        more: Telling = {"effect": effect, "keys": keys}
-        book.enter("limits", a.name, figure, (low, high), unit, scale=span, against=span, **more)
+        book.enter(
+            *("limits", a.name, figure, (low, high), unit),
+            scale=span,
+            against=span,
+            effect=f"the {further} goes {rounded(abs(low - high), unit)} further",
+            keys=keys,
+        )
 
 
 def _drives(book: Ledger, left: _Driven, right: _Driven) -> None:

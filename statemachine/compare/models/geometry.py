@@ -117,23 +117,29 @@ def of_frames(
         label = name if name == other else f"{name}, {other}"
         site = name.removesuffix(" (site)")
         if pair is None or pair.right.number != there:
-            on = [tree.groups[number].name for tree, number in ((left, at), (right, there))]
             if pair is not None or there in {p.right.number for p in matching.pairs}:
+                on = left.groups[at].name, right.groups[there].name
                 keys = [("site", site, "owner")]
                 book.differ("tool frame", label, "is fixed to", on, keys=keys)
             continue
         ours = pair.align @ place
         far, turn = ours.distance(their), ours.angle(their)
         values, keys = (plain(ours.pos), plain(their.pos)), [("site", site, "place")]
-        more: Telling = {"share": far / reach, "keys": keys}
-        book.measure("tool frame", label, "origin", far, "m", reach, values, slack=2, **more)
-        more = {"share": turn / math.pi, "keys": keys}
-        book.measure("tool frame", label, "axes", turn, "rad", math.pi, slack=4, **more)
-    paired = {group.name for pair in matching.pairs for group in (pair.left, pair.right)} | {
-        "world"
-    }
+        book.measure(
+            *("tool frame", label, "origin", far, "m", reach, values),
+            slack=2,
+            share=far / reach,
+            keys=keys,
+        )
+        book.measure(
+            *("tool frame", label, "axes", turn, "rad", math.pi),
+            slack=4,
+            share=turn / math.pi,
+            keys=keys,
+        )
+    paired = {group.name for pair in matching.pairs for group in (pair.left, pair.right)}
     for tree, known, which in ((left, {*named}, "left"), (right, {*named.values()}, "right")):
-        alone = [name for name in tree.frames if name not in known | paired]
+        alone = [name for name in tree.frames if name not in known | paired | {"world"}]
         if alone:
             yield f"only the {which} has the frames {few(alone, 8)} (--frame LEFT=RIGHT pairs two)"
 
@@ -161,9 +167,13 @@ def of_masses(
     hinge = joint is not None and joint.kind == "hinge"
     felt = zip(left.felt(pair.left.number), right.felt(pair.right.number), strict=True)
     inertia, load = (max((v for v in values if v > 0), default=0.0) for values in felt)
-    effect = "{share:.1%} of it" if matters else _STILL
-    more: Telling = {"matters": matters, "effect": effect, "keys": [("body", where, "mass")]}
-    book.enter("mass", where, "", (mine.mass, theirs.mass), "kg", slack=2, **more)
+    book.enter(
+        *("mass", where, "", (mine.mass, theirs.mass), "kg"),
+        slack=2,
+        matters=matters,
+        effect="{share:.1%} of it" if matters else _STILL,
+        keys=[("body", where, "mass")],
+    )
     if not heavy and not mine.tensor.any() and not theirs.tensor.any():
         return
     apart = float(np.linalg.norm(mine.com - theirs.com))

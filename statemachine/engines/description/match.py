@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import check_name
 from ...interface import Array
 from ...rotations import HERE, Placement
-from .records import Robot
+from .records import SCALAR, Robot
 from .tree import Group, GroupTree
 
 _NEAR, _TILT = 5e-3, 0.1  # [m] and [rad] within which two axes may be one
@@ -138,16 +138,15 @@ def match(left: GroupTree, right: GroupTree, *, one_world: bool = False) -> Matc
 
 def _bases(left: GroupTree, right: GroupTree) -> tuple[Group, Group]:
     """The roots; a base that floats in one file and stands still in the other is one too."""
-    for name, a in left.by_joint.items():
-        b = right.by_joint.get(name)
-        if b is None or a.parent < 0 or b.parent < 0:
-            continue
-        above = left.groups[a.parent], right.groups[b.parent]
-        floats = [bool(group.joint and group.joint.kind == "free") for group in above]
-        if floats[0] != floats[1] and above[floats[0]].parent < 0:
-            return above
-        break
-    return left.groups[0], right.groups[0]
+    carriers = (
+        (left.groups[a.parent], right.groups[right.by_joint[name].parent])
+        for name, a in left.by_joint.items()
+        if a.parent >= 0 and name in right.by_joint and right.by_joint[name].parent >= 0
+    )
+    roots = left.groups[0], right.groups[0]
+    above = next(carriers, roots)
+    floats = [bool(group.joint and group.joint.kind == "free") for group in above]
+    return above if floats[0] != floats[1] and above[floats[0]].parent < 0 else roots
 
 
 def _placed(
@@ -161,7 +160,7 @@ def _placed(
         hers = other.joint
         if hers is None or hers.kind != joint.kind or hers.name in left.by_joint:
             continue
-        if joint.kind in ("hinge", "slide"):
+        if joint.kind in SCALAR:
             (at, axis), (there, along) = _line(group, above.align), _line(other, HERE)
             apart = _apart(at, there, along)
             if apart < nearest and abs(axis @ along) > np.cos(_TILT):
@@ -218,7 +217,7 @@ def _errors(
     align: Placement,
 ) -> Iterator[float]:
     """How far apart [m] the features of two solids are that are laid on each other."""
-    if a.joint and b.joint and a.joint.kind in ("hinge", "slide"):
+    if a.joint and b.joint and a.joint.kind in SCALAR:
         yield float(np.linalg.norm(align.mat @ a.joint.axis - b.joint.axis)) / 10
         if a.joint.kind == "hinge":
             yield _apart(align.of(a.joint.anchor), b.joint.anchor, b.joint.axis)
@@ -226,7 +225,7 @@ def _errors(
         other = right.by_joint.get(child.joint.name) if child.joint else None
         if other is None or other.joint is None or other.parent != b.number:
             continue
-        if other.joint.kind in ("hinge", "slide"):
+        if other.joint.kind in SCALAR:
             (at, axis), (there, along) = _line(child, align), _line(other, HERE)
             yield _apart(at, there, along)
             yield float(np.linalg.norm(np.cross(axis, along))) / 10

@@ -149,16 +149,19 @@ def laid_on(shape: CollisionShape, other: CollisionShape) -> CollisionShape:
     """The other box with its axes called as this one's: one solid has six such names."""
     if shape.kind != other.kind or shape.kind not in ("box", "ellipsoid"):
         return other
-    choices = []
-    for order in permutations(range(3)):
+    most = float(np.linalg.norm(shape.size)) or 1.0
+
+    def turned(order: tuple[int, ...]) -> CollisionShape:
         mat = other.place.mat[:, order].copy()
         mat[:, 2] = np.cross(mat[:, 0], mat[:, 1])  # right-handed; a box has no inside out
         size = tuple(other.size[k] for k in order)
-        turned = replace(other, place=Placement(other.place.pos, mat), size=size)
-        most = float(np.linalg.norm(shape.size)) or 1.0
-        apart = float(np.linalg.norm(np.subtract(shape.size, size))) / most
-        choices.append((apart + angle_between(shape, turned), turned))
-    return min(choices, key=lambda choice: choice[0])[1]
+        return replace(other, place=Placement(other.place.pos, mat), size=size)
+
+    def unlike(box: CollisionShape) -> float:
+        sizes = np.subtract(shape.size, box.size)
+        return float(np.linalg.norm(sizes)) / most + angle_between(shape, box)
+
+    return min(map(turned, permutations(range(3))), key=unlike)
 
 
 def angle_between(shape: CollisionShape, other: CollisionShape) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...interface import Array
 from ...rotations import HERE, Placement
-from .records import CollisionShape, Inertial, Link, Robot, RobotJoint, moved
+from .records import SCALAR, CollisionShape, Inertial, Link, Robot, RobotJoint, moved
 from .shapes import with_capsules
 
 GRAVITY = 9.81  # [m/s²]
@@ -159,7 +159,7 @@ class GroupTree:
             [N or N·m]. Of a hinge: its axis level, and the centre of mass beside it.
         """
         joint, body = self.groups[number].joint, self.carried[number]
-        if joint is None or joint.kind not in ("hinge", "slide"):
+        if joint is None or joint.kind not in SCALAR:
             return math.nan, math.nan
         rotor, weight, arm = joint.armature or 0.0, body.mass * GRAVITY, body.com - joint.anchor
         if joint.kind == "slide":

@@ -94,9 +94,6 @@ class _Reader:
                 raise ModelError(f"link {child!r} hangs on two joints")
             hung[child] = (parent, joint)
         order = _order(list(elements), {child: parent for child, (parent, _) in hung.items()})
-        links = tuple(
-            self._link(name, elements[name], *hung.get(name, ("", None))) for name in order
-        )
         if root.find("transmission") is not None:
             self.notes.append(
                 "its <transmission> elements are for a controller and are not compared"
@@ -105,7 +102,9 @@ class _Reader:
             name="/".join(self.path.parts[-2:]),
             reader="its XML",
             format="URDF",
-            links=links,
+            links=tuple(
+                self._link(name, elements[name], *hung.get(name, ("", None))) for name in order
+            ),
             frames=(),
             actuators=None,
             settings=None,
@@ -142,8 +141,7 @@ class _Reader:
             scale = _numbers(solid, ".", "scale", 3, where, (1.0, 1.0, 1.0))
             points, trouble = self._read_mesh(file)
             if points is None:
-                note = f"the mesh {file!r} of {link} {trouble}: its size is not known"
-                self.notes.append(note)
+                self.notes.append(f"the mesh {file!r} of {link} {trouble}: its size is not known")
             else:
                 points = points * scale
         elif kind == "box":
@@ -286,9 +284,8 @@ def _matrix_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
 
 def _said(element: Element, path: str, attribute: str, where: str) -> float | None:
     """The number of an attribute of an element below; None where the file does not give it."""
-    part = element.find(path)
-    said = part is not None and part.get(attribute) is not None
-    return _number(element, path, attribute, where) if said else None
+    numbers = _numbers(element, path, attribute, 1, where, ())
+    return float(numbers[0]) if len(numbers) else None
 
 
 def _number(element: Element, path: str, attribute: str, where: str) -> float:

@@ -16,7 +16,6 @@ from .. import RawEngine, function_of
 
 if TYPE_CHECKING:
     from ...interface import Array, Data, Model
-    from ..description.records import Robot
 
 _OPTIONS = ("disableflags", "enableflags", "timestep", "gravity", "integrator")
 
@@ -31,7 +30,9 @@ class MujocoEngine(RawEngine):
     phrases = function_of(".mujoco.phrasebook:phrases")
     driver = function_of(".mujoco.audit:MujocoDriver")
     call_watch = function_of(".mujoco.calls:MujocoWatch")
+    read = function_of(".mujoco.description:read")
     read_file = function_of(".mujoco.description:read_file")
+    describe = function_of(".mujoco.description:describe")
     differences = function_of(".mujoco.differences:differences")
     sensors = function_of(".mujoco.differences:sensors")
     entries = function_of(".mujoco.differences:entries")
@@ -81,18 +82,6 @@ class MujocoEngine(RawEngine):
         """The solver of contacts begins with the accelerations "qacc" (nv,)."""
         if "qacc" in before:
             data.raw.qacc_warmstart[:] = before["qacc"]
-
-    def read(self, path: Path, name: str) -> Robot:
-        """What its compiler makes of it."""
-        from .description import loaded
-
-        return loaded(path, name, "engine")
-
-    def describe(self, compiled: Any, name: str) -> Robot:
-        """The description in an mjModel."""
-        from .description import description_of
-
-        return description_of(compiled, name, f"mujoco {require('mujoco').__version__}", "MJCF")
 
     def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
         """By mj_energyPos and mj_energyVel."""

@@ -57,7 +57,7 @@ class Geoms:
         on = [g for g in self._acting[side] if solids.head(solids.raw.geom_bodyid[g]) == head]
         return {g: replace(shapes.of(solids.raw, g), place=solids.on("geom", g)) for g in on}
 
-    def found(self) -> Iterator[ModelDifference]:
+    def differences(self) -> Iterator[ModelDifference]:
         """What they differ in."""
         for a, b in self.pairs:
             yield from self._shape(a, b)

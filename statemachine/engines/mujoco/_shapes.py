@@ -169,27 +169,20 @@ def identical(left: Any, ours: int, right: Any, theirs: int) -> bool:
 def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """What two height fields differ in."""
     left, right = sides.left, sides.right
-    ours, theirs = int(left.geom_dataid[a]), int(right.geom_dataid[b])
-    fields = (left, ours), (right, theirs)
-    grids = [(int(raw.hfield_nrow[h]), int(raw.hfield_ncol[h])) for raw, h in fields]
-    if grids[0] != grids[1]:
-        values = (("points", *(f"{rows} x {columns}" for rows, columns in grids)),)
+    (ours, grid, here), (theirs, other, there) = _field(left, a), _field(right, b)
+    if grid != other:
+        values = (("points", *(f"{rows} x {columns}" for rows, columns in (grid, other))),)
         why = "it is a height field of another size"
         yield sides.tell("heights", "geom", a, values, refused=why)
         return
-    starts = [int(raw.hfield_adr[h]) for raw, h in fields]
-    spans = [
-        slice(start, start + rows * columns)
-        for start, (rows, columns) in zip(starts, grids, strict=True)
-    ]
-    data = left.hfield_data[spans[0]], right.hfield_data[spans[1]]
+    data = left.hfield_data[here], right.hfield_data[there]
     sizes = left.hfield_size[ours], right.hfield_size[theirs]
     if same(*data) and same(*sizes):
         return
     # The heights of a field are from 0 to 1 of its largest.
     far = np.abs(data[0] * sizes[0][2] - data[1] * sizes[1][2]).max()
     edits: tuple[Edit, ...] = (
-        ("hfield_data", (spans[1],), np.array(data[0])),
+        ("hfield_data", (there,), np.array(data[0])),
         ("hfield_size", (theirs,), np.array(sizes[0])),
         *copies(("geom_size", "geom_rbound", "geom_aabb"), left, a, b),
     )
@@ -197,3 +190,12 @@ def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     why = "another geom has this height field, too" if users.sum() > 1 else ""
     values = (("farthest point", 0.0, float(far)),)
     yield sides.tell("heights", "geom", a, values, "m", () if why else edits, refused=why)
+
+
+def _field(raw: Any, geom: int) -> tuple[int, tuple[int, int], slice]:
+    """The height field of a geom: its id, its rows and columns, and where its data are."""
+    field = int(raw.geom_dataid[geom])
+    rows, columns, start = (
+        int(getattr(raw, f"hfield_{name}")[field]) for name in ("nrow", "ncol", "adr")
+    )
+    return field, (rows, columns), slice(start, start + rows * columns)

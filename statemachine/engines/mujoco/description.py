@@ -18,6 +18,7 @@ from ...backends import load
 from ...errors import ModelError
 from ...installed import require
 from ...interface import JointType
+from ...measures.text import few
 from ...rotations import HERE
 from ..description.records import (
     Actuator,
@@ -50,7 +51,7 @@ def read_file(path: Path, name: str) -> Robot:
     """
     suffix = path.suffix.lower()
     try:
-        return loaded(path, name, _FORMATS.get(suffix, "MJCF"))
+        return read(path, name, _FORMATS.get(suffix, "MJCF"))
     except ModelError:
         robot = _without_missing_meshes(path, name) if suffix not in _FORMATS else None
         if robot is None:
@@ -58,10 +59,9 @@ def read_file(path: Path, name: str) -> Robot:
         return robot
 
 
-def loaded(path: Path, name: str, form: str) -> Robot:
-    """What its compiler makes of a file, with its own defaults; `form` is what it is called."""
-    model = load(path, backend="mujoco", defaults="engine")
-    return description_of(model.raw, name, f"mujoco {model.engine_version}", form)
+def read(path: Path, name: str, form: str = "engine") -> Robot:
+    """What its compiler makes of a file, with its own defaults; the rest as of `describe`."""
+    return describe(load(path, backend="mujoco", defaults="engine").raw, name, form)
 
 
 def _without_missing_meshes(path: Path, name: str) -> Robot | None:
@@ -89,12 +89,11 @@ def _without_missing_meshes(path: Path, name: str) -> Robot | None:
         raw = spec.compile()
     except (ValueError, mujoco.FatalError):
         return None
-    robot = description_of(raw, name, f"mujoco {mujoco.__version__}", "MJCF")
-    files = sorted(mesh.file for mesh in missing.values())
-    more = f" and {len(files) - 5} more" if len(files) > 5 else ""
+    robot = describe(raw, name)
+    files = few(sorted(mesh.file for mesh in missing.values()), 5)
     note = (
-        f"the meshes {', '.join(files[:5])}{more} are not there: their sizes are not known, and "
-        "what they weigh is not counted where a body has no inertia of its own"
+        f"the meshes {files} are not there: their sizes are not known, and what they weigh is not "
+        "counted where a body has no inertia of its own"
     )
     links = tuple(
         replace(link, shapes=(*link.shapes, *lost.get(link.name, ()))) for link in robot.links
@@ -102,17 +101,17 @@ def _without_missing_meshes(path: Path, name: str) -> Robot | None:
     return replace(robot, links=links, notes=(*robot.notes, note))
 
 
-def description_of(raw: Any, name: str, reader: str, form: str) -> Robot:
+def describe(raw: Any, name: str, form: str = "MJCF") -> Robot:
     """The description in a compiled model.
 
     Args:
         raw: An mjModel.
         name: Of the file.
-        reader: What compiled it.
         form: The format of the file.
     """
+    mujoco = require("mujoco")
     # What the engine takes where a file says nothing.
-    empty = require("mujoco").MjModel.from_xml_string(
+    empty = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><geom type='sphere' size='1'/></worldbody></mujoco>"
     )
     actuators = tuple(_actuator(raw, i) for i in range(raw.nactuator))
@@ -132,7 +131,7 @@ def description_of(raw: Any, name: str, reader: str, form: str) -> Robot:
     )
     return Robot(
         name=name,
-        reader=reader,
+        reader=f"mujoco {mujoco.__version__}",
         format=form,
         links=tuple(links),
         frames=frames,

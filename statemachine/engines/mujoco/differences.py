@@ -51,7 +51,7 @@ def differences(
         *_options(left, right, world),
         *weights(sides),
         *places(sides),
-        *geoms.found(),
+        *geoms.differences(),
         *elements(sides),
         *equalities(sides),
         *drives(sides),
