@@ -19,6 +19,7 @@ import numpy as np
 from ... import models
 from ...errors import ModelError
 from ...interface import Array
+from ...measures.text import grouped
 from ...rotations import HERE, Placement
 from .records import CollisionShape, Follows, Inertial, Link, Robot, RobotJoint
 from .shapes import read_mesh, volume_of
@@ -193,9 +194,7 @@ def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
 
 def _order(names: list[str], parent: dict[str, str]) -> list[str]:
     """Parents before children, depth first, siblings as in the file."""
-    children: dict[str, list[str]] = {}
-    for name in reversed(names):
-        children.setdefault(parent.get(name, ""), []).append(name)
+    children = grouped((parent.get(name, ""), name) for name in reversed(names))
     waiting = children.pop("", [])
     if len(waiting) > 1:
         named = ", ".join(waiting[:-5:-1])
@@ -205,7 +204,7 @@ def _order(names: list[str], parent: dict[str, str]) -> list[str]:
         order.append(waiting.pop())
         waiting += children.pop(order[-1], [])
     if children:
-        left = next(name for name in names if name not in set(order))
+        left = next(name for name in names if name not in order)
         raise ModelError(f"its links go round in a circle, {left!r} among them")
     return order
 
@@ -265,21 +264,14 @@ def _origin(element: Element, where: str) -> Placement:
     zeros = (0.0, 0.0, 0.0)
     pos = _numbers(element, "origin", "xyz", 3, where, zeros)
     rpy = _numbers(element, "origin", "rpy", 3, where, zeros).tolist()
-    return Placement(pos, _matrix_from_rpy(*rpy))
-
-
-def _matrix_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
-    """Rz(yaw)·Ry(pitch)·Rx(roll), as the format defines its rpy."""
-    (sr, sp, sy), (cr, cp, cy) = (
-        [f(angle) for angle in (roll, pitch, yaw)] for f in (math.sin, math.cos)
-    )
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    (sr, sp, sy), (cr, cp, cy) = ([f(angle) for angle in rpy] for f in (math.sin, math.cos))
+    # Rz(yaw)·Ry(pitch)·Rx(roll), as the format defines its rpy.
+    mat = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return Placement(pos, np.array(mat))
 
 
 def _said(element: Element, path: str, attribute: str, where: str) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from ..records import BodyPair, Edit, ModelDifference
 from ._sides import NEAR, Sides, apart, copies, plain, quat_of, same, zeros
 
 _FREE, _BALL, _SLIDE, _HINGE = JointType
+# What a body weighs: the fields of each figure, and its unit.
 _WEIGHS = {
-    "mass": ("body_mass",),
-    "centre of mass": ("body_ipos",),
-    "inertia": ("body_inertia", "body_iquat"),
+    "mass": (("body_mass",), "kg"),
+    "centre of mass": (("body_ipos",), "m"),
+    "inertia": (("body_inertia", "body_iquat"), "kg m²"),
 }
 _DIAGONAL = "its mass matrix is stored as a diagonal"
 
@@ -57,9 +59,6 @@ def _differing(left: Inertial, right: Inertial) -> dict[str, tuple[str, Any, Any
     return figures
 
 
-_UNITS = {"mass": "kg", "centre of mass": "m", "inertia": "kg m²"}
-
-
 def _made_alike(sides: Sides, here: list[int], there: list[int]) -> bool:
     """Whether the bodies of a part are the same ones in the same places."""
     ours, theirs = sides.solids
@@ -82,16 +81,16 @@ def _of_body(
     fits = not right.body_simple[target] or simple
     back_fits = not simple and align is HERE
     for subject, values in _differing(wanted, sides.solids[1].inertial(target)).items():
-        edits, back, why = (), (), ""
+        (fields, unit), edits, back, why = _WEIGHS[subject], (), (), ""
         if subject == "mass" or fits:
             edits = _weighs(sides, subject, target, wanted)
             if subject == "inertia" and exact:
-                edits = copies(_WEIGHS[subject], left, pair.left, target)
+                edits = copies(fields, left, pair.left, target)
         elif back_fits:
-            back = copies(_WEIGHS[subject], right, pair.right, pair.left)
+            back = copies(fields, right, pair.right, pair.left)
         else:
             why = _DIAGONAL
-        yield sides.tell(subject, "body", pair.left, (values,), _UNITS[subject], edits, back, why)
+        yield sides.tell(subject, "body", pair.left, (values,), unit, edits, back, why)
 
 
 def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edit, ...]:
@@ -102,7 +101,7 @@ def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edi
     else:
         values = (there.mass if subject == "mass" else inner.of(there.com),)
     return tuple(
-        (name, (body,), value) for name, value in zip(_WEIGHS[subject], values, strict=True)
+        (name, (body,), value) for name, value in zip(_WEIGHS[subject][0], values, strict=True)
     )
 
 
@@ -110,16 +109,13 @@ def _lumped(sides: Sides, pair: BodyPair, there: Inertial, bodies: list[int]) ->
     """All of a part's inertia in its first body, none in those fixed to it."""
     differing = _differing(there, sides.solids[1].inertial(*bodies))
     subject = next(iter(differing))
-    edits: list[Edit] = []
-    for body in bodies:
-        if body != pair.right:
-            edits += zeros(("body_mass", "body_inertia"), sides.right, body)
-    for figure in _WEIGHS:
-        edits += _weighs(sides, figure, pair.right, there)
+    fixed = (body for body in bodies if body != pair.right)
+    emptied = [zeros(("body_mass", "body_inertia"), sides.right, body) for body in fixed]
+    filled = [_weighs(sides, figure, pair.right, there) for figure in _WEIGHS]
     why = _DIAGONAL if sides.right.body_simple[pair.right] else ""
     return sides.tell(
-        *(subject, "body", pair.left, differing.values(), _UNITS[subject]),
-        edits=() if why else edits,
+        *(subject, "body", pair.left, differing.values(), _WEIGHS[subject][1]),
+        edits=() if why else chain(*emptied, *filled),
         refused=why,
     )
 

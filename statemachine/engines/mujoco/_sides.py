@@ -52,12 +52,14 @@ def differing(
     """The figures of these that differ, by name; of a long array each entry that does."""
     figures: list[tuple[str, Any, Any]] = []
     for name, a, b in zip(names, left, right, strict=True):
-        word, size = name.partition("_")[2] or name, np.size(a)
-        if size <= _TOGETHER or np.shape(a) != np.shape(b):
-            figures += [] if same(a, b) else [(word, plain(a), plain(b))]
-        else:
-            places = [k for k in range(size) if not same(a[k], b[k])]
-            figures += [(f"{word}[{k}]", plain(a[k]), plain(b[k])) for k in places]
+        word, entries = name.partition("_")[2] or name, {"": (a, b)}
+        if np.size(a) > _TOGETHER and np.shape(a) == np.shape(b):
+            entries = {f"[{k}]": pair for k, pair in enumerate(zip(a, b, strict=True))}
+        figures += [
+            (word + place, plain(ours), plain(theirs))
+            for place, (ours, theirs) in entries.items()
+            if not same(ours, theirs)
+        ]
     return tuple(figures)
 
 
