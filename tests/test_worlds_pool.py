@@ -271,13 +271,13 @@ def test_memory_is_measured_and_no_process_is_left_by_a_refusal(
     model = sm.load("so101", backend="pybullet")
     monkeypatch.setattr(interface_worlds, "free_memory", lambda: 200 << 20)
     started: list[int] = []
-    starting = pool.PoolWorlds._fill
+    begin = pool.PoolWorlds._begun
 
-    def fill(worlds: Any) -> None:
+    def begun(worlds: Any, *arguments: Any) -> Any:
         started.extend(pids(worlds))
-        starting(worlds)
+        return begin(worlds, *arguments)
 
-    monkeypatch.setattr(pool.PoolWorlds, "_fill", fill)
+    monkeypatch.setattr(pool.PoolWorlds, "_begun", begun)
     with pytest.raises(EngineError, match=r"takes [23]\d MB, and 0.2 GB are free: make 1[0-3] "):
         make_worlds(model, 1000, workers=2)
     assert len(started) == 3

@@ -15,6 +15,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from ..errors import refuse
 from ..interface import DERIVED, INPUTS
 from .watch import EngineRun, Inputs, StudentWatch
 
@@ -199,11 +200,15 @@ def _is(value: Any, hint: Any) -> bool:
 
 def _array(dtype: str, shape: list[int], data: str) -> Any:
     kind = np.dtype(dtype)
-    if kind.kind not in "biuf" or kind.itemsize > 8 or kind.shape:
-        raise ValueError("an array of no numbers")
     content = base64.b64decode(data, validate=True)
-    negative = any(size < 0 for size in shape)
-    if negative or len(shape) > 16 or math.prod(shape) * kind.itemsize != len(content):
-        raise ValueError("an array of another size")
+    negative, size = any(length < 0 for length in shape), math.prod(shape) * kind.itemsize
+    refuse(
+        (
+            kind.kind not in "biuf" or kind.itemsize > 8 or kind.shape,
+            "an array of no numbers",
+        ),
+        (negative or len(shape) > 16 or size != len(content), "an array of another size"),
+        error=ValueError,
+    )
     array = np.frombuffer(content, kind).reshape(shape)
     return array.astype(kind.newbyteorder("="))

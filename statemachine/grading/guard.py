@@ -57,7 +57,7 @@ class Guard:
         )  # fmt: skip
         self._open = tuple(os.path.realpath(place) + os.sep for place in places)
         self._file, self._own, self._tell = file, os.path.realpath(own) + os.sep, tell
-        self._told: set[tuple[str, str]] = set()
+        self._reported: set[tuple[str, str]] = set()
         sys.addaudithook(self._hear)
 
     def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
@@ -81,8 +81,8 @@ class Guard:
                 self._once("reads", path)
 
     def _once(self, kind: str, text: str) -> None:
-        if (kind, text) not in self._told:
-            self._told.add((kind, text))
+        if (kind, text) not in self._reported:
+            self._reported.add((kind, text))
             self._tell(kind, text)
 
 

@@ -76,7 +76,7 @@ class Scenes:
     def __init__(self, backend: str, folder: Path) -> None:
         self._backend = backend
         self._folder = folder
-        self._made: dict[str, Model] = {}
+        self._models: dict[str, Model] = {}
 
     def ordinary(self, name: str) -> Model:
         """The course's own scene, without what is only seen."""
@@ -91,14 +91,14 @@ class Scenes:
 
     def _load(self, name: str, kind: str, edit: Callable[[ElementTree.Element], None]) -> Model:
         file = self._folder / f"{kind}_{name.rpartition('/')[2]}.xml"
-        if file.name not in self._made:
+        if file.name not in self._models:
             path = resolve(name)
             root, _ = with_includes(parse(path), path)
             _bare(root)
             edit(root)
             ElementTree.ElementTree(root).write(file)
-            self._made[file.name] = load(file, backend=self._backend)
-        return self._made[file.name]
+            self._models[file.name] = load(file, backend=self._backend)
+        return self._models[file.name]
 
 
 def _bare(root: ElementTree.Element) -> None:

@@ -94,12 +94,16 @@ def play(envs: ArmVectorEnv, policy: Policy, seed: int) -> Episodes:
     steps = np.zeros(n, dtype=np.int64)
     while going.any():
         seen, rewards, terminated, truncated, infos = envs.step(policy(seen))
-        told = infos.get("final_info", infos)
+        final = infos.get("final_info", infos)
         returned[going] += rewards[going]
         steps += going
-        for kept, name in ((distance, "distance"), (success, "is_success"), (diverged, "diverged")):
-            np.copyto(kept, infos[name], where=going)
-            if told is not infos:
-                np.copyto(kept, told[name], where=going & told[f"_{name}"])
+        for array, name in (
+            (distance, "distance"),
+            (success, "is_success"),
+            (diverged, "diverged"),
+        ):
+            np.copyto(array, infos[name], where=going)
+            if final is not infos:
+                np.copyto(array, final[name], where=going & final[f"_{name}"])
         going &= ~(terminated | truncated)
     return Episodes(returned, distance, success, steps, diverged)

@@ -222,8 +222,8 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
             "is_success": outcome.success & which,
             "diverged": diverged & which,
         }
-        return {key: value for name, each in facts.items()
-                for key, value in ((name, each), (f"_{name}", which.copy()))}  # fmt: skip
+        return {key: value for name, fact in facts.items()
+                for key, value in ((name, fact), (f"_{name}", which.copy()))}  # fmt: skip
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:
@@ -234,4 +234,4 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         if not listed or len(seed) != self.num_envs:
             got = len(seed) if listed else shown(seed)
             raise BadInputError(f"seed wants {self.num_envs} seeds, or one; got {got}")
-        return [int(each) if isinstance(each, np.integer) else each for each in seed]
+        return [int(own) if isinstance(own, np.integer) else own for own in seed]

@@ -12,7 +12,7 @@ from ..errors import BadInputError, check_name
 from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
 from ..kinematics import Kind
 from ..measures.readings import readings
-from ..runs.commands import is_servo, load_at_start, start_keyframe
+from ..runs.commands import farther, is_servo, load_at_start, start_keyframe
 from ..runs.robot import carried_by, scalar_joint
 from ..witness import labels
 
@@ -95,11 +95,8 @@ def usual_value(model: Model, joint: str) -> float:
         return _VALUE
     with make_data(model) as data:
         start = float(data.qpos[at.place])
-    shift = _SHIFT
-    if limited and low < high:  # a quarter of the range, towards the farther end
-        start = min(max(start, low), high)
-        shift = (high - low) / 4 if high - start >= start - low else (low - high) / 4
-    return float(f"{start + shift:.3g}")
+    value = farther(start, (low, high)) if limited and low < high else start + _SHIFT
+    return float(f"{value:.3g}")
 
 
 class Tip(NamedTuple):

@@ -106,7 +106,7 @@ def _left_to_groups() -> Iterator[int]:
         _, controllers, group = line.split(":", 2)
         if controllers not in _VERSIONS:
             continue
-        mount, limit, used, kept = _VERSIONS[controllers]
+        mount, limit, used, inactive = _VERSIONS[controllers]
         root = Path("/sys/fs/cgroup") / mount
         place = root / group.strip("/")
         for folder in (place, *place.parents[: len(place.parts) - len(root.parts)]):
@@ -115,7 +115,7 @@ def _left_to_groups() -> Iterator[int]:
                     int((folder / name).read_text(encoding="ascii")) for name in (limit, used)
                 )
                 stat = (folder / "memory.stat").read_text(encoding="ascii").split()
-                yield most - now + int(stat[stat.index(kept) + 1])
+                yield most - now + int(stat[stat.index(inactive) + 1])
 
 
 def resident_memory() -> int:

@@ -206,9 +206,9 @@ def cpu_of(process: subprocess.Popen[bytes]) -> float:
     total = 0.0
     with suppress(psutil.Error):
         first = psutil.Process(process.pid)
-        for each in (first, *first.children(recursive=True)):
+        for running in (first, *first.children(recursive=True)):
             with suppress(psutil.Error):
-                times = each.cpu_times()
+                times = running.cpu_times()
                 total += times.user + times.system
     return total
 
@@ -277,14 +277,14 @@ def _end_all(process: subprocess.Popen[bytes], token: str) -> None:
     deadline = time.monotonic() + _PATIENCE
     first = True
     while True:
-        found = [int(each.name) for each in _relatives(process.pid, token)]
+        relatives = [int(entry.name) for entry in _relatives(process.pid, token)]
         if process.returncode is None:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)
-        for pid in found:
+        for pid in relatives:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
-        if time.monotonic() > deadline or not (found or first):
+        if time.monotonic() > deadline or not (relatives or first):
             return
         first = False  # what was being forked meanwhile shows in the next round
         time.sleep(0.002)
@@ -293,7 +293,7 @@ def _end_all(process: subprocess.Popen[bytes], token: str) -> None:
 def _relatives(leader: int, token: str) -> set[Path]:
     """Living processes of the session, or that carry the token, in /proc; without it, none."""
     mark = f"{_TOKEN}={token}".encode()
-    found = set()
+    relatives = set()
     for entry in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):  # it ended meanwhile, or is another user's
             # After the name in brackets, which may hold anything.
@@ -302,8 +302,8 @@ def _relatives(leader: int, token: str) -> set[Path]:
             if state not in b"ZX" and (
                 session == leader or mark in (entry / "environ").read_bytes()
             ):
-                found.add(entry)
-    return found
+                relatives.add(entry)
+    return relatives
 
 
 def _start_of(file: Any, most: int) -> str:

@@ -68,7 +68,7 @@ def hold_ctrl(model: Model) -> Array:
         if servos[i]:
             begin = ctrl[i] if key else float(qpos[model.jnt_qposadr[joint]] * gear)
             most = _FARTHEST[JointType(int(model.jnt_type[joint]))] * abs(gear)
-            ctrl[i] = _farther(begin, _reachable(model, i), most)
+            ctrl[i] = farther(begin, _reachable(model, i), most)
         elif load is not None and _holds(model, i):
             force = load[model.jnt_dofadr[joint]] / np.count_nonzero(model.actuator_jntid == joint)
             if abs(force) > _NO_FORCE:
@@ -113,7 +113,7 @@ def _reachable(model: Model, i: int) -> tuple[float, float]:
     return low, high
 
 
-def _farther(begin: float, ends: tuple[float, float], most: float) -> float:
+def farther(begin: float, ends: tuple[float, float], most: float = np.inf) -> float:
     """A step from a beginning towards the farther of two ends."""
     low, high = ends
     begin = min(max(begin, low), high)

@@ -86,9 +86,13 @@ def parameters_of(spec: str) -> tuple[str, ...]:
     except ValueError:  # something of C's without a signature
         return ()
     kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
-    takes = [each.name for each in given if each.kind in kinds][: len(_TAKES)]
+    takes = [parameter.name for parameter in given if parameter.kind in kinds][: len(_TAKES)]
     named = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
-    return tuple(each.name for each in given if each.kind in named and each.name not in takes)
+    return tuple(
+        parameter.name
+        for parameter in given
+        if parameter.kind in named and parameter.name not in takes
+    )
 
 
 def function_file(spec: str) -> Path:

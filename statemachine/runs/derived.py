@@ -32,7 +32,7 @@ def derived(
         than the step before them left.
     """
     rows = len(inputs["time"])
-    kept: dict[str, list[Array]] = {name: [] for name in _TOLD}
+    arrays: dict[str, list[Array]] = {name: [] for name in _TOLD}
     contacts: dict[str, list[Any]] = {name: [] for name in CONTACTS}
     # After a step, derived values are of the state before its last engine step: with one of
     # those they are of the row that began it. With more, they must be asked for before.
@@ -46,17 +46,17 @@ def derived(
                 data.time = float(inputs["time"][k])
             if not after:
                 forward(model, data)
-                _read(data, k, kept, contacts)
+                _read(data, k, arrays, contacts)
             if k < rows - 1:
                 step(model, data)
             elif after:
                 _one_more(model, data)
             if after:
-                _read(data, k, kept, contacts)
+                _read(data, k, arrays, contacts)
             if k % 32 == 0:
                 progress(k / rows)
     progress(1.0)
-    columns: dict[str, Any] = {name: np.array(values) for name, values in kept.items()}
+    columns: dict[str, Any] = {name: np.array(values) for name, values in arrays.items()}
     for name, width in CONTACTS.items():
         kind = np.int64 if name in ("contact_row", "contact_geom") else np.float64
         rows_of = [np.reshape(part, (-1, *width)) for part in contacts[name]]
@@ -96,9 +96,9 @@ def array_or_nan(data: Data, name: str) -> Array:
 
 
 def _read(
-    data: Data, row: int, kept: dict[str, list[Array]], contacts: dict[str, list[Any]]
+    data: Data, row: int, arrays: dict[str, list[Array]], contacts: dict[str, list[Any]]
 ) -> None:
-    for name, values in kept.items():
+    for name, values in arrays.items():
         values.append(array_or_nan(data, name))
     touching = data.contacts
     if len(touching):

@@ -216,29 +216,29 @@ def _text(value: Any) -> bool:
 
 
 def _number(value: Any) -> bool:
-    return isinstance(value, float) or _whole(value)
+    return isinstance(value, float) or _integer(value)
 
 
 def _finite(value: Any) -> bool:
     return _number(value) and math.isfinite(value) and abs(value) <= HUGE
 
 
-def _whole(value: Any) -> bool:
+def _integer(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
 
 
-def _each(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+def _tuple_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, tuple) and all(map(fits, value))
 
 
 def _option(name: str, value: Any) -> bool:
     """Whether `Model.replace` might take this; it looks closer."""
-    known = isinstance(value, bool) or _text(value) or _finite(value) or _each(_finite)(value)
+    known = isinstance(value, bool) or _text(value) or _finite(value) or _tuple_of(_finite)(value)
     return name in OPTIONS and known
 
 
 def _count(value: Any) -> bool:
-    return _whole(value) and 0 <= value < 10**6
+    return _integer(value) and 0 <= value < 10**6
 
 
 _KINDS: dict[str, Callable[[Any], bool]] = {
@@ -255,21 +255,21 @@ _KINDS: dict[str, Callable[[Any], bool]] = {
         isinstance(value, dict) and all(_option(name, each) for name, each in value.items())
     ),
     "keyframe": lambda value: value is None or _text(value),
-    "gravity": lambda value: _each(_finite)(value) and len(value) == 3,
-    "joints": _each(_text),
-    "sites": _each(_text),
-    "bodies": _each(_text),
-    "geoms": _each(_text),
-    "actuators": _each(_text),
-    "jnt_type": _each(_whole),
-    "jnt_qposadr": _each(_whole),
-    "jnt_dofadr": _each(_whole),
-    "geom_bodyid": _each(_whole),
-    "body_parentid": _each(_whole),
-    "actuator_jntid": _each(_whole),
-    "ctrlrange": _each(lambda row: _each(_number)(row) and len(row) == 2),
+    "gravity": lambda value: _tuple_of(_finite)(value) and len(value) == 3,
+    "joints": _tuple_of(_text),
+    "sites": _tuple_of(_text),
+    "bodies": _tuple_of(_text),
+    "geoms": _tuple_of(_text),
+    "actuators": _tuple_of(_text),
+    "jnt_type": _tuple_of(_integer),
+    "jnt_qposadr": _tuple_of(_integer),
+    "jnt_dofadr": _tuple_of(_integer),
+    "geom_bodyid": _tuple_of(_integer),
+    "body_parentid": _tuple_of(_integer),
+    "actuator_jntid": _tuple_of(_integer),
+    "ctrlrange": _tuple_of(lambda row: _tuple_of(_number)(row) and len(row) == 2),
     "energy_by": _text,
-    "rewritten": _whole,
+    "rewritten": _integer,
     "ended": _text,
     "single": lambda value: isinstance(value, bool),
 }
@@ -281,8 +281,8 @@ _OF_PROVENANCE: dict[str, Callable[[Any], bool]] = {
     "model_file": _text,
     "model_sha256": _text,
     "timestep": _number,
-    "emulated": _each(_text),
-    "seed": lambda value: value is None or _whole(value),
+    "emulated": _tuple_of(_text),
+    "seed": lambda value: value is None or _integer(value),
 }
 
 

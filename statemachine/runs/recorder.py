@@ -92,13 +92,13 @@ def record(
     columns: dict[str, Any] = dict(inputs)
     rewritten, energy_by = 0, ""
     if derive:
-        told, rewritten = derived(model, begin, inputs, part_of(progress, share, 1.0 - share))
+        more, rewritten = derived(model, begin, inputs, part_of(progress, share, 1.0 - share))
         if rewritten and (controller is None or not writes_state):
             raise EngineError(
                 f"the run could not be repeated: {rewritten} rows began in another state; the "
                 "engine does not give the same bits twice"
             )
-        columns |= told
+        columns |= more
         columns["energy"], energy_by = energies(
             model, defaults, inputs["qpos"], inputs["qvel"], (options or {}).get("gravity")
         )

@@ -89,16 +89,12 @@ def touching(
 
     Without `bodies`, whatever touches; with `each_other`, also what of them touches one another.
     """
-    pairs = contacts.geom.tolist()
+    geoms = contacts.geom
     if bodies is not None:
-        owners = [[int(model.geom_bodyid[geom]) in bodies for geom in pair] for pair in pairs]
-        pairs = [
-            pair
-            for pair, (one, two) in zip(pairs, owners, strict=True)
-            if one != two or (one and each_other)
-        ]
-    names = ContactNames.of(model) if pairs else None
-    return tuple(dict.fromkeys(names.geoms(*pair) for pair in pairs)) if names else ()
+        inside = np.isin(model.geom_bodyid[geoms], list(bodies)).sum(axis=1)
+        geoms = geoms[(inside == 1) | (each_other & (inside == 2))]
+    names = ContactNames.of(model) if len(geoms) else None
+    return tuple(dict.fromkeys(names.geoms(*pair) for pair in geoms.tolist())) if names else ()
 
 
 def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:

@@ -32,29 +32,36 @@ def check_shapes(header: Header, shapes: Mapping[str, tuple[int, ...]]) -> None:
         TraceError: One is not.
     """
     rows = shapes.get("time", ())
-    if len(rows) != 1 or not rows[0]:
-        raise TraceError("a trace has at least one row, and a column 'time'")
+    known = {*COLUMNS, *CONTACTS}
+    refuse(
+        (len(rows) != 1 or not rows[0], "a trace has at least one row, and a column 'time'"),
+        *((name not in known, f"a trace has no column {name[:40]!r}") for name in shapes),
+        *((name not in shapes, f"a trace needs the column {name!r}") for name in INPUTS),
+        error=TraceError,
+    )
     for name, shape in shapes.items():
-        if name not in COLUMNS and name not in CONTACTS:
-            raise TraceError(f"a trace has no column {name[:40]!r}")
         first = shapes.get("contact_row", ()) if name in CONTACTS else rows
         expected = (*first[:1], *header.shape(name))
         if shape != expected:
             raise TraceError(f"column {name!r} has shape {shape}; expected {expected}")
-    for name in INPUTS:
-        if name not in shapes:
-            raise TraceError(f"a trace needs the column {name!r}")
 
 
 def _check_entries(name: str, array: NDArray[Any]) -> None:
     """Inputs are numbers that an engine takes; the rest may be NaN, which is not told."""
-    if name in INPUTS and not np.isfinite(array).all():
-        raise TraceError(f"column {name!r} has an entry that is not a finite number")
     most = HUGE if name in INPUTS else LARGEST
     # fmax and fmin pass over NaN.
     ends = np.fmin.reduce(array, None, initial=0), np.fmax.reduce(array, None, initial=0)
-    if not -most <= ends[0] <= ends[1] <= most:
-        raise TraceError(f"column {name!r} has an entry beyond {most:g}")
+    refuse(
+        (
+            name in INPUTS and not np.isfinite(array).all(),
+            f"column {name!r} has an entry that is not a finite number",
+        ),
+        (
+            not -most <= ends[0] <= ends[1] <= most,
+            f"column {name!r} has an entry beyond {most:g}",
+        ),
+        error=TraceError,
+    )
 
 
 def check_size(unfolded: int, path: Path) -> None:

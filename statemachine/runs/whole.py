@@ -64,8 +64,8 @@ def beside(*targets: Path) -> Iterator[list[str]]:
                     target.unlink(missing_ok=True)
             for name, target in zip(names, targets, strict=True):
                 if _special(target):
-                    with open(name, "rb") as made, open(target, "wb") as out:
-                        shutil.copyfileobj(made, out)
+                    with open(name, "rb") as part, open(target, "wb") as out:
+                        shutil.copyfileobj(part, out)
                 else:
                     os.replace(name, target)
         except OSError as error:

@@ -116,9 +116,9 @@ def _factorial(design: Design, figures: Array) -> Sensitivity | None:
     cube = figures.reshape(*(len(vary.values) for vary in design.factors), -1)
     levels = _without_holes(cube)
     left_out = [
-        f"{vary.label} = {', '.join(str(v) for k, v in enumerate(vary.values) if k not in kept)}"
-        for vary, kept in zip(design.factors, levels, strict=True)
-        if len(kept) < len(vary.values)
+        f"{vary.label} = {', '.join(str(v) for k, v in enumerate(vary.values) if k not in present)}"
+        for vary, present in zip(design.factors, levels, strict=True)
+        if len(present) < len(vary.values)
     ]
     note = "A full factorial has no holes: what has failed cells is left out ({})."
     notes = [note.format("; ".join(left_out))] if left_out else []

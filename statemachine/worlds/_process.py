@@ -65,8 +65,8 @@ class WorldsProcess(PipedChild):
             frame = os.read(self.out.fileno(), ANSWER.size)
             if len(frame) < ANSWER.size:
                 raise EOFError
-            told, size = ANSWER.unpack(frame)
-            if told == number:
+            answered, size = ANSWER.unpack(frame)
+            if answered == number:
                 place = self._place
                 return pickle.loads(self._block.memory[place : place + size]) if size else {}
 

@@ -88,9 +88,9 @@ class Holder:
     def __init__(self, inbox: Inbox, memory: Any, number: int) -> None:
         self._inbox, self._memory, self._number = inbox, memory, number
         self._models: list[Model] = []
-        self._made: dict[bytes, Model] = {}  # by the options that they differ in
+        self._variants: dict[bytes, Model] = {}  # by the options that they differ in
         self._data: list[Data] = []
-        self._told: list[tuple[type[Warning], str]] = []
+        self._warnings: list[tuple[type[Warning], str]] = []
 
     def answer(self, command: Command) -> dict[str, Any]:
         """Do what was asked; what came of it, without what is nothing."""
@@ -112,14 +112,16 @@ class Holder:
         if self._errors:
             errors = self._errors.items()
             answer["errors"] = {self._world(k): portable_error(error) for k, error in errors}
-        if self._told:
-            answer["warnings"] = [(portable(kind, UserWarning), text) for kind, text in self._told]
-            self._told.clear()
+        if self._warnings:
+            answer["warnings"] = [
+                (portable(kind, UserWarning), text) for kind, text in self._warnings
+            ]
+            self._warnings.clear()
         return answer
 
     def warn(self, message: Warning, kind: type[Warning], *_: Any, **__: Any) -> None:
         """Keep a warning for the answer; in place of `warnings.showwarning`."""
-        self._told.append((kind, str(message)))
+        self._warnings.append((kind, str(message)))
 
     def write(self, answer: dict[str, Any]) -> int:
         """Put an answer where it is looked for; how many bytes it has."""
@@ -147,8 +149,8 @@ class Holder:
         self._make(1)
         first = resident_memory()
         self._make(2)
-        each = resident_memory() - first if len(self._data) == 2 else 0
-        return {"each": each, "left": self._all - len(self._data)}
+        of_one = resident_memory() - first if len(self._data) == 2 else 0
+        return {"each": of_one, "left": self._all - len(self._data)}
 
     @property
     def _all(self) -> int:
@@ -164,9 +166,9 @@ class Holder:
             world = self._world(len(self._data))
             options = {name: values[world] for name, values in self._options.items()}
             key = pickle.dumps(options)
-            if key not in self._made:
-                self._made[key] = self._model.replace(**options) if options else self._model
-            model = self._made[key]
+            if key not in self._variants:
+                self._variants[key] = self._model.replace(**options) if options else self._model
+            model = self._variants[key]
             self._data.append(make_data(model))
             self._models.append(model)
             self._take(len(self._data) - 1)
@@ -187,12 +189,12 @@ class Holder:
         self._ctrl[world], self._time[world] = data.ctrl, data.time
 
     def _step(self, nstep: int, _: Any, places: Sequence[int]) -> None:
-        self._each(places, lambda place: step(self._models[place], self._data[place], nstep))
+        self._for_all(places, lambda place: step(self._models[place], self._data[place], nstep))
 
     def _forward(self, _argument: int, _: Any, places: Sequence[int]) -> None:
-        self._each(places, lambda place: forward(self._models[place], self._data[place]))
+        self._for_all(places, lambda place: forward(self._models[place], self._data[place]))
 
-    def _each(self, places: Sequence[int], call: Callable[[int], None]) -> None:
+    def _for_all(self, places: Sequence[int], call: Callable[[int], None]) -> None:
         """Call something for each world that is meant; what it raises ends this world."""
         inbox = self._inbox
         for place in places:
@@ -254,7 +256,7 @@ class Holder:
                     array[world, row] = getattr(data, name)
                 self._rows[world] = row + 1
 
-        self._each(places, run)
+        self._for_all(places, run)
 
     def _derive(self, _argument: int, name: str, places: Sequence[int]) -> None:
         rows = self._arrays[name]

@@ -103,7 +103,7 @@ def draw(
     number = whole_number(seed)
     if number is None or number < 0:
         raise BadInputError(f"seed must be a whole number of at least 0; got {shown(seed)}")
-    found: dict[str, Any] = {}  # of arrays; typed so that make_worlds takes it by **
+    options: dict[str, Any] = {}  # of arrays; typed so that make_worlds takes it by **
     for name, given in ranges.items():
         check_name("option to draw", name, _NOMINAL)
         of = _range(name, given)
@@ -112,8 +112,8 @@ def draw(
         # A stream for each option; rows are drawn one after the other.
         stream = np.random.default_rng([number, *name.encode()])
         parts = stream.random((n, len(nominal) if of.each else 1))
-        found[name] = of.at(parts) * nominal
-    return found
+        options[name] = of.at(parts) * nominal
+    return options
 
 
 def _range(name: str, given: Uniform | tuple[float, float]) -> Uniform:

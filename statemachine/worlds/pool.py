@@ -84,7 +84,7 @@ class PoolWorlds(Worlds):
         job["layout"], end = laid_out(shapes, self._answers + workers * ANSWER_MOST)
         self._block = SharedBlock(end)
         arrays = arrays_in(self._block.memory, job["layout"])
-        self._options, self._job, self._replaced = options, job, dict[int, Model]()
+        self._options, self._replaced = options, dict[int, Model]()
         self._chosen: Any = arrays.pop("ids")
         self._rows: Any = arrays.pop("rows")
         self._count, self._warned = 0, set[tuple[Any, str]]()
@@ -92,13 +92,16 @@ class PoolWorlds(Worlds):
         self._layouts: list[Any] = []  # of the States, by process
         self._end = weakref.finalize(self, end_all, self._processes, os.getpid())
         super().__init__(model, n, workers, derived, arrays)
-        self._kept = {name: vars(self)[name] for name in derived}
+        self._derived_arrays = {name: vars(self)[name] for name in derived}
         try:
             for number in range(workers):
                 worlds = range(number, n, workers)
                 process = WorldsProcess(number, worlds, self._block, self._answers)
                 self._processes.append(process)
-            self._fill()
+            begun = self._begun("start", self._answers, job)
+            left = sum(process["left"] for process in begun)
+            check_memory(n, max(process["each"] for process in begun), n - left)
+            self._layouts = self._begun("fill")
         except BaseException:
             self._end()
             raise
@@ -110,13 +113,6 @@ class PoolWorlds(Worlds):
             options = {name: values[world] for name, values in self._options.items()}
             self._replaced[world] = self.model.replace(**options)
         return self._replaced[world]
-
-    def _fill(self) -> None:
-        """Let the processes make their Data."""
-        told = self._begun("start", self._answers, self._job)
-        left = sum(process["left"] for process in told)
-        check_memory(self.n, max(process["each"] for process in told), self.n - left)
-        self._layouts = self._begun("fill")
 
     def _begun(self, verb: str, argument: int = 0, payload: Any = None) -> list[Any]:
         """What all processes say as they start, or raise what keeps one from it."""
@@ -131,7 +127,7 @@ class PoolWorlds(Worlds):
 
     def _close(self) -> None:
         self._end()
-        self._kept.clear()
+        self._derived_arrays.clear()
         self._chosen = self._rows = np.zeros(0)
         self._block.close()
 
@@ -198,17 +194,13 @@ class PoolWorlds(Worlds):
             errors |= answer.get("errors", {})
             raised, value = raised or answer.get("error"), answer.get("value")
             for kind, text in answer.get("warnings", ()):
-                self._warn(kind, text)
+                if (kind, text) not in self._warned:  # once for all worlds
+                    self._warned.add((kind, text))
+                    warnings.warn(text, kind, stacklevel=7)
         if raised:
             self._errors.update(errors)
             raise raised
         return errors, value
-
-    def _warn(self, kind: type[Warning], text: str) -> None:
-        """Say what an engine warned of, once for all worlds."""
-        if (kind, text) not in self._warned:
-            self._warned.add((kind, text))
-            warnings.warn(text, kind, stacklevel=8)
 
     def _forget(self) -> None:
         """What is derived is another from now on."""
@@ -218,7 +210,7 @@ class PoolWorlds(Worlds):
 
     def __getattr__(self, name: str) -> Any:  # only for what is not there
         own = vars(self)
-        if name not in own.get("_kept", ()):
+        if name not in own.get("_derived_arrays", ()):
             return super().__getattr__(name)
         self._refuse_if_troubled()
         if self._process != os.getpid():
@@ -232,8 +224,8 @@ class PoolWorlds(Worlds):
             ids = ids[~np.isin(ids, list(self._errors))]
         if len(ids):
             self._ask(ids, "derive", payload=name)
-        vars(self)[name] = self._kept[name]
-        return self._kept[name]
+        vars(self)[name] = self._derived_arrays[name]
+        return self._derived_arrays[name]
 
     def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
         self._forget()

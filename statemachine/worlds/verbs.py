@@ -59,12 +59,12 @@ def make_worlds(
     n = as_count(n, "n")
     workers = min(checked_jobs(None) if workers is None else as_count(workers, "workers"), n)
     names = _names(derived, "derived array", BATCHED)
-    each = _options(model, n, options)
-    worlds = model._make_worlds(n, workers, names, each)
+    checked = _options(model, n, options)
+    worlds = model._make_worlds(n, workers, names, checked)
     if worlds is None:
         from .pool import PoolWorlds
 
-        worlds = PoolWorlds(model, n, workers, names, each)
+        worlds = PoolWorlds(model, n, workers, names, checked)
     return worlds
 
 
@@ -230,12 +230,14 @@ def record(
 
 def _run(worlds: Worlds, call: Any, ids: Ints, *args: Any) -> None:
     """Call a hook, and tell of the worlds that are left out from now on."""
-    errors = alone(worlds, _kept, worlds, call, ids, args)
+    errors = alone(worlds, _checked_call, worlds, call, ids, args)
     if errors:
-        warnings.warn(_told(worlds, errors), DivergedWarning, stacklevel=3)
+        warnings.warn(_warning_text(worlds, errors), DivergedWarning, stacklevel=3)
 
 
-def _kept(worlds: Worlds, call: Any, ids: Ints, args: tuple[Any, ...]) -> Mapping[int, Exception]:
+def _checked_call(
+    worlds: Worlds, call: Any, ids: Ints, args: tuple[Any, ...]
+) -> Mapping[int, Exception]:
     worlds._check_time(ids)
     errors = call(ids, *args)
     if errors:
@@ -243,14 +245,13 @@ def _kept(worlds: Worlds, call: Any, ids: Ints, args: tuple[Any, ...]) -> Mappin
     return errors
 
 
-def _told(worlds: Worlds, errors: Mapping[int, Exception]) -> str:
+def _warning_text(worlds: Worlds, errors: Mapping[int, Exception]) -> str:
     """'3 of 1024 worlds diverged and are left out: 17 (qpos[2] (elbow) at 0.34 s), …'."""
-    each = [f"{world} ({_entry(worlds, errors[world])})" for world in sorted(errors)]
-    more = f" and {len(each) - _SHOWN} more" if len(each) > _SHOWN else ""
-    verbs = ("diverged", "is") if len(each) == 1 else ("diverged", "are")
+    entries = [f"{world} ({_entry(worlds, errors[world])})" for world in sorted(errors)]
+    more = f" and {len(entries) - _SHOWN} more" if len(entries) > _SHOWN else ""
     return (
-        f"{len(each)} of {worlds.n} worlds {verbs[0]} and {verbs[1]} left out until reset or "
-        f"set_state: {', '.join(each[:_SHOWN])}{more}"
+        f"{len(entries)} of {worlds.n} worlds diverged and {'is' if len(entries) == 1 else 'are'} "
+        f"left out until reset or set_state: {', '.join(entries[:_SHOWN])}{more}"
     )
 
 

@@ -164,8 +164,8 @@ def examine(
         backend=backend,
         engine_version=version,
         tests=healthy.tests,
-        failures=_told(healthy),
-        trials=tuple(MutantTrial(m, _told(records[m.name])) for m in mutants if records),
+        failures=_failures_of(healthy),
+        trials=tuple(MutantTrial(m, _failures_of(records[m.name])) for m in mutants if records),
     )
 
 
@@ -206,7 +206,7 @@ class _Record:
     failures: dict[str, str]
 
 
-def _told(record: _Record) -> tuple[Failure, ...]:
+def _failures_of(record: _Record) -> tuple[Failure, ...]:
     return tuple(Failure(test, why) for test, why in record.failures.items())
 
 
