@@ -14,6 +14,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.metadata
+from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -52,7 +53,10 @@ Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 def _needed(method: Method) -> Method:
-    """A method without which what was asked cannot be done: it raises UnsupportedError."""
+    """A method without which what was asked cannot be done: it raises UnsupportedError.
+
+    It is marked as abstract for type checkers, which then want no body.
+    """
 
     @functools.wraps(method)
     def lacking(self: RawEngine, *_arguments: Any, **_named: Any) -> Any:
@@ -159,9 +163,9 @@ class RawEngine:
         return None
 
     @_needed
+    @abstractmethod
     def call_watch(self) -> CallWatch:
         """Which of its functions can be watched, and what they change."""
-        ...
 
     # One step from a given state, past the interface.
 
@@ -190,6 +194,7 @@ class RawEngine:
     # Files and compiled models.
 
     @_needed
+    @abstractmethod
     def read(self, path: Path, name: str) -> Robot:
         """What it makes of a file, with its own defaults.
 
@@ -201,19 +206,19 @@ class RawEngine:
             MissingEngineError: It is not installed here.
             ModelError: It cannot read the file.
         """
-        ...
 
     @_needed
+    @abstractmethod
     def read_file(self, path: Path, name: str) -> Robot:
         """What an MJCF says itself; meshes may be missing. Arguments and errors as of `read`."""
-        ...
 
     @_needed
+    @abstractmethod
     def describe(self, compiled: Any, name: str) -> Robot:
         """The description in a compiled model; its joints are in the order of the model's."""
-        ...
 
     @_needed
+    @abstractmethod
     def differences(
         self, one: Any, two: Any, pairs: Counterparts, *, world: bool = True
     ) -> tuple[ModelDifference, ...]:
@@ -225,14 +230,14 @@ class RawEngine:
             pairs: What of one is what of the other.
             world: Whether gravity and the timestep are compared, too.
         """
-        ...
 
     @_needed
+    @abstractmethod
     def sensors(self, one: Any, two: Any, pairs: Counterparts) -> list[ModelDifference]:
         """What the sensors of two compiled models differ in, which only a controller reads."""
-        ...
 
     @_needed
+    @abstractmethod
     def entries(self, two: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
         """A difference by its single entries, or itself where it is of one piece.
 
@@ -240,19 +245,19 @@ class RawEngine:
             two: The compiled model that its edits are of.
             difference: One of `differences`.
         """
-        ...
 
     @_needed
+    @abstractmethod
     def edited(self, raw: Any, edits: Iterable[Edit]) -> Any:
         """A copy of a compiled model with these edits, and all that follows from them."""
-        ...
 
     @_needed
+    @abstractmethod
     def counts(self, compiled: Any) -> dict[str, int]:
         """How many "actuators" a compiled model has, and how many planes are its "floor"."""
-        ...
 
     @_needed
+    @abstractmethod
     def with_parts(
         self,
         taker: Path,
@@ -271,9 +276,9 @@ class RawEngine:
         Raises:
             ModelError: It cannot be made.
         """
-        ...
 
     @_needed
+    @abstractmethod
     def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
         """Kinetic and potential energy (n, 2) [J] of states.
 
@@ -282,25 +287,25 @@ class RawEngine:
             qpos: (n, nq) positions [rad or m].
             qvel: (n, nv) velocities [rad/s or m/s].
         """
-        ...
 
     # Pictures without a screen.
 
     @_needed
+    @abstractmethod
     def opengl(self) -> str:
         """The OpenGL that it draws with here; "" for its own choice, or where none is needed.
 
         Raises:
             MissingEngineError: It cannot draw here; the message says why, and what to do.
         """
-        ...
 
     @_needed
+    @abstractmethod
     def drawn_by(self, opengl: str) -> str:
         """What a reader is told of what draws."""
-        ...
 
     @_needed
+    @abstractmethod
     def drawer(self, file: Path, size: tuple[int, int], camera: Camera, ghost: bool) -> Drawer:
         """Get ready to draw one side.
 
@@ -311,17 +316,16 @@ class RawEngine:
             ghost: Whether it is the side that is drawn over the other one: in one colour,
                 without what belongs to the world.
         """
-        ...
 
     @_needed
+    @abstractmethod
     def drawing_environment(self, opengl: str, known: dict[str, str]) -> dict[str, str]:
         """The environment of a process in which the engine takes this OpenGL."""
-        ...
 
     @_needed
+    @abstractmethod
     def drawing_diagnosis(self) -> tuple[bool, str, str]:
         """Whether it draws here, what was found, and the next step if there is one."""
-        ...
 
     # What a student can do with it past the interface, and where a fault is seeded.
 
@@ -330,18 +334,18 @@ class RawEngine:
         return None
 
     @_needed
+    @abstractmethod
     def origin(self, raw: Any) -> object:
         """What an engine's own model and its copies have in common, and no other."""
-        ...
 
     def settings(self, raw: Any) -> dict[str, list[float]]:
         """What of an engine's own model a student can change, by name."""
         return {}
 
     @_needed
+    @abstractmethod
     def backend(self) -> ModuleType:
         """The backend's module, with `compile_file`, `facts` and `edited`, to put a fault in."""
-        ...
 
 
 def room_names() -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ...engines.auditing import ITSELF, ONLY
 from ...engines.futures import FutureGap, worst
+from ...measures.text import grouped
 from .trials import (
     EACH_OTHER,
     FORGETS,
@@ -79,11 +80,11 @@ def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
     """Draw the conclusion of one driver's findings."""
 
     def by_case(experiment: str, among: bool = False) -> dict[str, list[AuditFinding]]:
-        cases: dict[str, list[AuditFinding]] = {}
-        for finding in findings:
-            if finding.experiment == experiment and (finding.into == EACH_OTHER) == among:
-                cases.setdefault(finding.case, []).append(finding)
-        return cases
+        return grouped(
+            (finding.case, finding)
+            for finding in findings
+            if finding.experiment == experiment and (finding.into == EACH_OTHER) == among
+        )
 
     tried, among, left_out = by_case(RESTORE), by_case(RESTORE, among=True), by_case(WITHOUT)
     alone = tried.pop(ONLY, None)
