@@ -29,8 +29,7 @@ from statemachine.grading.judges import JUDGES, Judgement
 from statemachine.grading.mutants import MUTANTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial
 from statemachine.page import Text
-from statemachine.report import gradescope
-from statemachine.report.classroom import page
+from statemachine.report.grading import class_page, gradescope_results
 from statemachine.runs.whole import csv_text, replace_csv
 
 from .conftest import ROOT, Cli, assert_in, one_line, refused, written, written_all
@@ -164,7 +163,9 @@ def test_what_is_not_looked_at_is_told(folder: Path, judged: list[str]) -> None:
     ignored = not_looked_at([folder])
     assert ignored == ["grades.txt"]
     texts = [
-        b.text for b in page(judge_all(found, "mujoco"), ignored).blocks if isinstance(b, Text)
+        b.text
+        for b in class_page(judge_all(found, "mujoco"), ignored).blocks
+        if isinstance(b, Text)
     ]
     assert "No Python files, and not looked at: grades.txt." in texts
 
@@ -430,7 +431,7 @@ def test_what_gradescope_reads(judged: list[str]) -> None:
         Judgement("demo_replay", True, False, ("busy",), judged=False),
     )
     grade = Grade("step_loop.py", "0", "mujoco", {"mujoco": "4"}, marks)
-    read = json.loads(gradescope.results(grade, points=2.5))
+    read = json.loads(gradescope_results(grade, points=2.5))
     tests = {each["name"]: each for each in read["tests"]}
     assert list(tests) == list(JUDGES)
     assert [each["score"] for each in tests.values()] == [2.5, 0, 0, 0]
@@ -438,7 +439,7 @@ def test_what_gradescope_reads(judged: list[str]) -> None:
     assert [each["status"] for each in tests.values()] == ["passed", "failed", "failed", "failed"]
     assert tests["demo_state"]["output"] == "wrong\nbad\nworse"
     assert tests["demo_replay"]["output"] == "not judged\nbusy"
-    refused = json.loads(gradescope.results(None, "there is no file"))
+    refused = json.loads(gradescope_results(None, "there is no file"))
     assert {each["output"] for each in refused["tests"]} == {"there is no file"}
 
 

@@ -22,7 +22,7 @@ from statemachine.measures import (
     text,
     together,
 )
-from statemachine.report.events import events_of
+from statemachine.report.finding import events_of
 from statemachine.report.plot import of_trace
 from statemachine.runs import Trace, record, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS

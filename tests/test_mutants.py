@@ -20,7 +20,7 @@ from statemachine.errors import BadInputError, EngineError
 from statemachine.grading.mutants import MUTANTS, Mutant, run
 from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
-from statemachine.report import mutants as report
+from statemachine.report.grading import mutants_page
 
 from .conftest import ROOT, Cli, one_line_error, opened, shown, written_all
 
@@ -342,7 +342,7 @@ def test_the_page_keeps_to_its_columns() -> None:
     trials = tuple(
         MutantTrial(mutant, (one,) * (k % 3 * 6)) for k, mutant in enumerate(MUTANTS.values())
     )
-    page = report.page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
+    page = mutants_page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
     assert not page.holds
     assert max(map(cell_len, shown(page).splitlines())) <= 80
 

@@ -39,8 +39,7 @@ from statemachine.page import (
     Verdict,
 )
 from statemachine.report.compare import page as compared
-from statemachine.report.events import events_of
-from statemachine.report.finding import headline
+from statemachine.report.finding import events_of, headline
 from statemachine.report.html import Look, check_target, report, write_report
 from statemachine.report.html.geometry import bones_of, mesh_as_data, mesh_of
 from statemachine.report.html.scene import moments_of, rows_at

@@ -20,7 +20,7 @@ import tests.exercises.state  # noqa: F401  (they fill WRONG)
 from statemachine.grading.mutants.faults import FAULTS
 from statemachine.lessons import LESSONS
 from statemachine.probes.phrasebook import CONCEPTS
-from statemachine.report.cheat_sheet import OURS, REMEMBER
+from statemachine.report.conventions import OURS, REMEMBER
 
 from .conftest import ROOT
 from .exercises import WRONG

@@ -134,19 +134,19 @@ def run(options: argparse.Namespace) -> int:
 def _mutants(options: argparse.Namespace) -> int:
     """A student's tests, on every mutant."""
     from ..grading.mutants.run import examine
-    from ..report import mutants
+    from ..report.grading import mutants_page
     from ..report.progress import progress
 
     with progress("mutants") as report:
         examination = examine(options.mutants, options.backend, options.only, progress=report)
-    return show(mutants.page(examination), examination, options.json)
+    return show(mutants_page(examination), examination, options.json)
 
 
 def _one(options: argparse.Namespace) -> int:
     """One student's file."""
     from ..errors import BadInputError
     from ..grading import classroom, exercise
-    from ..report import grade as words
+    from ..report.grading import grade_page
     from ..report.progress import progress
 
     (file,) = options.files
@@ -162,20 +162,20 @@ def _one(options: argparse.Namespace) -> int:
         raise
     if options.gradescope:
         _gradescope(options.gradescope, grade, "")
-    return show(words.page(grade), grade, options.json)
+    return show(grade_page(grade), grade, options.json)
 
 
 def _gradescope(target: Path, grade: Any, refusal: str) -> None:
-    from ..report import gradescope
+    from ..report.grading import gradescope_results
     from ..runs.whole import replace_text
 
-    replace_text(target, gradescope.results(grade, refusal))
+    replace_text(target, gradescope_results(grade, refusal))
 
 
 def _class(options: argparse.Namespace) -> int:
     """The files of a class."""
     from ..grading import classroom
-    from ..report import classroom as words
+    from ..report.grading import class_page
     from ..report.progress import progress
 
     submitted = classroom.submissions(options.files)
@@ -191,5 +191,5 @@ def _class(options: argparse.Namespace) -> int:
             tests=options.tests,
             progress=report,
         )
-    show(words.page(entries, classroom.not_looked_at(options.files)), entries, options.json)
+    show(class_page(entries, classroom.not_looked_at(options.files)), entries, options.json)
     return 0 if all(entry.judged for entry in entries) else SAYS_NO

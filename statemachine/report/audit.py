@@ -37,7 +37,7 @@ def page(results: Mapping[str, Audit]) -> Page:
     """
     first = next(iter(results.values()))
     made_with = [result.provenance for result in results.values()]
-    versions = {made.backend: made.versions[made.backend] for made in made_with}
+    versions = {source.backend: source.versions[source.backend] for source in made_with}
     drivers = [driver for result in results.values() for driver in result.audited]
     return template.page(
         "audit",
@@ -80,9 +80,9 @@ def _tables(backend: str, result: Audit) -> list[Block]:
 def _of_driver(driver: Audited) -> list[Block]:
     """What was found of the state of one driver, and of what should change nothing."""
     candidates = grouped(
-        (f"all but {each.case}" if each.experiment == WITHOUT else each.case, each)
-        for each in driver.findings
-        if each.experiment in (RESTORE, WITHOUT)
+        (f"all but {finding.case}" if finding.experiment == WITHOUT else finding.case, finding)
+        for finding in driver.findings
+        if finding.experiment in (RESTORE, WITHOUT)
     )
     return template.blocks(
         "audit_driver",
@@ -133,18 +133,18 @@ def _by_target(driver: Audited, candidates: Mapping[str, Sequence[AuditFinding]]
 
 def _forgotten(driver: Audited) -> Table | None:
     """What is changed after a save and not brought back."""
-    findings = [each for each in driver.findings if each.experiment == FORGETS]
+    findings = [finding for finding in driver.findings if finding.experiment == FORGETS]
     if not findings:
         return None
-    exact = {(each.into, each.case): each.gap.exact for each in findings}
-    cases = list(dict.fromkeys(each.case for each in findings))
+    exact = {(finding.into, finding.case): finding.gap.exact for finding in findings}
+    cases = list(dict.fromkeys(finding.case for finding in findings))
 
     def word(way: str, case: str) -> str:
         if exact[NOT_RESTORED, case]:
             return "does not show"
         return "brought back" if exact[way, case] else "stays"
 
-    ways = dict.fromkeys(each.into for each in findings if each.into != NOT_RESTORED)
+    ways = dict.fromkeys(finding.into for finding in findings if finding.into != NOT_RESTORED)
     rows = [(way, *(word(way, case) for case in cases)) for way in ways]
     title = f"{driver.name}: changed after the save, at {findings[0].point}, and then restored"
     return Table(("restored by", *cases), rows, title, words=frozenset(range(len(cases) + 1)))
@@ -153,7 +153,9 @@ def _forgotten(driver: Audited) -> Table | None:
 def _touching(driver: Audited) -> Table | None:
     """What contacts have to do with what is not restored."""
     gaps = driver.conclusion.touching
-    case = next((each.case for each in driver.findings if each.experiment == NO_CONTACTS), "")
+    case = next(
+        (finding.case for finding in driver.findings if finding.experiment == NO_CONTACTS), ""
+    )
     rows = [
         ("as it stands", *(cell(standing) for standing, _ in gaps.values())),
         ("contacts switched off", *(cell(off) for _, off in gaps.values())),
@@ -165,13 +167,13 @@ def _touching(driver: Audited) -> Table | None:
 def _promises(driver: Audited) -> dict[str, Any]:
     """What should change nothing: slots of `audit_driver.md`."""
     tried = grouped(
-        ((each.case, each.into, each.promised), each)
-        for each in driver.findings
-        if each.experiment not in _OF_THE_STATE or each.promised
+        ((finding.case, finding.into, finding.promised), finding)
+        for finding in driver.findings
+        if finding.experiment not in _OF_THE_STATE or finding.promised
     )
-    kept = {key: all(each.holds for each in findings) for key, findings in tried.items()}
+    intact = {key: all(finding.holds for finding in findings) for key, findings in tried.items()}
     differing = {key: [f for f in of if not f.gap.exact] for key, of in tried.items()}
-    promised = [holds for (*_, is_promised), holds in kept.items() if is_promised]
+    promised = [holds for (*_, is_promised), holds in intact.items() if is_promised]
     rows = Table.of(
         tried,
         {
@@ -180,18 +182,18 @@ def _promises(driver: Audited) -> dict[str, Any]:
             "same bytes at": lambda key: (
                 f"{len(tried[key]) - len(differing[key])} of {len(tried[key])}"
             ),
-            "promised": lambda key: _PROMISED[key[2], kept[key]],
+            "promised": lambda key: _PROMISED[key[2], intact[key]],
         },
         f"{driver.name}: what should change nothing",
         words={"compared with", "same bytes at", "promised"},
-        emphasis=lambda key: not kept[key],
+        emphasis=lambda key: not intact[key],
     )
-    gaps = {key: worst([each.gap for each in of]) for key, of in differing.items() if of}
+    gaps = {key: worst([finding.gap for finding in of]) for key, of in differing.items() if of}
     changes = Table.of(
         gaps,
         {
             "what is done": lambda key: key[0],
-            "differs at": lambda key: ", ".join(each.point for each in differing[key]),
+            "differs at": lambda key: ", ".join(finding.point for finding in differing[key]),
             "by": lambda key: rough(gaps[key].length, "m"),
             "and": lambda key: rough(gaps[key].angle, "rad"),
             "from step": lambda key: str(gaps[key].first),
@@ -205,7 +207,7 @@ def _promises(driver: Audited) -> dict[str, Any]:
         "drops": len({f.point for f in driver.findings if f.point.startswith(FALL)}) or None,
         "boxes": BOXES,
         "steps": STEPS,
-        "holds": all(kept.values()) if tried else None,
+        "holds": all(intact.values()) if tried else None,
         "intact": sum(promised),
         "promised": len(promised),
     }
@@ -215,14 +217,14 @@ _PROMISED = {(True, True): "yes", (True, False): "yes, broken", (False, True): "
 
 
 def _worst(findings: Iterable[AuditFinding]) -> str:
-    gaps = [each.gap for each in findings]
+    gaps = [finding.gap for finding in findings]
     return cell(worst(gaps)) if gaps else NONE
 
 
 def _conclusion(driver: Audited) -> list[Block]:
     """What follows; all of it from the findings."""
     of = driver.conclusion
-    again = [each.gap.exact for each in driver.findings if each.experiment == AGAIN]
+    again = [finding.gap.exact for finding in driver.findings if finding.experiment == AGAIN]
     needed = Table.of(
         of.missing,
         {

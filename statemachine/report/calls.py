@@ -21,25 +21,29 @@ _ROWS_SHOWN = 6  # of the calls on one thing, before those that changed nothing 
 def blocks(recordings: Mapping[str, CallRecording]) -> list[Block]:
     """Blocks for the recordings of one code, by engine; the code's backend may differ."""
     prefix = {name: f"{name}: " if len(recordings) > 1 else "" for name in recordings}
-    looks = [f"{prefix[name]}{_words(each.engine).shown}" for name, each in recordings.items()]
+    looks = [
+        f"{prefix[name]}{_words(recording.engine).shown}" for name, recording in recordings.items()
+    ]
     ended = {name: recording.error for name, recording in recordings.items() if recording.error}
     statements: list[Block] = []
-    for together in zip_longest(*(each.statements for each in recordings.values())):
+    for together in zip_longest(*(recording.statements for recording in recordings.values())):
         pairs = zip(recordings, together, strict=True)
         ran = {name: statement for name, statement in pairs if statement is not None}
         sources = dict.fromkeys(statement.source for statement in ran.values())
         is_import = next(iter(sources)).startswith(("import ", "from "))
-        if not is_import or any(each.calls or each.changed for each in ran.values()):
+        if not is_import or any(statement.calls or statement.changed for statement in ran.values()):
             statements.append(Code([line for source in sources for line in source.splitlines()]))
             statements += _answers(ran)
     return template.blocks(
         "calls",
-        engines=" and ".join(f"{name} {each.version}" for name, each in recordings.items()),
+        engines=" and ".join(
+            f"{name} {recording.version}" for name, recording in recordings.items()
+        ),
         none=NONE,
         looks="; ".join(looks),
         statements=statements,
         ended=[Text(f"{prefix[name]}The run ended there: {why}") for name, why in ended.items()],
-        legend=[text for each in recordings.values() for text in _legend(each)],
+        legend=[text for recording in recordings.values() for text in _legend(recording)],
     )
 
 
@@ -50,7 +54,7 @@ def not_asked(backend: str) -> Text:
 
 def _answers(ran: Mapping[str, Statement]) -> list[Block]:
     """What a line made each engine do; once, if nothing and the same of all."""
-    silent = {name: _unheard(each) for name, each in ran.items() if not each.calls}
+    silent = {name: _unheard(statement) for name, statement in ran.items() if not statement.calls}
     if len(silent) == len(ran) and len({*silent.values()}) == 1:
         return [Text(next(iter(silent.values())))]
     return [

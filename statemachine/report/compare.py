@@ -23,8 +23,10 @@ from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Ve
 from ..runs import Trace
 from ..witness import SAME_READING
 from . import template, why
-from .events import Event, events_of, events_table
 from .finding import (
+    Event,
+    events_of,
+    events_table,
     floor_words,
     headline,
     in_words,
@@ -95,7 +97,7 @@ def page(
     reasons: list[Block] = [Text(why_not)] if why_not else []
     if explanation is not None:
         reasons = [*why.causes(explanation), *why.three_parts(explanation)]
-    kept = emulated(comparison)
+    emulated_parts = emulated(comparison)
     agree = why.steps(explanation) if explanation is not None else []
     made_by = [Text("This page was made by:"), Code([command])] if command else []
     origin = [provenance((one.header, two.header), comparison), *made_by]
@@ -106,8 +108,8 @@ def page(
         ),
         Section("figures", "The figures", _figures(comparison, witness, floor)),
         Section("events", "What happens when", [events_table(events, labels)], detail=True),
-        *([_models(models, bool(kept))] if models is not None else []),
-        Section(*_EMULATED, kept),
+        *([_models(models, bool(emulated_parts))] if models is not None else []),
+        Section(*_EMULATED, emulated_parts),
         Section("agree", "To make them agree", agree),
         Section("origin", "Where this comes from", origin, detail=True),
     ]
@@ -187,29 +189,36 @@ def _figures(
     figures = Table.of(
         agreements,
         {
-            "quantity": lambda found: name_of(found.name),
-            "verdict": lambda found: TableCell(found.verdict, verdict=found.verdict),
-            "largest": lambda found: (
-                found.note or quantity(found.max, found.unit)
-                if found.kind == "contact"
-                else _small(found.max, found)
+            "quantity": lambda agreement: name_of(agreement.name),
+            "verdict": lambda agreement: TableCell(agreement.verdict, verdict=agreement.verdict),
+            "largest": lambda agreement: (
+                agreement.note or quantity(agreement.max, agreement.unit)
+                if agreement.kind == "contact"
+                else _small(agreement.max, agreement)
             ),
-            "at, s": lambda found: moment(found.at),
-            "RMS": lambda found: NONE if found.kind == "contact" else _small(found.rms, found),
+            "at, s": lambda agreement: moment(agreement.at),
+            "RMS": lambda agreement: (
+                NONE if agreement.kind == "contact" else _small(agreement.rms, agreement)
+            ),
             "settled": lambda f: NONE if f.kind == "contact" else _small(f.settled, f),
-            "from, s": lambda found: NONE if found.kind == "contact" else moment(found.since),
-            "tolerance": lambda found: quantity(found.tolerance, found.unit),
+            "from, s": lambda agreement: (
+                NONE if agreement.kind == "contact" else moment(agreement.since)
+            ),
+            "tolerance": lambda agreement: quantity(agreement.tolerance, agreement.unit),
             **(_floor_columns(floor) if floor else {}),
         },
         f"{one} against {two}: how far apart",
         words={"verdict"},
-        emphasis=lambda found: found.verdict == "differs",
+        emphasis=lambda agreement: agreement.verdict == "differs",
         wide={"tolerance", "floor", "inside from, s"},
     )
     # One row for each tolerance: who shares it, how much, why.
     shared = grouped(
-        ((quantity(found.tolerance, found.unit), found.reason), QUANTITIES[found.kind].plural)
-        for found in agreements
+        (
+            (quantity(agreement.tolerance, agreement.unit), agreement.reason),
+            QUANTITIES[agreement.kind].plural,
+        )
+        for agreement in agreements
     )
     reasons = Table.of(
         shared.items(),
@@ -245,11 +254,11 @@ def _floor_columns(floor: ChaosFloor) -> dict[str, Callable[[Agreement], str]]:
     }
 
 
-def _small(value: float, found: Agreement) -> str:
+def _small(value: float, agreement: Agreement) -> str:
     """A difference as text; what is a millionth of its tolerance is rounding."""
-    if 0 < abs(value) < _ROUNDING * found.tolerance:
+    if 0 < abs(value) < _ROUNDING * agreement.tolerance:
         return "≈ 0"
-    return quantity(value, found.unit)
+    return quantity(value, agreement.unit)
 
 
 def _models(models: Page, has_emulated: bool) -> Section:
@@ -270,9 +279,9 @@ def _models(models: Page, has_emulated: bool) -> Section:
 def _origin(comparison: Comparison) -> str:
     sides = (comparison.one, comparison.two)
     made_by = [side.provenance for side in sides]
-    files = dict.fromkeys(f"{made.model_file} ({made.model_sha256[:8]})" for made in made_by)
+    files = dict.fromkeys(f"{source.model_file} ({source.model_sha256[:8]})" for source in made_by)
     engine = [] if sides[0].engine in sides[0].label else [f"both on {sides[0].engine}"]
-    seeds = ["" if made.seed is None else f", seed {made.seed}" for made in made_by]
+    seeds = ["" if source.seed is None else f", seed {source.seed}" for source in made_by]
     words = [
         f"{side.label}, {milliseconds(side.timestep)}{seed}"
         for side, seed in zip(sides, seeds, strict=True)

@@ -112,9 +112,11 @@ def _engine(name: str) -> HealthCheck:
     check = _imported(name, code, name != DEFAULT)
     if check.works:
         return replace(check, found=f"{engine_version(name)}, {ENGINES[name].role}")
-    told = any(word in check.found for word in ("pip install", "no wheel", "apt-get", "unset it"))
+    says_what_to_do = any(
+        word in check.found for word in ("pip install", "no wheel", "apt-get", "unset it")
+    )
     wheel = wheel_here(ENGINES[name])
-    if told or check.next_step or not wheel:
+    if says_what_to_do or check.next_step or not wheel:
         return check
     return replace(check, next_step=f"pip install --force-reinstall {wheel.requirement}")
 

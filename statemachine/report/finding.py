@@ -1,20 +1,21 @@
-"""What was found, in words: each made from figures of this comparison, none a guess."""
+"""What a comparison found, in words, and what happens when: each from its figures, none a guess."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from ..compare import Agreement, ChaosFloor, Comparison, Series
+from ..compare import Agreement, ChaosFloor, Comparison, Series, Touch
 from ..compare.series import SETTLED, at_the_end
 from ..compare.why import Explanation
 from ..measures import QUANTITIES
-from ..measures.text import capital, listed, quantity, rounded, short_time
-from ..page import Block, Headline, TableCell
+from ..measures.text import capital, grouped, listed, quantity, rounded, short_time
+from ..page import Block, Headline, Table, TableCell
 from . import template
-from .events import Event
 from .template import if_true
 from .why import answer, proofs
 
@@ -40,6 +41,25 @@ ENDS = {
     "changing": "On average over {window} {what} is still {far} apart, and still changing: {last} "
     "at the last moment.",
 }
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens.
+
+    Attributes:
+        time: Since the start [s].
+        kind: "touch", "part", "largest" or "end".
+        text: What, in a few words.
+        side: 0 or 1, or None for both.
+        what: What touches what; empty otherwise.
+    """
+
+    time: float
+    kind: Literal["touch", "part", "largest", "end"]
+    text: str
+    side: int | None
+    what: str = ""
 
 
 def headline(
@@ -264,3 +284,50 @@ def changed_by(floor: ChaosFloor) -> str:
     sizes = [rounded(v, unit) for v, unit in ((size.length, "m"), (size.angle, "rad")) if v > 0]
     start = f", and its start by {listed(sizes)}" if sizes else ""
     return f"start and commands changed by rounding ({floor.rounding:g}){start}"
+
+
+def events_of(comparison: Comparison, touches: Sequence[Touch]) -> list[Event]:
+    """First touches on each side, where each quantity parts, largest differences, early ends."""
+    parted = [
+        (agreement.since, agreement.at, agreement.name.replace(", ", " "))
+        for agreement in comparison.agreements
+        if agreement.kind != "contact" and agreement.since is not None
+    ]
+    events = [
+        *(
+            Event(contact.first, "touch", f"first touch: {touch.pair}", side, touch.pair)
+            for touch in touches
+            for side, contact in enumerate((touch.one, touch.two))
+            if contact.first is not None
+        ),
+        *(
+            Event(since, "part", f"beyond tolerance from here: {'; '.join(names)}", None)
+            for since, names in grouped((since, name) for since, _, name in parted).items()
+        ),
+        *(
+            Event(at, "largest", f"largest difference: {'; '.join(names)}", None)
+            for at, names in grouped((at, name) for _, at, name in parted).items()
+        ),
+        *(
+            Event((side.rows - 1) * side.timestep, "end", f"ends early: {side.ended}", number)
+            for number, side in enumerate((comparison.one, comparison.two))
+            if side.ended
+        ),
+    ]
+    return sorted(events, key=lambda event: event.time)
+
+
+def events_table(events: Sequence[Event], labels: tuple[str, str]) -> Table:
+    """What happens when; the same on both sides at the same time is one row."""
+    sides = grouped(((event.time, event.text), event.side) for event in events)
+    where = {None: "between them", 0: labels[0], 1: labels[1]}
+    return Table.of(
+        sides,
+        {
+            "time": lambda event: TableCell(short_time(event[0]), at=event[0]),
+            "what": lambda event: capital(event[1]),
+            "on": lambda event: "both" if {0, 1} <= {*sides[event]} else where[sides[event][0]],
+        },
+        "First touches, partings, largest differences; press a time to go there",
+        words={"what", "on"},
+    )

@@ -15,9 +15,9 @@ ENDED = "ended early: {why}"
 def junit(comparisons: Sequence[Comparison]) -> str:
     """The text of the file: a suite for each comparison."""
     root = ElementTree.Element("testsuites")
-    for found in comparisons:
-        sides = found.one, found.two
-        name = f"{found.one.experiment}: {found.one.label}, {found.two.label}"
+    for comparison in comparisons:
+        sides = comparison.one, comparison.two
+        name = f"{comparison.one.experiment}: {comparison.one.label}, {comparison.two.label}"
         failures = {
             agreement.name: FAILED.format(
                 largest=quantity(agreement.max, agreement.unit),
@@ -25,11 +25,13 @@ def junit(comparisons: Sequence[Comparison]) -> str:
                 tolerance=quantity(agreement.tolerance, agreement.unit),
                 reason=agreement.reason,
             )
-            for agreement in found.agreements
+            for agreement in comparison.agreements
             if agreement.verdict != "agrees"
         }
         failures |= {f"end of {s.label}": ENDED.format(why=s.ended) for s in sides if s.ended}
-        names = dict.fromkeys([agreement.name for agreement in found.agreements] + list(failures))
+        names = dict.fromkeys(
+            [agreement.name for agreement in comparison.agreements] + list(failures)
+        )
         about = {"name": name, "tests": str(len(names)), "failures": str(len(failures))}
         suite = ElementTree.SubElement(root, "testsuite", about)
         for test in names:

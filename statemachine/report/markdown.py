@@ -59,7 +59,7 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
         if isinstance(opening, Question):
             says = Verdict if opening.always else Printed  # stands before the answer
             place = next(
-                (k for k, each in enumerate(rest) if not isinstance(each, says)), len(rest)
+                (k for k, block in enumerate(rest) if not isinstance(block, says)), len(rest)
             )
             inside.insert(place, answer(opening))
             yield f"{asked(opening)}\n\n{_folded(inside)}"
@@ -103,7 +103,7 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
 
 
 def _section(block: Section, picture: Callable[[Picture], str]) -> str:
-    parts = [part for each in block.blocks if (part := block_as_markdown(each, picture))]
+    parts = [part for inner in block.blocks if (part := block_as_markdown(inner, picture))]
     if not parts:
         return ""
     heading = _escaped(block.heading)

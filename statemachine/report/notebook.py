@@ -166,10 +166,10 @@ def _leading(page: Page) -> list[Text]:
 
 def _opening(page: Page) -> str:
     """The first paragraphs and the questions, without what answers them."""
-    blocks = [*_leading(page), *(each for each in page.blocks if isinstance(each, Question))]
+    blocks = [*_leading(page), *(block for block in page.blocks if isinstance(block, Question))]
     return "\n\n".join(
-        asked(each) if isinstance(each, Question) else block_as_markdown(each, inline)
-        for each in blocks
+        asked(block) if isinstance(block, Question) else block_as_markdown(block, inline)
+        for block in blocks
     )
 
 

@@ -17,8 +17,7 @@ from ..measures.text import figure, quantity, reading, short_time
 from ..page import Interactive, Traces
 from ..runs import Trace
 from . import template
-from .events import Event
-from .finding import name_of
+from .finding import Event, name_of
 
 CHARTS_SHOWN = 20  # of a page or a figure
 GAP = "how far apart"

@@ -43,7 +43,7 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
         return _one(survey, models[0])
     backends = list(dict.fromkeys(name for row in models for name in row.backends))
     others = [name for name in backends if name != survey.default]
-    tried = any(each.scenarios for row in models for each in row.backends.values())
+    tried = any(backend.scenarios for row in models for backend in row.backends.values())
     wrong = [f"{file}: {text}" for file, texts in survey.wrong.items() for text in texts]
     inside = [f"{row.file}, {row.inside[0]}" for row in models if row.inside]
     grades = Counter(row.witness.grade or "refused" for row in models if row.witness is not None)
@@ -96,7 +96,9 @@ def _bits(survey: Survey, row: ExaminedModel) -> str:
     first = row.backends.get(survey.default)
     if first is None or (first.refusal and first.refusal_without):
         return "no"
-    exact = [v for each in row.backends.values() for v in (each.equals_engine, each.restores)]
+    exact = [
+        v for backend in row.backends.values() for v in (backend.equals_engine, backend.restores)
+    ]
     return "✗" if False in exact else "✓" if True in exact else NONE
 
 
@@ -124,12 +126,14 @@ def _witness(row: ExaminedModel) -> str:
 
 
 def _runs(row: ExaminedModel) -> str:
-    tried = [list(each.scenarios.values()) for each in row.backends.values() if each.scenarios]
+    tried = [
+        list(backend.scenarios.values()) for backend in row.backends.values() if backend.scenarios
+    ]
     return " ".join(str(words.count(RUNS)) for words in tried) or NONE
 
 
 def _cost(row: ExaminedModel) -> str:
-    costs = [f"{each.cost:.3g}" for each in row.backends.values() if each.cost is not None]
+    costs = [f"{backend.cost:.3g}" for backend in row.backends.values() if backend.cost is not None]
     return " ".join(costs) or NONE
 
 
@@ -190,16 +194,16 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
     wrong, witness = row.wrong(survey.default), row.witness or WitnessRow()
     reason = sentence(witness.refusal) if witness.refusal else None
     facts: dict[str, Callable[[BackendRow], str]] = {
-        "loads": lambda each: (
-            "✓" if each.loads else "no" if each.refusal_without else "with contacts off"
+        "loads": lambda backend: (
+            "✓" if backend.loads else "no" if backend.refusal_without else "with contacts off"
         ),
-        "the bits of the engine without us": lambda each: _MARKS[each.equals_engine],
-        "two futures of a State are one": lambda each: _MARKS[each.restores],
-        "gap without contacts": lambda each: _gap_in_full(each.without_contacts),
-        "gap with contacts": lambda each: _gap_in_full(each.with_contacts),
+        "the bits of the engine without us": lambda backend: _MARKS[backend.equals_engine],
+        "two futures of a State are one": lambda backend: _MARKS[backend.restores],
+        "gap without contacts": lambda backend: _gap_in_full(backend.without_contacts),
+        "gap with contacts": lambda backend: _gap_in_full(backend.with_contacts),
         **{f"scenario {name}": partial(_scenario, name) for name in TRIED},
-        "cost of a step, on this machine": lambda each: (
-            NONE if each.cost is None else f"{each.cost:.3g} ×"
+        "cost of a step, on this machine": lambda backend: (
+            NONE if backend.cost is None else f"{backend.cost:.3g} ×"
         ),
     }
     rows = [(fact, *map(cell, row.backends.values())) for fact, cell in facts.items()]

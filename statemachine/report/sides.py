@@ -144,8 +144,8 @@ def loops(comparison: Comparison, played: Comparison | None) -> list[Block]:
     """The figures of both loops, quantity by quantity; nothing where they are the same."""
     if played is None:
         return []
-    closed = {found.name: found for found in comparison.agreements}
-    opened = {found.name: found for found in played.agreements}
+    closed = {agreement.name: agreement for agreement in comparison.agreements}
+    opened = {agreement.name: agreement for agreement in played.agreements}
     rows = [
         (name_of(name), *_cells(closed.get(name)), *_cells(opened.get(name)))
         for name in closed | opened
@@ -216,17 +216,17 @@ def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
 
 def facts_of(header: Header) -> dict[str, str]:
     """What made a run, apart from versions."""
-    made = header.provenance
+    source = header.provenance
     substeps = f" in {header.substeps} substeps" if header.substeps > 1 else ""
     return {
-        "model": made.model_file,
-        "its SHA-256": TableCell(made.model_sha256, code=True),
+        "model": source.model_file,
+        "its SHA-256": TableCell(source.model_sha256, code=True),
         "defaults": header.defaults,
         "options": ", ".join(f"{name} {value}" for name, value in header.options.items()) or "none",
         "starts in": header.keyframe or "the default state",
         "timestep": milliseconds(header.timestep) + substeps,
         "gravity": numbers(header.gravity) + " m/s²",
-        "seed": "none drawn" if made.seed is None else f"{made.seed}",
+        "seed": "none drawn" if source.seed is None else f"{source.seed}",
         "energies by": header.energy_by or NONE,
         "made again by": TableCell(header.command, code=True),
     }

@@ -23,7 +23,6 @@ from ..runs.scenarios import scenario
 from ..runs.whole import replace_bytes
 from . import compare as comparison
 from . import conventions, why
-from .cheat_sheet import cheat_sheet
 from .markdown import markdown
 from .robot_pictures import drawn_picture
 
@@ -70,7 +69,7 @@ def make_reference(folder: Path) -> list[Path]:
     pages = {
         "conventions": markdown(conventions.page(probe(installed)), lambda _: ""),
         "calls": markdown(conventions.calls_page(table), lambda _: ""),
-        "cheat-sheet": cheat_sheet(table),
+        "cheat-sheet": conventions.cheat_sheet(table),
     }
     return [_save(folder / f"{name}.md", text.encode()) for name, text in pages.items()]
 

@@ -185,16 +185,16 @@ def _stage_cells(gap: StageGap) -> tuple[str, ...]:
 
 def versions(comparisons: Sequence[Comparison], experiment: str) -> Page:
     """What each comparison of a release with the next one found."""
-    sides = [(found.one, found.two) for found in comparisons]
+    sides = [(comparison.one, comparison.two) for comparison in comparisons]
     pairs = [tuple(s.provenance.versions[s.backend] for s in both) for both in sides]
     rows, changed, bars = [], [], []
-    for (left, right), found in zip(pairs, comparisons, strict=True):
-        worst = leading(found)
+    for (left, right), comparison in zip(pairs, comparisons, strict=True):
+        worst = leading(comparison)
         bars.append((worst.max / worst.tolerance if worst.tolerance else 0.0, None))
         largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
         cells = name_of(worst.name), largest, short_time(worst.at), tolerance
-        rows.append((left, right, *cells, "agrees" if found.agrees else "DIFFERS"))
-        changed += [] if found.agrees else [f"MuJoCo {left} and {right}"]
+        rows.append((left, right, *cells, "agrees" if comparison.agrees else "DIFFERS"))
+        changed += [] if comparison.agrees else [f"MuJoCo {left} and {right}"]
     heads = ("release", "next", "quantity", "largest", "at", "tolerance", "verdict")
     headline = Headline(CHANGED.format(pairs=listed(changed)), holds=False)
     return template.page(
@@ -203,7 +203,7 @@ def versions(comparisons: Sequence[Comparison], experiment: str) -> Page:
         experiment=experiment,
         first=pairs[0][0],
         last=pairs[-1][1],
-        until=max(found.until for found in comparisons),
+        until=max(comparison.until for comparison in comparisons),
         steps=Table(heads, rows, "From release to release", words=frozenset({0, 1, 2, 6})),
         bars=Bars(
             "How far a release is from the next",

@@ -25,78 +25,81 @@ LINES = {
 }
 
 
-def together(found: SweepReport) -> list[Block]:
+def together(sweep: SweepReport) -> list[Block]:
     """The sentence of each fit, how it was made, and its picture."""
-    blocks = [block for fit in found.together for block in _fit(found, fit)]
-    return blocks or [Text(NONE_FITTED[found.only_rounding])]
+    blocks = [block for fit in sweep.together for block in _fit(sweep, fit)]
+    return blocks or [Text(NONE_FITTED[sweep.only_rounding])]
 
 
-def line(found: SweepReport, each: BroughtTogether) -> str:
+def line(sweep: SweepReport, parameter: BroughtTogether) -> str:
     """What a fit says, in a sentence."""
-    unit, what = found.quantity.unit, found.quantity.says
-    if each.fit is None:
-        return LINES["not fitted"].format(label=each.label, why_not=each.why_not)
-    before, after = quantity(each.before, unit), quantity(each.after, unit)
-    own = each.verdict == "none" and _is_own(each)
-    return LINES["own" if own else each.verdict].format(
-        label=each.label,
-        value=_fitted(each),
-        where=f"in {found.sides[1]}" if each.varied == "right" else "in both",
-        pair=listed(list(found.sides)),
-        other="any other" if each.own is None else "the model's own",
+    unit, what = sweep.quantity.unit, sweep.quantity.says
+    if parameter.fit is None:
+        return LINES["not fitted"].format(label=parameter.label, why_not=parameter.why_not)
+    before, after = quantity(parameter.before, unit), quantity(parameter.after, unit)
+    own = parameter.verdict == "none" and _is_own(parameter)
+    return LINES["own" if own else parameter.verdict].format(
+        label=parameter.label,
+        value=_fitted(parameter),
+        where=f"in {sweep.sides[1]}" if parameter.varied == "right" else "in both",
+        pair=listed(list(sweep.sides)),
+        other="any other" if parameter.own is None else "the model's own",
         sizes=f"{what} {before} → {after}",
     )
 
 
-def _is_own(each: BroughtTogether) -> bool:
+def _is_own(parameter: BroughtTogether) -> bool:
     """Whether the value is the model's own, as far as its error tells."""
-    if each.fit is None or each.value is None or each.own is None:
+    if parameter.fit is None or parameter.value is None or parameter.own is None:
         return False
-    wide = each.fit.bounds[1] - each.fit.bounds[0]
-    return abs(each.value - each.own) <= max(2 * (each.error or 0.0), 0.02 * wide)
+    wide = parameter.fit.bounds[1] - parameter.fit.bounds[0]
+    return abs(parameter.value - parameter.own) <= max(2 * (parameter.error or 0.0), 0.02 * wide)
 
 
-def _fit(found: SweepReport, each: BroughtTogether) -> list[Block]:
+def _fit(sweep: SweepReport, parameter: BroughtTogether) -> list[Block]:
     """What a fit says, how it was made, and what a run says of it."""
-    unit, fit = found.quantity.unit, each.fit
+    unit, fit = sweep.quantity.unit, parameter.fit
     if fit is None:
-        return [Text(line(found, each))]
-    within, measured = fit.within(found.quantity.tolerance), each.measured is not None
+        return [Text(line(sweep, parameter))]
+    within, measured = fit.within(sweep.quantity.tolerance), parameter.measured is not None
     figures = {
-        "the model's own value": each.own is not None and _times(each, each.own),
-        "values looked at": " to ".join(_times(each, end) for end in fit.bounds),
-        "predicted within tolerance": within and " to ".join(_times(each, end) for end in within),
+        "the model's own value": parameter.own is not None and _times(parameter, parameter.own),
+        "values looked at": " to ".join(_times(parameter, end) for end in fit.bounds),
+        "predicted within tolerance": within
+        and " to ".join(_times(parameter, end) for end in within),
         "curves in the mean, over settings and seeds": str(fit.curves),
-        "± is the standard error, from": fit.error is not None and not each.tried and fit.of,
-        "gap of runs there": measured and quantity(each.measured, unit),
-        "predicted for them": measured and quantity(each.predicted, unit),
-        "pairs of runs": measured and str(each.pairs),
+        "± is the standard error, from": fit.error is not None and not parameter.tried and fit.of,
+        "gap of runs there": measured and quantity(parameter.measured, unit),
+        "predicted for them": measured and quantity(parameter.predicted, unit),
+        "pairs of runs": measured and str(parameter.pairs),
     }
     rows = [(name, value) for name, value in figures.items() if value]
-    values = each.tried[0] if each.tried is not None and each.error is not None else None
-    right = each.varied == "right"
+    values = (
+        parameter.tried[0] if parameter.tried is not None and parameter.error is not None else None
+    )
+    right = parameter.varied == "right"
     return template.blocks(
         "sweep_fit",
-        line=line(found, each),
-        table=Table(("the fit", each.label), rows, words=frozenset({0, 1})),
-        left=found.sides[0] if right else None,
-        right=found.sides[1],
+        line=line(sweep, parameter),
+        table=Table(("the fit", parameter.label), rows, words=frozenset({0, 1})),
+        left=sweep.sides[0] if right else None,
+        right=sweep.sides[1],
         both=if_true(not right),
-        label=each.label,
-        why_not=None if measured else each.why_not,
+        label=parameter.label,
+        why_not=None if measured else parameter.why_not,
         number=str(len(values) - 1) if values else None,
-        low=_times(each, min(values or [0.0])),
-        high=_times(each, max(values or [0.0])),
-        apart=_times(each, each.error or 0.0),
-        picture=fit_curve(found, each),
+        low=_times(parameter, min(values or [0.0])),
+        high=_times(parameter, max(values or [0.0])),
+        apart=_times(parameter, parameter.error or 0.0),
+        picture=fit_curve(sweep, parameter),
     )
 
 
-def _fitted(each: BroughtTogether) -> str:
+def _fitted(parameter: BroughtTogether) -> str:
     """The value with its error, to the digits that the error leaves."""
-    fit, value, error = each.fit, each.value, each.error
+    fit, value, error = parameter.fit, parameter.value, parameter.error
     assert fit is not None
-    times = "x" if each.times else ""
+    times = "x" if parameter.times else ""
     if error is None or not error > 0:
         return f"{value:.3g}{times}"
     error = max(error, 1e-4 * (fit.bounds[1] - fit.bounds[0]))  # the interpolation knows no more
@@ -104,5 +107,5 @@ def _fitted(each: BroughtTogether) -> str:
     return f"{value:.{digits}f}{times} ± {error:.{digits}f}{times}"
 
 
-def _times(each: BroughtTogether, value: float) -> str:
-    return f"{value:.4g}{'x' if each.times else ''}"
+def _times(parameter: BroughtTogether, value: float) -> str:
+    return f"{value:.4g}{'x' if parameter.times else ''}"

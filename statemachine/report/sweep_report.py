@@ -26,75 +26,75 @@ CAUSES = {
 }
 
 
-def page(found: SweepReport, command: str = "") -> Page:
+def page(sweep: SweepReport, command: str = "") -> Page:
     """The answer of a sweep.
 
     Args:
-        found: The report.
+        sweep: The report.
         command: What was typed, or "".
     """
-    sections = [Section("where", "Where they agree", _where(found))]
-    if found.parameters:
-        sections.append(Section("sensitive", "What the gap is sensitive to", _sensitive(found)))
-        sections.append(Section("together", "What brings them together", together(found)))
-    failed = {f"failed with {kind}": number for kind, number in found.failed.items()}
-    counts = {**failed, "have not run": found.missing}
+    sections = [Section("where", "Where they agree", _where(sweep))]
+    if sweep.parameters:
+        sections.append(Section("sensitive", "What the gap is sensitive to", _sensitive(sweep)))
+        sections.append(Section("together", "What brings them together", together(sweep)))
+    failed = {f"failed with {kind}": number for kind, number in sweep.failed.items()}
+    counts = {**failed, "have not run": sweep.missing}
     left_out = [f"{kind}: {number}" for kind, number in counts.items() if number]
     return template.page(
         "sweep_report",
-        _headline(found),
-        what=found.what,
-        left=found.sides[0],
-        right=found.sides[1],
-        origin="; ".join(filter(None, (versions_of(found.versions), str(found.folder), command))),
-        settings=len(found.settings),
-        varied=f" over {listed(found.parameters)}" if found.parameters else "",
-        seeds=found.seeds,
-        **_floor_slots(found),
+        _headline(sweep),
+        what=sweep.what,
+        left=sweep.sides[0],
+        right=sweep.sides[1],
+        origin="; ".join(filter(None, (versions_of(sweep.versions), str(sweep.folder), command))),
+        settings=len(sweep.settings),
+        varied=f" over {listed(sweep.parameters)}" if sweep.parameters else "",
+        seeds=sweep.seeds,
+        **_floor_slots(sweep),
         left_out=", ".join(left_out) or None,
-        none=found.quantity.counts.get("no runs", 0),
+        none=sweep.quantity.counts.get("no runs", 0),
         sections=sections,
     )
 
 
-def _headline(found: SweepReport) -> Headline:
-    main, shares, causes = found.quantity, found.sensitivity, []
+def _headline(sweep: SweepReport) -> Headline:
+    main, shares, causes = sweep.quantity, sweep.sensitivity, []
     lead = LEAD.format(
-        agreed=found.agreed,
-        settings=len(found.settings),
-        pair=listed(list(found.sides)),
+        agreed=sweep.agreed,
+        settings=len(sweep.settings),
+        pair=listed(list(sweep.sides)),
         tolerance=rounded(main.tolerance, main.unit, 2),
         what=main.says,
     )
-    if found.only_rounding:
+    if sweep.only_rounding:
         causes.append(CAUSES["rounding"])
     elif shares is not None and len(shares.indices) > 1:
         top, kind = shares.indices[0], "rank" if shares.method == "rank" else "share"
         causes.append(CAUSES[kind].format(label=top.label, total=fixed(top.total, 2)))
-    causes += [line(found, each) for each in found.together if each.fit is not None]
-    return Headline(lead, tuple(causes), holds=found.agreed == len(found.settings))
+    causes += [line(sweep, fit) for fit in sweep.together if fit.fit is not None]
+    return Headline(lead, tuple(causes), holds=sweep.agreed == len(sweep.settings))
 
 
-def _floor_slots(found: SweepReport) -> dict[str, Any]:
+def _floor_slots(sweep: SweepReport) -> dict[str, Any]:
     """How high the chaos floor is, and how it was made; or why it is not known."""
-    floor = found.floor
+    floor = sweep.floor
     if floor is None:
-        return {"no_floor": found.no_floor, "backend": None, "width": None}
-    widths = [each.floor for each in found.settings if each.floor is not None]
+        return {"no_floor": sweep.no_floor, "backend": None, "width": None}
+    widths = [setting.floor for setting in sweep.settings if setting.floor is not None]
     return {
         **{"no_floor": None, "backend": floor.backend, "rounding": floor.rounding},
         **{"where": floor.settings, "cells": floor.cells, "seconds": floor.seconds},
-        "width": rough(max(widths), found.quantity.unit),
-        "inside": sum(each.inside_floor for each in found.settings),
+        "width": rough(max(widths), sweep.quantity.unit),
+        "inside": sum(setting.inside_floor for setting in sweep.settings),
     }
 
 
-def _where(found: SweepReport) -> list[Block]:
-    chart = found.map
+def _where(sweep: SweepReport) -> list[Block]:
+    chart = sweep.map
     return template.blocks(
         "sweep_map",
         quantities=Table.of(
-            found.quantities,
+            sweep.quantities,
             {
                 "gap of": lambda gaps: gaps.says,
                 "within": lambda gaps: rounded(gaps.tolerance, gaps.unit, 2),
@@ -105,23 +105,23 @@ def _where(found: SweepReport) -> list[Block]:
                 "median": lambda gaps: quantity(gaps.median, gaps.unit),
                 "worst": lambda gaps: quantity(gaps.worst, gaps.unit),
             },
-            f"How many settings, of {len(found.settings)}",
-            emphasis=lambda gaps: gaps.name == found.quantity.name,
+            f"How many settings, of {len(sweep.settings)}",
+            emphasis=lambda gaps: gaps.name == sweep.quantity.name,
             wide={"median"},
         ),
-        tables=_map_tables(found, chart) if chart else [],
+        tables=_map_tables(sweep, chart) if chart else [],
         legend=if_true(chart),
         others=(chart and listed(chart.others)) or None,
         sampled=(chart and listed(chart.sampled)) or None,
-        picture=map_picture(found),
-        largest=_largest(found) if len(found.settings) > _SHOWN or chart is None else None,
+        picture=map_picture(sweep),
+        largest=_largest(sweep) if len(sweep.settings) > _SHOWN or chart is None else None,
     )
 
 
-def _map_tables(found: SweepReport, chart: GapMap) -> list[Table]:
+def _map_tables(sweep: SweepReport, chart: GapMap) -> list[Table]:
     """The map; of many columns, in parts that a terminal has room for."""
-    tolerance = found.quantity.tolerance
-    scale, unit = reading(found.quantity.unit)
+    tolerance = sweep.quantity.tolerance
+    scale, unit = reading(sweep.quantity.unit)
 
     def cell(r: int, c: int) -> str:
         value = chart.gap[r][c]
@@ -131,14 +131,14 @@ def _map_tables(found: SweepReport, chart: GapMap) -> list[Table]:
         return f"{mark}{rough(value * scale)}"
 
     up, across = (
-        label if label in found.scaled else axis(found, label)  # an x behind each value says it
+        label if label in sweep.scaled else axis(sweep, label)  # an x behind each value says it
         for label in (chart.up, chart.across)
     )
-    places = [setting_word(found, chart.across, value) for value in chart.columns]
-    names = [setting_word(found, chart.up, value) for value in chart.rows] if chart.up else ["gap"]
+    places = [setting_word(sweep, chart.across, value) for value in chart.columns]
+    names = [setting_word(sweep, chart.up, value) for value in chart.rows] if chart.up else ["gap"]
     rows = [(name, *(cell(r, c) for c in range(len(places)))) for r, name in enumerate(names)]
     down = f"{up} down, " if chart.up else ""
-    title = f"The gap of the {found.quantity.says},{unit}: {down}{across} across"
+    title = f"The gap of the {sweep.quantity.says},{unit}: {down}{across} across"
     return [
         Table(
             (chart.up or chart.across, *places[k : k + _COLUMNS]),
@@ -149,14 +149,14 @@ def _map_tables(found: SweepReport, chart: GapMap) -> list[Table]:
     ]
 
 
-def _largest(found: SweepReport) -> Table:
-    known = [setting for setting in found.settings if setting.median is not None]
+def _largest(sweep: SweepReport) -> Table:
+    known = [setting for setting in sweep.settings if setting.median is not None]
     known.sort(key=lambda setting: -(setting.median or 0.0))
-    unit = found.quantity.unit
+    unit = sweep.quantity.unit
     return Table.of(
         known[:_SHOWN],
         {
-            "setting": partial(_setting, found),
+            "setting": partial(_setting, sweep),
             "median": lambda setting: quantity(setting.median, unit),
             "worst": lambda setting: quantity(setting.worst, unit),
             "verdict": lambda setting: setting.verdict,
@@ -166,32 +166,32 @@ def _largest(found: SweepReport) -> Table:
     )
 
 
-def _setting(found: SweepReport, setting: SettingGap) -> str:
-    pairs = zip(found.parameters, setting.values, strict=True)
-    words = [f"{name} {setting_word(found, name, value)}" for name, value in pairs]
+def _setting(sweep: SweepReport, setting: SettingGap) -> str:
+    pairs = zip(sweep.parameters, setting.values, strict=True)
+    words = [f"{name} {setting_word(sweep, name, value)}" for name, value in pairs]
     return few(words, 4) or "as it is"
 
 
-def _sensitive(found: SweepReport) -> list[Block]:
-    shares = None if found.only_rounding else found.sensitivity
+def _sensitive(sweep: SweepReport) -> list[Block]:
+    shares = None if sweep.only_rounding else sweep.sensitivity
     alone = shares is not None and len(shares.indices) == 1
     if shares is None or alone:
         return template.blocks(
             "sweep_no_shares",
-            rounding=if_true(found.only_rounding),
-            same=if_true(not found.only_rounding and not alone),
+            rounding=if_true(sweep.only_rounding),
+            same=if_true(not sweep.only_rounding and not alone),
             alone=if_true(alone),
         )
     rank = shares.method == "rank"
     rows = [
         (
-            each.label,
-            TableCell(fixed(each.first, 2), share=each.first),
-            _interval(each.first_interval),
-            TableCell(fixed(each.total, 2), share=each.total),
-            _interval(each.total_interval),
+            index.label,
+            TableCell(fixed(index.first, 2), share=index.first),
+            _interval(index.first_interval),
+            TableCell(fixed(index.total, 2), share=index.total),
+            _interval(index.total_interval),
         )
-        for each in shares.indices
+        for index in shares.indices
     ]
     heads = ("parameter", "first order", "95 %", "total", "95 %")
     table = Table(heads, rows, "Shares of the gap's variance")
@@ -208,7 +208,7 @@ def _sensitive(found: SweepReport) -> list[Block]:
         error=shares.error or None,
         no_error=if_true(not rank and not shares.error),
         notes=" ".join(shares.notes) or None,
-        picture=bars(found),
+        picture=bars(sweep),
     )
 
 

@@ -268,7 +268,7 @@ def _widths(block: Table, width: int) -> list[int | None]:
     columns = zip(block.headers, *block.rows, strict=True)
     widths = [widest(cells, k in block.words) for k, cells in enumerate(columns)]
     fits = sum(widths) + 3 * (len(widths) - 1) <= width
-    return [each if fits else None for each in widths]
+    return [column if fits else None for column in widths]
 
 
 def _hanging(mark: str | RichText, text: str) -> RenderableType:

@@ -1,0 +1,157 @@
+"""What is said of students: a file judged, the files of a class, and what their tests catch."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+
+from ..grading.class_table import NOTHING, ClassEntry, verdict_word
+from ..grading.exercise import Grade
+from ..grading.judges import JUDGES
+from ..grading.mutants.run import Examination, MutantTrial
+from ..measures.text import count
+from ..page import Page, Table, Text, Verdict
+from . import template
+from .template import if_true, versions_of
+
+
+def grade_page(grade: Grade) -> Page:
+    """What each function does, and how many do what they should."""
+    remarks = {judgement.remarks for judgement in grade.functions}
+    if len(remarks) == 1 and grade.right == 0 and len(grade.functions) > 1:
+        judgements = [Verdict(text, False) for text in remarks.pop()]  # of the file as a whole
+    else:
+        judgements = [
+            Verdict(f"{judgement.function}: {text}", judgement.passed)
+            for judgement in grade.functions
+            for text in judgement.remarks
+        ]
+    todo = sum(not judgement.written for judgement in grade.functions)
+    return template.page(
+        "grade",
+        file=grade.file,
+        backend=grade.backend,
+        versions=versions_of(grade.versions),
+        judgements=judgements,
+        right=grade.right,
+        total=len(grade.functions),
+        todo=f"; {todo} not written yet" if todo else "",
+        passed=if_true(grade.passed),
+    )
+
+
+def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
+    """A row a file, and what a teacher should look at.
+
+    Args:
+        entries: What became of each submission.
+        ignored: Names of files that were not looked at.
+    """
+    columns: dict[str, Callable[[ClassEntry], str]] = {
+        "file": lambda entry: entry.student or entry.name,
+        "right": lambda entry: f"{entry.right} of {len(JUDGES)}" if entry.judged else "?",
+        "what is not right": lambda entry: entry.reasons,
+        "tests": lambda entry: entry.tests.partition(";")[0],
+        "predictions": lambda entry: entry.predictions,
+        "alike": lambda entry: entry.alike,
+    }
+    shown = {name: cell for name, cell in columns.items() if any(map(cell, entries))}
+    table = Table.of(entries, shown, words=shown, wide={"predictions", "alike"})
+    copies = [(e.name, f"has the same code as {e.same_as}.") for e in entries if e.same_as]
+    looks = [(f"{entry.name}:", look) for entry in entries for look in entry.looks]
+    unjudged = {
+        entry.name: entry.refusal or next(e.remarks[0] for e in entry.functions if not e.judged)
+        for entry in entries
+        if not entry.judged
+    }
+    return template.page(
+        "classroom",
+        files=count(sum(entry.refusal != NOTHING for entry in entries), "file"),
+        made_with=entries[0].made_with,
+        table=table,
+        solved=sum(entry.right == len(JUDGES) for entry in entries),
+        ignored=", ".join(ignored) or None,
+        notes=[Text(f"{name} {note}") for name, note in (*copies, *looks)],
+        unjudged=[Verdict(f"{n} could not be judged: {why}", False) for n, why in unjudged.items()],
+        all_judged=None if unjudged else True,
+    )
+
+
+_WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
+
+
+def mutants_page(examination: Examination) -> Page:
+    """The examination as a page."""
+    trials = Table.of(
+        examination.trials,
+        {
+            "fault": lambda trial: trial.mutant.name,
+            "what is wrong": lambda trial: trial.mutant.wrong,
+            "caught by": _catchers,
+        },
+        "One fault at a time",
+        words={"what is wrong", "caught by"},
+        emphasis=lambda trial: not trial.caught,
+    )
+    failures, hints = examination.failures, [(m.name, m.hint) for m in examination.survivors]
+    idle = examination.idle and len(examination.trials) > 1 and not failures
+    return template.page(
+        "mutants",
+        file=examination.file,
+        tests=count(len(examination.tests), "test"),
+        backend=examination.backend,
+        version=examination.engine_version,
+        trials=None if failures else trials,
+        hints=[] if failures else [Text(f"{name}: {hint}.") for name, hint in hints],
+        idle=", ".join(examination.idle) if idle else None,
+        healthy=None if failures else not hints,
+        caught=examination.caught,
+        faults=count(len(examination.trials), "fault"),
+        unhealthy=False if failures else None,
+        failures=[Text(_cut(f"{failure.test}: {failure.why}", _SHOWN)) for failure in failures],
+    )
+
+
+def _catchers(trial: MutantTrial) -> str:
+    """The first test that caught it, and how many others did."""
+    if not trial.caught:
+        return "nothing"
+    first, *others = trial.caught_by
+    more = f" +{len(others)}" if others else ""
+    return _cut(first.test.removeprefix("test_"), _WIDTH - len(more)) + more
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def gradescope_results(grade: Grade | None, refusal: str = "", points: float = 1.0) -> str:
+    """A judgement in the form that Gradescope reads, the text of its `results.json`.
+
+    The form is described in Gradescope's documentation, "Autograder Specifications".
+
+    Args:
+        grade: Of the submission; None where it could not be judged.
+        refusal: Why it could not, shown to the student.
+        points: For each function.
+    """
+    judgements = {judgement.function: judgement for judgement in grade.functions} if grade else {}
+    tests = []
+    for name in JUDGES:
+        judgement = judgements.get(name)
+        passed = judgement is not None and judgement.passed
+        remarks = [refusal] if judgement is None else [verdict_word(judgement), *judgement.remarks]
+        tests.append(
+            {
+                "name": name,
+                "score": points if passed else 0.0,
+                "max_score": points,
+                "status": "passed" if passed else "failed",
+                "output": "\n".join(remarks),
+                "visibility": "visible",
+            }
+        )
+    versions = grade.versions if grade else {}
+    output = versions_of(versions)
+    document = {"tests": tests, "output": output or refusal, "visibility": "visible"}
+    return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
