@@ -86,7 +86,7 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
         need_engine("pybullet")
     if "fingertip" in words:
         need_engine("pinocchio")
-    if "mujoco==" in command:
+    if "mujoco==" in command or "--versions" in command:
         request.getfixturevalue("old_releases")
     if "path/to/menagerie" in words:
         folder = request.getfixturevalue("menagerie")

@@ -121,7 +121,7 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
             for k, pair in enumerate(pairs)
         ]
     write_junit(options, comparisons)
-    page = steps.versions(comparisons, _name(request))
+    page = steps.versions(comparisons, request)
     if options.plot is not None:
         write_pictures(page.blocks, options.plot)
     return show(page, comparisons, options.json)

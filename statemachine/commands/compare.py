@@ -118,7 +118,17 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_rules(parser, *RULES)
     shorten_help(
         parser,
-        *("what", "backends", "why", "html", "plot", "seconds", "tolerance", "one_step"),
+        *(
+            "what",
+            "backends",
+            "why",
+            "html",
+            "plot",
+            "seconds",
+            "tolerance",
+            "one_step",
+            "versions",
+        ),
         *("models", "json"),
     )
 

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
-from ..compare import Comparison, QuantityLimit, StepComparison, TimestepConvergence
+from ..compare import Comparison, QuantityLimit, Request, StepComparison, TimestepConvergence
 from ..compare.one_step import StageGap
 from ..compare.stages import FORCES
-from ..measures.text import NONE, figure, listed, milliseconds, quantity, sentence, short_time
-from ..page import Bars, Headline, Items, Page, Table
+from ..measures.text import (
+    NONE,
+    command,
+    figure,
+    listed,
+    milliseconds,
+    quantity,
+    sentence,
+    short_time,
+)
+from ..page import Bars, Code, Headline, Items, Page, Table
 from . import template
 from .finding import leading, moment, name_of
 from .template import if_true
@@ -24,8 +34,6 @@ TOUCH = {
     True: "Before the first touch, at {touch}, there is no gap.",
     False: "Before the first touch, at {touch}, there is nothing but discretisation.",
 }
-CHANGED = "The motion changes between {pairs}"
-SAME = "The motion is the same on all of them, within its tolerances"
 
 
 def convergence(result: TimestepConvergence, experiment: str) -> Page:
@@ -183,32 +191,38 @@ def _stage_cells(gap: StageGap) -> tuple[str, ...]:
     )
 
 
-def versions(comparisons: Sequence[Comparison], experiment: str) -> Page:
-    """What each comparison of a release with the next one found."""
-    sides = [(comparison.one, comparison.two) for comparison in comparisons]
-    pairs = [tuple(s.provenance.versions[s.backend] for s in both) for both in sides]
+def versions(comparisons: Sequence[Comparison], request: Request) -> Page:
+    """What each comparison of a release with the next one gives, and a command that asks why."""
+    what, model = request.what[0], request.model or request.scenario().model
     rows, changed, bars = [], [], []
-    for (left, right), comparison in zip(pairs, comparisons, strict=True):
-        worst = leading(comparison)
+    for comparison in comparisons:
+        both = comparison.one, comparison.two
+        left, right = (side.provenance.versions[side.backend] for side in both)
+        cells, worst = ("nothing differs", NONE, NONE, NONE), leading(comparison)
         bars.append((worst.max / worst.tolerance if worst.tolerance else 0.0, None))
-        largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
-        cells = name_of(worst.name), largest, short_time(worst.at), tolerance
+        if worst.max:
+            largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
+            cells = (name_of(worst.name), largest, short_time(worst.at), tolerance)
         rows.append((left, right, *cells, "agrees" if comparison.agrees else "DIFFERS"))
-        changed += [] if comparison.agrees else [f"MuJoCo {left} and {right}"]
+        if not comparison.agrees:
+            changed.append((f"MuJoCo {left} and {right}", [f"{model}@{s.backend}" for s in both]))
     heads = ("release", "next", "quantity", "largest", "at", "tolerance", "verdict")
-    headline = Headline(CHANGED.format(pairs=listed(changed)), holds=False)
     return template.page(
         "versions",
-        headline if changed else Headline(SAME),
-        experiment=experiment,
-        first=pairs[0][0],
-        last=pairs[-1][1],
+        experiment=Path(what).name,
+        first=rows[0][0],
+        last=rows[-1][1],
         until=max(comparison.until for comparison in comparisons),
         steps=Table(heads, rows, "From release to release", words=frozenset({0, 1, 2, 6})),
         bars=Bars(
             "How far a release is from the next",
             "largest gap [tolerances]",
-            [f"{left} to {right}" for left, right in pairs],
+            [f"{left} to {right}" for left, right, *_ in rows],
             {"farthest beyond its tolerance": bars},
         ),
-    )
+        why=[Code([command(["statemachine", "compare", what, *sides, "--why"])])
+             for _, sides in changed],
+        same=None if changed else True,
+        differs=False if changed else None,
+        pairs=listed([pair for pair, _ in changed]) or None,
+    )  # fmt: skip

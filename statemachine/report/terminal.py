@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..page import (
@@ -236,17 +236,12 @@ def _grid(block: Table, plain: bool, width: int) -> RenderableType:
         pad_edge=False,
         show_edge=False,
     )
-    widths = _widths(block, width)
-    for k, header in enumerate(block.headers):
-        grid.add_column(
-            _shown(header, plain),
-            justify="left" if k in block.words else "right",
-            overflow="fold",
-            min_width=widths[k],
-        )
-    for k, row in enumerate(block.rows):
-        cells = (_shown(_loud(cell), plain) for cell in row)
-        grid.add_row(*cells, style="bold" if k in block.emphasis else None)
+    rows = [[_shown(_loud(c), plain) for c in row] for row in (block.headers, *block.rows)]
+    for k, cells in enumerate(_widths(rows, block.words, width)):
+        justify = "left" if k in block.words else "right"
+        grid.add_column(rows[0][k], justify=justify, overflow="fold", width=cells)
+    for k, row in enumerate(rows[1:]):
+        grid.add_row(*row, style="bold" if k in block.emphasis else None)
     return grid
 
 
@@ -256,19 +251,23 @@ def _loud(cell: str) -> str:
     return cell.upper() if differs else cell
 
 
-def _widths(block: Table, width: int) -> list[int | None]:
-    """The least widths at which columns break no name and no number, if there is room for them."""
+def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) -> list[int | None]:
+    """Widths of columns that break no name and no number, if there is room for them."""
     from rich.cells import cell_len
 
-    def widest(cells: Sequence[str], words: bool) -> int:
-        # Words of a column may wrap; numbers must not.
-        parts = [part for cell in cells for part in (cell.split() if words else [cell])]
-        return max(map(cell_len, parts), default=0)
-
-    columns = zip(block.headers, *block.rows, strict=True)
-    widths = [widest(cells, k in block.words) for k, cells in enumerate(columns)]
-    fits = sum(widths) + 3 * (len(widths) - 1) <= width
-    return [column if fits else None for column in widths]
+    columns = list(zip(*rows, strict=True))
+    # Words of a column may wrap; numbers must not.
+    parts = [" ".join(cells).split() if k in words else cells for k, cells in enumerate(columns)]
+    least = [max(map(cell_len, cells), default=0) for cells in parts]
+    free = width - sum(least) - 3 * (len(least) - 1)
+    if free < 0:
+        return [None] * len(least)
+    widths: list[int | None] = []
+    for cells, size in zip(columns, least, strict=True):
+        more = min(max(map(cell_len, cells)) - size, free)
+        widths.append(size + more)
+        free -= more
+    return widths
 
 
 def _hanging(mark: str | RichText, text: str) -> RenderableType:
