@@ -50,13 +50,16 @@ def version_of(name: str) -> str:
     """The version that a release's name has.
 
     Raises:
-        BadInputError: It is no such name.
+        BadInputError: It is no such name, or has not three numbers.
         UnknownNameError: There is no such engine that runs.
     """
     match = _NAME.fullmatch(name)
     if match is None:
         raise BadInputError(f"{name!r} is no release of an engine: type {_EXAMPLE}")
     check_name("engine", match["engine"], [name for name, engine in ENGINES.items() if engine.runs])
+    lacking = 2 - match["version"].count(".")
+    if lacking > 0:
+        raise BadInputError(f"releases have three numbers: type {name}{'.0' * lacking}")
     return match["version"]
 
 

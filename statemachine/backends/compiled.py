@@ -102,6 +102,9 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
             raw = spec.compile() if spec else mujoco.MjModel.from_xml_path(text)
     except (ValueError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
+        if missing := re.search(r"opening file '(.*)'", reason):
+            place = Path(text).absolute().parent / Path(missing[1]).parent
+            reason += f"; it is looked for in {place}: copy that folder along with the model"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
     check_numbers(raw, text)
     if doubtful := "; ".join(_doubtful(raw)):

@@ -12,7 +12,7 @@ OPTIONS: tuple[Row, ...] = (
         "NAME|FILE",
         "two models, URDF or MJCF, before anything moves; FILE@ENGINE, or --backends and one "
         "model: what an engine makes of it",
-        {"nargs": "+"},
+        {"nargs": "*"},
     ),
     ("--frame", "LEFT=RIGHT", "a frame of the left and what the right calls it", REPEATED),
     ("--rename", None, argparse.SUPPRESS, REPEATED, {"dest": "map"}),
@@ -43,17 +43,17 @@ def run(options: argparse.Namespace) -> int:
         given = [
             (model, engine) for (model, _), engine in zip(given, options.backends, strict=False)
         ]
-    typed = options.models[0].replace(",", " ").split()
+    typed = " ".join(options.models or options.what[-2:]).replace(",", " ").split()
     hint = "two models, or one and --backends A B"
-    if len(options.models) == 1 and len(typed) == 2:
-        hint = f"two words: {PROGRAM} compare --models {' '.join(typed)}"
+    if len(options.models) < 2 and len(typed) == 2:
+        hint = f"two words behind it: {PROGRAM} compare --models {' '.join(typed)}"
     digits = 6 if options.digits is None else options.digits
     refuse(
-        *((True, f"--models compares descriptions; {word} is a run") for word in options.what),
         (
             len(given) != 2 or len(options.models) > 2,
             f"--models wants {hint}; got {len(options.models)}",
         ),
+        *((True, f"--models compares descriptions; {word} is a run") for word in options.what),
         (not 1 <= digits <= 17, f"--digits wants a number from 1 to 17; got {digits}"),
         (options.seed < 0, f"--seed must not be negative; got {options.seed}"),
     )

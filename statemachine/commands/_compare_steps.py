@@ -45,7 +45,7 @@ def run(options: argparse.Namespace, request: Any) -> int:
         request: The `compare.Request`; not of recorded traces alone.
     """
     asked = {"--one-step": _one_step, "--converge": _converge, "--versions": _versions}
-    flag = next(flag for flag in asked if getattr(options, flag[2:].replace("-", "_")))
+    flag = "--one-step" if options.one_step else "--converge" if options.converge else "--versions"
     refuse(
         (
             request.is_traces and not request.sides,

@@ -268,7 +268,7 @@ def run(options: argparse.Namespace) -> int:
             f"--budget wants a number of runs, at least 1; got {options.budget}",
         )
     )
-    if options.models:
+    if options.models is not None:
         return _compare_models.run(options)
     refuse(
         (
@@ -277,7 +277,7 @@ def run(options: argparse.Namespace) -> int:
             f"{PROGRAM} compare hold",
         )
     )
-    if options.one_step or options.converge or options.versions:
+    if options.one_step or options.converge or options.versions is not None:
         return _compare_steps.run(options, request_of(options))
     if options.why and not options.html:
         refuse(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import asdict
+from platform import python_version
 
 from ._common import PROGRAM, add_table, json_of
 
@@ -31,6 +32,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """What is here."""
+    from ..installed import available, engine_version
+    from ..measures.text import NONE
     from ..page import Page, Table, Text
     from ..releases import folder, releases
     from ..report import terminal
@@ -40,10 +43,12 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(dumps([asdict(release) for release in here]))
         return 0
+    own = [(f"{name}=={engine_version(name)}", python_version(), NONE) for name in available()[0]]
     rows = [(r.name, r.python, f"{r.size / 1e6:.0f} MB") for r in here]
     hint = Text(f"To add one: {PROGRAM} engines add mujoco==3.3.7")
-    table = Table(("release", "python", "size"), rows, f"Releases in {folder()}")
-    terminal.show(Page("Releases of engines", "", [table] if rows else [hint]), "")
+    table = Table(("release", "python", "size"), [*rows, *own])
+    origin = f"those with a size are in {folder()}, the others beside this program"
+    terminal.show(Page("Releases of engines", origin, [table, hint]))
     return 0
 
 

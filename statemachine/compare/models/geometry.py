@@ -171,7 +171,7 @@ def of_masses(
         *("mass", where, "", (mine.mass, theirs.mass), "kg"),
         slack=2,
         matters=matters,
-        effect="{share:.1%} of it" if matters else _STILL,
+        effect="{share:.1%} of the larger" if matters else _STILL,
         keys=[("body", where, "mass")],
     )
     if not heavy and not mine.tensor.any() and not theirs.tensor.any():
