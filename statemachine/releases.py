@@ -15,12 +15,13 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from .errors import BadInputError, EngineError, MissingEngineError, check_name
 from .installed import DEFAULT, ENGINES, engine_version
 
-_NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+(\.\w+)*)")
+_NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)")
 _ADD = "not here: {}; to have it: statemachine engines add {}"
 _LARGE = 1e9  # [byte], more than any takes while it is made
 _EXAMPLE = f"{DEFAULT}==3.3.7"
@@ -50,16 +51,16 @@ def version_of(name: str) -> str:
     """The version that a release's name has.
 
     Raises:
-        BadInputError: It is no such name, or has not three numbers.
+        BadInputError: It is no such name.
         UnknownNameError: There is no such engine that runs.
     """
     match = _NAME.fullmatch(name)
     if match is None:
-        raise BadInputError(f"{name!r} is no release of an engine: type {_EXAMPLE}")
+        whole = f"{name}.0" if re.fullmatch(r"[a-z]+==\d+\.\d+", name) else _EXAMPLE
+        raise BadInputError(
+            f"{name!r} is no release of an engine, which has three numbers: type {whole}"
+        )
     check_name("engine", match["engine"], [name for name, engine in ENGINES.items() if engine.runs])
-    lacking = 2 - match["version"].count(".")
-    if lacking > 0:
-        raise BadInputError(f"releases have three numbers: type {name}{'.0' * lacking}")
     return match["version"]
 
 
@@ -83,10 +84,9 @@ def python_of(name: str) -> Path:
         BadInputError: As `version_of`.
     """
     version_of(name)
-    python = _python_in(folder() / name)
-    if not python.exists():
+    if not is_here(name):
         raise MissingEngineError(_ADD.format(name, name), engine=name)
-    return python
+    return _python_in(folder() / name)
 
 
 def backends_of(versions: str) -> list[str]:
@@ -121,19 +121,25 @@ def published(since: str) -> list[str]:
         EngineError: It cannot be asked.
         BadInputError: It has no such release.
     """
-    asked = [sys.executable, "-m", "pip", "index", "versions", DEFAULT]
+    version_of(f"{DEFAULT}=={since}")
+    uv, pip = shutil.which("uv"), [sys.executable, "-m", "pip"]
+    if uv and find_spec("pip") is None:
+        pip = [uv, "tool", "run", "--python", sys.executable, "pip"]
+    asked = [*pip, "index", "versions", DEFAULT]
     done = subprocess.run(asked, capture_output=True, text=True, stdin=subprocess.DEVNULL)  # noqa: PLW1510
     line = re.search(r"^Available versions: (.*)$", done.stdout, re.MULTILINE)
     if line is None:
         reason = (done.stderr.strip().splitlines() or ["pip does not say"])[-1]
         raise EngineError(f"the releases of {DEFAULT} cannot be listed: {reason}")
     installed = engine_version(DEFAULT)
-    newest_first = [version.strip() for version in line[1].split(",")]
-    if since not in newest_first or since == installed:
+    versions = [version.strip() for version in reversed(line[1].split(","))]
+    if since not in versions or since == installed:
         raise BadInputError(f"the package index has no {DEFAULT}=={since} before {installed}")
-    start = newest_first.index(installed) + 1 if installed in newest_first else 0
-    older = newest_first[start : newest_first.index(since) + 1]
-    return [*(f"{DEFAULT}=={version}" for version in reversed(older)), DEFAULT]
+    end = versions.index(installed) if installed in versions else None
+    return [
+        *(f"{DEFAULT}=={version}" for version in versions[versions.index(since) : end]),
+        DEFAULT,
+    ]
 
 
 def _python_in(place: Path) -> Path:
@@ -142,9 +148,7 @@ def _python_in(place: Path) -> Path:
 
 def releases() -> Iterator[Release]:
     """Those that are here, by name."""
-    for place in sorted(folder().glob("*==*")):
-        if place.name[0] == ".":  # is being made
-            continue
+    for place in sorted(folder().glob("[a-z]*==*")):  # one that is being made begins with a dot
         settings = place / "pyvenv.cfg"
         text = settings.read_text(encoding="utf-8") if settings.exists() else ""
         python = re.search(r"^version(?:_info)? *= *(\S+)", text, re.MULTILINE)

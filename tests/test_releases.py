@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ import statemachine as sm
 from statemachine import conformance, releases
 from statemachine.backends.release_backend import ServedEngine, Server, served
 from statemachine.cli import main
+from statemachine.compare import around_a_change
 from statemachine.compare.models import read
 from statemachine.errors import (
     BadInputError,
@@ -75,6 +77,7 @@ def run_of(model: Any, nstep: int = 400, call: int = 1) -> Any:
     [
         (OLD, MissingEngineError, f"statemachine engines add {OLD}"),
         ("mujoco==new", BadInputError, "type mujoco==3.3.7"),
+        ("mujoco==3.3", BadInputError, "three numbers: type mujoco==3.3.0"),
         ("pybullet==3.2.5", MissingEngineError, "statemachine engines add pybullet==3.2.5"),
         ("pinocchio==3.0.0", UnknownNameError, "no engine named 'pinocchio'"),
     ],
@@ -162,6 +165,23 @@ def test_two_that_add_it_at_once(adding: Callable[[str], Any]) -> None:
     assert [process.returncode for process in both] == [0, 0], ends
     assert [place.name for place in releases.folder().iterdir()] == [OLD]
     assert [release.name for release in releases.releases()] == [OLD]
+
+
+def test_bisection_leaves_out_what_cannot_be_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is 5 that changed the motion; 4 and 5 have no wheel for this Python."""
+
+    def add(name: str, say: Callable[[str], object]) -> None:
+        if name[-1] in "45":
+            raise EngineError(f"{name} cannot be installed")
+
+    monkeypatch.setattr(sys.modules[around_a_change.__module__], "add", add)
+    rows, said = [*(f"mujoco==3.0.{k}" for k in range(9)), "mujoco"], list[str]()
+    changed = set(rows[5:])
+    found = around_a_change(
+        rows, lambda pair: SimpleNamespace(agrees=pair[1] not in changed), said.append
+    )
+    assert found == [rows[0], rows[3], rows[6], "mujoco"]
+    assert said == [f"{rows[k]} cannot be installed; it is left out" for k in (4, 5)]
 
 
 @pytest.mark.slow

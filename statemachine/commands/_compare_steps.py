@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ._common import PROGRAM, Row, refuse, show
+from ._common import PROGRAM, Row, complain, refuse, show
 from ._compare_pictures import checked
 
 OPTIONS: tuple[Row, ...] = (
@@ -94,7 +93,7 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
 
 
 def _versions(options: argparse.Namespace, request: Any) -> int:
-    from ..compare import compare, run_sides
+    from ..compare import around_a_change, compare, run_sides
     from ..measures import parse_tolerances
     from ..releases import backends_of, published
     from ..report import steps
@@ -111,7 +110,9 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
         return compare(*traces, tolerances=tolerances)
 
     if options.bisect:
-        backends = _around_a_change(published(options.versions), compared)
+        backends = around_a_change(
+            published(options.versions), compared, lambda text: complain(text, 0)
+        )
     else:
         backends = backends_of(options.versions)
     pairs = list(pairwise(backends))
@@ -125,30 +126,6 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
     if options.plot is not None:
         write_pictures(page.blocks, options.plot)
     return show(page, comparisons, options.json)
-
-
-def _around_a_change(
-    backends: Sequence[str], compared: Callable[[tuple[str, str]], Any]
-) -> list[str]:
-    """The first and the last of a row of releases, and two neighbours between that differ.
-
-    By bisection: the left bound agrees with the first one. Releases that are not here are added.
-    """
-    from ..releases import add, is_here, is_release
-
-    def differs(k: int) -> bool:
-        for name in (backends[0], backends[k]):
-            if is_release(name) and not is_here(name):
-                add(name, say=lambda line: print(line, file=sys.stderr))
-        return not compared((backends[0], backends[k])).agrees
-
-    left, right = 0, len(backends) - 1
-    if not differs(right):
-        return [backends[0], backends[-1]]
-    while right - left > 1:
-        middle = (left + right) // 2
-        left, right = (left, middle) if differs(middle) else (middle, right)
-    return [backends[k] for k in sorted({0, left, right, len(backends) - 1})]
 
 
 def check_junit(options: argparse.Namespace) -> None:
