@@ -97,7 +97,7 @@ def _in_menagerie(name: str, root: Path) -> Path:
     if not root.is_dir():
         raise ModelFileError(f"menagerie folder {root} does not exist")
     folder, _, file = name.rpartition("/")
-    folder, file = (folder, file) if folder else (name, name)
+    folder = folder or name
     robot = _COUNTERPARTS.get(folder, folder)
     # `root` may be the whole menagerie or the robot's own folder.
     home = root if root.name == robot else root / robot
@@ -121,7 +121,7 @@ def mesh_file(name: str, folder: Path) -> Path | None:
     if plain.startswith("package://"):
         inside = plain.removeprefix("package://")
         rest = inside.partition("/")[2]
-        above = (folder, *list(folder.parents)[:3])
+        above = (folder, *folder.parents[:3])
         choices = [up / part for up in above for part in (inside, rest)]
     for choice in choices:
         try:
@@ -157,6 +157,5 @@ def numbers(text: str, count: int, what: str) -> list[float]:
     except ValueError:
         found = []
     if len(found) != count or not all(map(math.isfinite, found)):
-        plural = "s" if count > 1 else ""
-        raise ModelError(f"{what} is {shown(text)}, and should be {count} number{plural}")
+        raise ModelError(f"{what} is {shown(text)}; numbers wanted: {count}")
     return found

@@ -56,7 +56,7 @@ def version_of(name: str) -> str:
     """
     match = _NAME.fullmatch(name)
     if match is None:
-        whole = f"{name}.0" if re.fullmatch(r"[a-z]+==\d+\.\d+", name) else _EXAMPLE
+        whole = f"{name}.0" if _NAME.fullmatch(f"{name}.0") else _EXAMPLE
         raise BadInputError(
             f"{name!r} is no release of an engine, which has three numbers: type {whole}"
         )
@@ -121,18 +121,16 @@ def published(since: str) -> list[str]:
         EngineError: It cannot be asked.
         BadInputError: It has no such release.
     """
-    version_of(f"{DEFAULT}=={since}")
-    uv, pip = shutil.which("uv"), [sys.executable, "-m", "pip"]
-    if uv and find_spec("pip") is None:
-        pip = [uv, "tool", "run", "--python", sys.executable, "pip"]
-    asked = [*pip, "index", "versions", DEFAULT]
+    uv = ["uv", "tool", "run", "--python", sys.executable]  # which brings a pip where there is none
+    run = uv if find_spec("pip") is None and shutil.which("uv") else [sys.executable, "-m"]
+    asked = [*run, "pip", "index", "versions", DEFAULT]
     done = subprocess.run(asked, capture_output=True, text=True, stdin=subprocess.DEVNULL)  # noqa: PLW1510
     line = re.search(r"^Available versions: (.*)$", done.stdout, re.MULTILINE)
     if line is None:
-        reason = (done.stderr.strip().splitlines() or ["pip does not say"])[-1]
+        reason = done.stderr.strip().rpartition("\n")[2] or "pip does not say"
         raise EngineError(f"the releases of {DEFAULT} cannot be listed: {reason}")
     installed = engine_version(DEFAULT)
-    versions = [version.strip() for version in reversed(line[1].split(","))]
+    versions = line[1].replace(" ", "").split(",")[::-1]
     if since not in versions or since == installed:
         raise BadInputError(f"the package index has no {DEFAULT}=={since} before {installed}")
     end = versions.index(installed) if installed in versions else None

@@ -436,7 +436,7 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
         (
             '<robot name="r"><link name="a"><inertial><mass value="nan"/></inertial></link>'
             "</robot>",
-            "should be 1 number",
+            "numbers wanted: 1",
         ),
         (
             '<robot name="r"><link name="a"><inertial><mass value="-1"/></inertial></link></robot>',
@@ -455,7 +455,7 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
         (
             '<robot name="r"><link name="a"><collision><origin xyz="1 2"/><geometry>'
             '<sphere radius="1"/></geometry></collision></link></robot>',
-            "should be 3 numbers",
+            "numbers wanted: 3",
         ),
         (
             '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'

@@ -63,6 +63,11 @@ def test_no_such_model(tmp_path: Path) -> None:
     )
 
 
+def test_a_mesh_that_is_missing_is_told_with_its_folder(tmp_path: Path) -> None:
+    text, folder = resolve("so101").read_text(), re.escape(str(tmp_path / "look"))
+    refused((errors.ModelError, f"{folder}: copy that folder", lambda: model_of(tmp_path, text)))
+
+
 def test_an_mjcf_may_say_so_in_its_name(tmp_path: Path) -> None:
     text = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
     file = written(tmp_path / "robot.mjcf", text)

@@ -94,8 +94,11 @@ def test_commands_without_any(nothing: Path, capsys: pytest.CaptureFixture[str])
     assert main(["engines", "add", "mujoco"]) == BAD_INPUT
     assert main(["engines", "add", OLD, "--python", "no-such-python"]) == BAD_INPUT
     assert main(["compare", "hold", f"so101@{OLD}", "so101"]) == MISSING
+    assert main(["compare", "hold", "--versions", ""]) == BAD_INPUT
+    assert main(["compare", "hold", "a", "b", "--models"]) == BAD_INPUT
     assert main(["compare", "hold", "--versions", "3.1.6,3.3.7"]) == MISSING
     said = capsys.readouterr().err
+    assert_in(said, "'mujoco=='", "two words behind it: statemachine compare --models a b")
     assert "Traceback" not in said
     assert said.endswith("statemachine engines add mujoco==3.1.6 mujoco==3.3.7\n")
     assert not list(nothing.iterdir())

@@ -1,9 +1,9 @@
 """Whether a gap vanishes with the timestep, and between which releases of an engine it comes.
 
-Both sides run with finer and finer steps. What vanishes is discretisation: each side approaches the
-same motion, in its own way. What stays is a difference of the machines. After a touch that cannot be
-told apart so simply: the contact law of an engine depends on its timestep, and the runs have no
-common limit.
+Both sides run with finer and finer steps. What vanishes is discretisation: each side approaches
+the same motion, in its own way. What stays is a difference of the machines. After a touch that
+cannot be told apart so simply: the contact law of an engine depends on its timestep, and the runs
+have no common limit.
 """
 
 from __future__ import annotations
