@@ -88,7 +88,7 @@ def files_are_cached(right: Any, **named: Any) -> None:
 @around("data.Machine", "_compute")
 def forward_steps_the_world_itself(right: Any, self: Any, name: str) -> Any:
     moment = self.moment
-    if moment is None or name in POSES or self._lives:
+    if moment is None or name in POSES or self._world_knows_moment:
         return right(self, name)
     present = self.present()
     found = _parts().hidden.LookAhead(lambda: self.world).at(moment)

@@ -66,11 +66,11 @@ class Machine:
         self._bounds = np.full(model.nq, HUGE), np.minimum(model.max_qvel, HUGE)
         self._fastest = float(self._bounds[1].min(initial=HUGE))
         self.world = model._open_world()
-        self._blank = tuple(np.zeros(size) for _, size in self.world.memory_layout)
+        self._no_memory = tuple(np.zeros(size) for _, size in self.world.memory_layout)
         self.qpos, self.qvel = np.zeros(model.nq), np.zeros(model.nv)
         self.ctrl = np.zeros(model.nu)
-        self._late = np.rint(model.actuator_delay / self.world.timestep).astype(np.int64)
-        self._longest = int(self._late.max(initial=0))
+        self._delay_steps = np.rint(model.actuator_delay / self.world.timestep).astype(np.int64)
+        self._longest_delay = int(self._delay_steps.max(initial=0))
         self._used = False
         self.reset(None)
 
@@ -78,11 +78,11 @@ class Machine:
         """Be in the default state, or in a keyframe's."""
         if key is None:
             still, silent = np.zeros(len(self.qvel)), np.zeros(len(self.ctrl))
-            self.restart(0.0, Moment(self.world.qpos0, still, silent, self._blank))
+            self.restart(0.0, Moment(self.world.qpos0, still, silent, self._no_memory))
         else:
             frame = self._model.keyframes[key]
-            start = Moment(frame.qpos, frame.qvel, frame.ctrl, self._blank)
-            silent = np.zeros((self._longest, len(self.ctrl)))
+            start = Moment(frame.qpos, frame.qvel, frame.ctrl, self._no_memory)
+            silent = np.zeros((self._longest_delay, len(self.ctrl)))
             self.restart(frame.time, start, None if self._model._holds_start else silent)
 
     def restart(self, time: float, start: Moment, given: Array | None = None) -> None:
@@ -98,21 +98,20 @@ class Machine:
             self._used = False
         self.time = time
         self.qpos[:], self.qvel[:], self.ctrl[:] = start.qpos, start.qvel, start.ctrl
-        self.given = np.tile(start.ctrl, (self._longest, 1)) if given is None else given
+        self.given = np.tile(start.ctrl, (self._longest_delay, 1)) if given is None else given
         self._place(start.memory)
         self._command()
         self.moment: Moment | None = None
-        self._lives = False
         self.derived: dict[str, Any] = {}
 
     def _place(self, memory: Memory) -> None:
-        # Until all is in its place the world is astray, and `_memory` says what it is to know.
-        self._astray, self._lives, self._memory = True, False, memory
+        # Until all is in its place the world is elsewhere, and `_memory` says what it is to know.
+        self._world_is_elsewhere, self._world_knows_moment, self._memory = True, False, memory
         qpos, qvel = self.qpos.copy(), self.qvel.copy()
         self.world.place(qpos, qvel, memory)
         # What the arrays were left at, and its bytes, by which a write is seen.
-        self._left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
-        self._astray = False
+        self._last_state = qpos, qvel, qpos.tobytes(), qvel.tobytes()
+        self._world_is_elsewhere = False
 
     def _command(self) -> None:
         """Take the command as it is now, and pass on what acts."""
@@ -123,7 +122,7 @@ class Machine:
 
     def _pass_on(self, given: Array) -> None:
         """Tell the world the command that acts in its next step."""
-        self._acting = self._model._acting("ctrl", acting(self._ctrl, given, self._late))
+        self._acting = self._model._acting("ctrl", acting(self._ctrl, given, self._delay_steps))
         self.world.command(self._acting)
 
     def run(self, _model: None, _data: None, nstep: int = 1) -> None:
@@ -142,15 +141,15 @@ class Machine:
             check_entries(self.qpos, "qpos", self._model._coordinate_name)
             check_entries(self.qvel, "qvel", self._model._coordinate_name)
             self._model._check_quaternions(self.qpos)
-            self._place(self._blank)
-        elif self._astray:
+            self._place(self._no_memory)
+        elif self._world_is_elsewhere:
             self._place(self._memory)
         self._used, start = True, world.memory
         derived_before = self.moment, self.derived
         try:
-            time, given, before, memory = self.time, self.given, self._left[:2], start
+            time, given, before, memory = self.time, self.given, self._last_state[:2], start
             if steps > 1:
-                for count in [1] * (steps - 1) if self._longest else [steps - 1]:
+                for count in [1] * (steps - 1) if self._longest_delay else [steps - 1]:
                     time, given = self._ahead(time, given, count)
                 before, memory = world.read(), world.memory
             given = self._commands(given)
@@ -161,9 +160,9 @@ class Machine:
             if not bounded(qpos, qvel, self._fastest):
                 self._diverge(time)
             left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
-            self.moment, self._lives, self.derived = moment, True, {}
+            self.moment, self._world_knows_moment, self.derived = moment, True, {}
             # Nothing can interrupt this line, and no other moves the Data.
-            self.qpos[:], self.qvel[:], self.time, self._left, self.given = (
+            self.qpos[:], self.qvel[:], self.time, self._last_state, self.given = (
                 qpos,
                 qvel,
                 time,
@@ -172,7 +171,7 @@ class Machine:
             )
         except BaseException:
             # The engine is elsewhere now; the arrays are not, nor is what else is known.
-            self._astray, self._lives, self._memory = True, False, start
+            self._world_is_elsewhere, self._world_knows_moment, self._memory = True, False, start
             self.moment, self.derived = derived_before
             raise
 
@@ -187,7 +186,7 @@ class Machine:
 
     def _commands(self, given: Array) -> Array:
         """Pass on what acts in the next step; the commands until after it."""
-        if not self._longest:
+        if not self._longest_delay:
             return given
         self._pass_on(given)
         return np.concatenate([given[1:], self._ctrl[None]])
@@ -213,20 +212,20 @@ class Machine:
     @property
     def _written(self) -> bool:
         """Whether qpos or qvel is no longer what it was left at."""
-        return self._left[2:] != (self.qpos.tobytes(), self.qvel.tobytes())
+        return self._last_state[2:] != (self.qpos.tobytes(), self.qvel.tobytes())
 
     def present(self) -> Moment:
         """All that decides the next engine step, with the command that acts in it."""
         if self._written:  # what the world remembers belongs to another state
-            memory = self._blank
+            memory = self._no_memory
         else:
-            memory = self._memory if self._astray else self.world.memory
-        ctrl = self._model._acting("ctrl", acting(self.ctrl, self.given, self._late))
+            memory = self._memory if self._world_is_elsewhere else self.world.memory
+        ctrl = self._model._acting("ctrl", acting(self.ctrl, self.given, self._delay_steps))
         return Moment(self.qpos.copy(), self.qvel.copy(), ctrl, memory)
 
     def forward(self) -> None:
         """Let everything derived belong to the present."""
-        self.moment, self._lives, self.derived = self.present(), False, {}
+        self.moment, self._world_knows_moment, self.derived = self.present(), False, {}
 
     def derive(self, name: str) -> Any:
         """An array of `records.DERIVED`, or "contacts"; computed at the first reading."""
@@ -244,23 +243,23 @@ class Machine:
             return _nothing(self._model)
         if name in POSES and (poses := self.world.kinematics(moment.qpos, name)):
             return poses
-        if self._lives:  # the world is still where the step that ends there left it
+        if self._world_knows_moment:  # the world is still where the step that ends there left it
             return self.world.derive(name, moment, self.derive)
         return self._model._look_ahead.at(moment)
 
 
-def acting(ctrl: Array, given: Array, late: Ints) -> Array:
+def acting(ctrl: Array, given: Array, delay_steps: Ints) -> Array:
     """The command (nu,) that acts in a step: of each number that of so many steps before.
 
     Args:
         ctrl: (nu,) of the step.
         given: (steps, nu) of the steps before, the newest last.
-        late: (nu,) steps by which each number acts late, at most as many as `given`.
+        delay_steps: (nu,) steps by which each number acts late, at most as many as `given`.
     """
     if not len(given):
         return ctrl.copy()
     commands = np.concatenate([given, ctrl[None]])
-    return commands[len(given) - late, np.arange(len(ctrl))]
+    return commands[len(given) - delay_steps, np.arange(len(ctrl))]
 
 
 class HiddenData(Data):
