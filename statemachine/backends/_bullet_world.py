@@ -238,8 +238,8 @@ class World:
         for link in range(-1, pb.getNumJoints(body, self.client)):
             self.change(body, link, **settings)
 
-    def rub(self, slide: Array, spin: Array, roll: Array) -> None:
-        """Set the frictions (nsolid,) of all that can touch."""
+    def set_friction(self, slide: Array, spin: Array, roll: Array) -> None:
+        """Set the sliding, spinning and rolling friction (nsolid,) of all that can touch."""
         for k, (body, link, _) in enumerate(self.solids()):
             self.change(
                 body,
@@ -253,7 +253,7 @@ class World:
         """Softness and friction of links, and which of them meet."""
         self.soften()
         known = self._surfaces
-        self.rub(known.slide, known.spin, known.roll)
+        self.set_friction(known.slide, known.spin, known.roll)
         links = [(body, link) for body, link, _ in self.solids()]
         for (i, j), meet in known.pairs.items():
             if not meet:  # the others do, as they were loaded
@@ -262,7 +262,7 @@ class World:
                     body_a, body_b, link_a, link_b, 0, physicsClientId=self.client
                 )
 
-    def meet(self, group: int = 0, mask: int = 0) -> None:
+    def set_collision_groups(self, group: int = 0, mask: int = 0) -> None:
         """Set the group and the mask of all that can touch; by default nothing meets anything."""
         for body, link in self._solid_links:
             pb.setCollisionFilterGroupMask(body, link, group, mask, self.client)
@@ -277,11 +277,11 @@ class World:
         """
         self.put(qpos, qvel)
         # Links of one body cannot be taken apart: for a moment they do not meet.
-        self.meet(0, 0)
+        self.set_collision_groups(0, 0)
         for i, (body, (_, quat)) in enumerate(self._homes, start=1):
             pb.resetBasePositionAndOrientation(body, (0, 0, _AWAY * i), quat, self.client)
         pb.performCollisionDetection(self.client)
-        self.meet(1, -1)
+        self.set_collision_groups(1, -1)
         for body, (pos, quat) in self._homes:
             if body not in self._frames:
                 pb.resetBasePositionAndOrientation(body, pos, quat, self.client)

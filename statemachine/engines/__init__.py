@@ -92,14 +92,14 @@ class RawEngine:
         emulated: Whether the backend emulates some of the contract, so that what the engine does
             must not be read from there.
         primes: What of the step before the engine takes, in words; "" for nothing.
-        sharper: It draws so many times as large as a picture is shown.
+        supersampling: It draws so many times as large as a picture is shown.
         steps: Names of its functions f(model, data[, nstep]) that advance time.
         forwards: Names of those f(model, data) that only recompute.
     """
 
     emulated = False
     primes = ""
-    sharper = 1
+    supersampling = 1
     steps: tuple[str, ...] = ()
     forwards: tuple[str, ...] = ()
 
@@ -311,7 +311,7 @@ class RawEngine:
 
         Args:
             file: Its model.
-            size: Width and height of the pictures, `sharper` times as shown.
+            size: Width and height of the pictures, `supersampling` times as shown.
             camera: Where they are seen from.
             ghost: Whether it is the side that is drawn over the other one: in one colour,
                 without what belongs to the world.

@@ -93,7 +93,7 @@ class SaveMethod:
         left_out: What of the whole is not kept, where it is the whole without one thing.
         promised: Whether its future is promised to be that of the run it was taken from.
         agree: Whether two restores are promised to have the same future.
-        travels: Whether it can be put into another machine than its own.
+        portable: Whether it can be put into another machine than its own.
     """
 
     name: str
@@ -101,7 +101,7 @@ class SaveMethod:
     left_out: str = ""
     promised: bool = False
     agree: bool = False
-    travels: bool = True
+    portable: bool = True
 
 
 @dataclass(frozen=True)
@@ -332,10 +332,10 @@ class Driver(ABC):
         futures = {}
         with self.at(point) as machine, way.save(machine) as restore:
             self.drive(machine, point, steps)
-            for into in (ITSELF,) if way.travels else (ITSELF, ITSELF_AGAIN):
+            for into in (ITSELF,) if way.portable else (ITSELF, ITSELF_AGAIN):
                 restore(machine)
                 futures[into] = self.drive(machine, point, steps)
-            for into, other in ((FRESH, self.new), (USED, self.used)) if way.travels else ():
+            for into, other in ((FRESH, self.new), (USED, self.used)) if way.portable else ():
                 with other(point) as target:
                     restore(target)
                     futures[into] = self.drive(target, point, steps)

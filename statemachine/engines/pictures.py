@@ -167,7 +167,7 @@ def _draw() -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     engine = room(name)
-    by = engine.sharper
+    by = engine.supersampling
     # What they hold they give back with the end of the process.
     drawers = [
         engine.drawer(file, (by * width, by * height), camera, ghost=k > 0)

@@ -168,7 +168,7 @@ class _Examination:
         """Whether two futures of a State are one, and that of the run itself if promised."""
         driver = InterfaceDriver(model, self.seed)
         point = self._start(model, _FUTURE)
-        way = replace(driver.save_methods(point)[-1], travels=False)
+        way = replace(driver.save_methods(point)[-1], portable=False)
         findings = trials.tried(driver, driver.run(point, _FUTURE), way)
         return all(finding.holds for finding in findings)
 

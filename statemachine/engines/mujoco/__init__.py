@@ -24,7 +24,7 @@ class MujocoEngine(RawEngine):
     """MuJoCo as its own users drive it; it compiles MJCF, and weighs states, for all others."""
 
     primes = "qacc_warmstart, the accelerations of the step before"
-    sharper = 2  # drawn so many times as large, and made smaller: edges are smooth then
+    supersampling = 2  # drawn so many times as large, and made smaller: edges are smooth then
     steps = ("mj_step", "mj_step2")
     forwards = ("mj_forward", "mj_kinematics", "mj_fwdPosition")
     phrases = function_of(".mujoco.phrasebook:phrases")

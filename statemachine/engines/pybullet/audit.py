@@ -64,7 +64,7 @@ taken_apart = copied(lambda m: m.world.read(), lambda m, state: m.world.place(*s
 
 def let_pass(machine: Client) -> None:
     """Nothing touches anything any more."""
-    machine.world.meet()
+    machine.world.set_collision_groups()
     pb.performCollisionDetection(machine.client)
 
 
@@ -154,7 +154,7 @@ class PybulletDriver(Driver):
         return (
             SaveMethod("written", written),
             SaveMethod(_BEST, self._with_targets(written)),
-            SaveMethod("saveState + targets", self._with_targets(saved_in_memory), travels=False),
+            SaveMethod("saveState + targets", self._with_targets(saved_in_memory), portable=False),
             SaveMethod("saveBullet + targets", self._with_targets(saved_in_a_file)),
             SaveMethod("taken apart + targets", self._with_targets(taken_apart)),
         )

@@ -71,7 +71,7 @@ class PybulletDials(Dials):
             "surfaces": partial(
                 _set_surfaces, surfaces=cast("PybulletModel", self.emulated).plan.surfaces
             ),
-            "contact": World.meet,  # nothing meets anything
+            "contact": World.set_collision_groups,  # nothing meets anything
         }
         return _dialled(model, [act for name, act in acts.items() if name in dials])
 
@@ -176,7 +176,7 @@ def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) 
 
 def _set_surfaces(world: World, surfaces: Surfaces) -> None:
     world.soften()
-    world.rub(surfaces.slide, surfaces.spin, surfaces.roll)
+    world.set_friction(surfaces.slide, surfaces.spin, surfaces.roll)
 
 
 def _harden(world: World) -> None:
@@ -191,7 +191,7 @@ def _fresh_surfaces(world: World, plan: Plan) -> None:
     _harden(world)
     solids = list(world.solids())
     none = np.zeros(len(solids))
-    world.rub(none + FRICTION, none, none)
+    world.set_friction(none + FRICTION, none, none)
     for (i, j), meet in plan.surfaces.pairs.items():
         (body, link, solid), (other, other_link, other_solid) = solids[i], solids[j]
         # What never moves does not meet what never moves; of the rest, all that are two bodies.
