@@ -220,29 +220,29 @@ class RawEngine:
     @_needed
     @abstractmethod
     def differences(
-        self, one: Any, two: Any, pairs: Counterparts, *, world: bool = True
+        self, left: Any, right: Any, pairs: Counterparts, *, world: bool = True
     ) -> tuple[ModelDifference, ...]:
         """All that two compiled models differ in and that can change a motion.
 
         Args:
-            one: A compiled model.
-            two: Another.
+            left: A compiled model.
+            right: Another.
             pairs: What of one is what of the other.
             world: Whether gravity and the timestep are compared, too.
         """
 
     @_needed
     @abstractmethod
-    def sensors(self, one: Any, two: Any, pairs: Counterparts) -> list[ModelDifference]:
+    def sensors(self, left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]:
         """What the sensors of two compiled models differ in, which only a controller reads."""
 
     @_needed
     @abstractmethod
-    def entries(self, two: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
+    def entries(self, right: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
         """A difference by its single entries, or itself where it is of one piece.
 
         Args:
-            two: The compiled model that its edits are of.
+            right: The compiled model that its edits are of.
             difference: One of `differences`.
         """
 

@@ -30,6 +30,7 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
     """
     with make_data(model) as data:
         zero, still, none = data.qpos.copy(), np.zeros(model.nv), np.zeros(model.nu)
+    rest = zero, still, none
     air, thrown = zero.copy(), still.copy()
     free = np.flatnonzero(model.jnt_type == int(JointType.FREE))
     for place, dof in zip(model.jnt_qposadr[free], model.jnt_dofadr[free], strict=True):
@@ -53,65 +54,74 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
     near[model.jnt_qposadr[limited]] = upper - reach
     towards[model.jnt_dofadr[limited]] = reach / (_ARRIVAL * model.timestep)
 
-    # Name, how to get there, (qpos, qvel, ctrl), seconds before the save, what the model lacks for
-    # it, and what is special about it.
-    candidates: tuple[
-        tuple[str, str, tuple[Array, Array, Array], float, str, dict[str, bool]], ...
-    ] = (
+    # Without servos, and why not.
+    limp, refused = model, ""
+    try:
+        limp = model.replace(actuation=False) if model.nu else model
+    except UnsupportedError as error:
+        refused = str(error)
+
+    def point(
+        name: str,
+        how: str,
+        start: tuple[Array, Array, Array],
+        seconds: float,
+        variant: Model = model,
+        **special: bool,
+    ) -> SavePoint:
+        qpos, qvel, ctrl = start
+        steps, command = min(max(round(seconds / model.timestep), 1), _LONGEST), within(model, ctrl)
+        return SavePoint(name, how, variant, qpos, qvel, command, steps, **special)
+
+    # Each with what the model lacks for it.
+    candidates = (
+        (point("default", "default pose, no command, and time to settle", rest, _SETTLE), ""),
         (
-            "default",
-            "default pose, no command, and time to settle",
-            (zero, still, none),
-            _SETTLE,
+            point("motion", ", ".join(ways) or "default pose, let go", (air, thrown, stir), _WAY),
             "",
-            {},
         ),
-        ("motion", ", ".join(ways) or "default pose, let go", (air, thrown, stir), _WAY, "", {}),
         (
-            "keyframe",
-            f"{start}, command moved away from it",
-            (key.qpos, key.qvel, moved),
-            2 * _WAY,
+            point(
+                "keyframe",
+                f"{start}, command moved away from it",
+                (key.qpos, key.qvel, moved),
+                2 * _WAY,
+            ),
             "" if model.keyframes else "the model has no keyframe",
-            {},
         ),
         (
-            "limp",
-            "default pose, servos off, and time to fall",
-            (zero, still, none),
-            _FALL,
-            "" if model.nu else "the model has no servo to switch off",
-            {"powered": False},
+            point(
+                "limp",
+                "default pose, servos off, and time to fall",
+                rest,
+                _FALL,
+                limp,
+                powered=False,
+            ),
+            refused if model.nu else "the model has no servo to switch off",
         ),
         (
-            "limit",
-            "servos off, each joint run into its upper limit",
-            (near, towards, none),
-            (_ARRIVAL + 3) * model.timestep,
-            "" if len(limited) else "no joint of the model has a limit",
-            {"powered": False, "at_limit": True},
+            point(
+                "limit",
+                "servos off, each joint run into its upper limit",
+                (near, towards, none),
+                (_ARRIVAL + 3) * model.timestep,
+                limp,
+                powered=False,
+                at_limit=True,
+            ),
+            refused if len(limited) else "no joint of the model has a limit",
         ),
         (
-            "clock",
-            f"{start}, a controller that reads the time before each step",
-            (key.qpos, key.qvel, key.ctrl),
-            2 * _WAY,
+            point(
+                "clock",
+                f"{start}, a controller that reads the time before each step",
+                (key.qpos, key.qvel, key.ctrl),
+                2 * _WAY,
+                swings=True,
+            ),
             "" if model.nu else "the model has no actuator",
-            {"swings": True},
         ),
     )
-    save_points: list[SavePoint] = []
-    without: list[str] = []
-    for name, how, (qpos, qvel, ctrl), seconds, lacks, special in candidates:
-        variant, reason = model, lacks
-        if model.nu and not special.get("powered", True):
-            try:
-                variant = model.replace(actuation=False)
-            except UnsupportedError as error:
-                reason = lacks or str(error)
-        if reason:
-            without.append(f"{name}: {reason}")
-            continue
-        steps, command = min(max(round(seconds / model.timestep), 1), _LONGEST), within(model, ctrl)
-        save_points.append(SavePoint(name, how, variant, qpos, qvel, command, steps, **special))
-    return tuple(save_points), tuple(without)
+    without = [f"{candidate.name}: {lacks}" for candidate, lacks in candidates if lacks]
+    return tuple(candidate for candidate, lacks in candidates if not lacks), tuple(without)
