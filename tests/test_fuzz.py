@@ -17,7 +17,7 @@ import statemachine as sm
 from fuzz import command_lines, kills, mjb, models, threads, traces
 from fuzz.__main__ import run_apart, targets
 from statemachine.errors import BusyDataError
-from statemachine.runs import parquet_files
+from statemachine.runs import formats
 
 from .conftest import ROOT, in_its_own_python
 
@@ -108,7 +108,7 @@ whole.beside = csv_files.beside = beside
 BLIND_READER = "import statemachine as sm\nsm.load = sm.Kinematics = lambda *a, **k: {}[a]"
 PATCHES: dict[str, list[tuple[Any, str, Any]]] = {
     "a digest is not looked at": [
-        (parquet_files, "_digest", lambda _text, _columns: "0" * 64),
+        (formats, "_digest", lambda _text, _columns: "0" * 64),
         (traces, "_CHANGES", [traces._flip] * 3),
     ],
     "a command line ends in a traceback": [

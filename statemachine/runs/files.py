@@ -19,9 +19,8 @@ from ..errors import (
     did_you_mean,
 )
 from ..models import resolve
+from .formats import read_npz, read_parquet, write_npz, write_parquet
 from .header import Header
-from .npz_files import read_npz, write_npz
-from .parquet_files import read_parquet, write_parquet
 from .provenance import model_digest
 from .trace import Trace
 from .whole import replace_file

@@ -12,8 +12,7 @@ from typing import Any
 from ..errors import EngineError
 from ..processes import fresh_python
 from ..processes.pipes import PipedChild
-from ._protocol import ANSWER, ANSWER_MOST, COMMAND, VERBS
-from ._shared import SharedBlock
+from ._shared import ANSWER, ANSWER_MOST, COMMAND, VERBS, SharedBlock
 
 _ENDING = 0.3  # seconds in which one that closed its pipes has ended
 

@@ -1,25 +1,45 @@
-"""Memory that several processes map, without a name that could be left behind.
+"""What processes of worlds share: memory, and what they are told and answer.
 
-It is a file without a place in any folder, which goes with the last process that holds it,
+The memory is a file without a place in any folder, which goes with the last process that holds it,
 however that ends. A process of ours inherits its descriptor. (Windows has a mapping by name,
 which goes with its last holder, too.)
+
+A command and an answer are a few bytes in a pipe, so that each is written and read whole or
+not at all, also where a signal falls in between. All else lies in shared memory: the arrays,
+what belongs to a command (the same for all processes), and a place for each one's answer.
 """
 
 from __future__ import annotations
 
 import mmap
 import os
+import pickle
 import secrets
+import struct
 import sys
 import tempfile
 import weakref
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import EngineError, shown
 from ..interface import INPUTS, Model
+
+T = TypeVar("T")
+
+# Number of the command, place in `VERBS`, argument, bytes, whether of ids.
+COMMAND = struct.Struct("<qqqqq")
+ANSWER = struct.Struct("<qq")  # number of the command, bytes
+ANSWER_MOST = 1 << 22  # bytes of an answer
+# What a process is asked for, by the methods of its `Holder`: to take the Model and make two Data,
+# to make the others, …; and to end what was asked before.
+VERBS = (
+    "start", "fill", "step", "forward", "reset", "get_state", "set_state", "record", "derive",
+    "stop",
+)  # fmt: skip
 
 _PAGE = 4096
 
@@ -105,3 +125,24 @@ def arrays_in(memory: mmap.mmap, layout: Layout) -> dict[str, NDArray[Any]]:
         name: np.frombuffer(memory, kind, int(np.prod(shape)), start).reshape(shape)
         for name, (start, shape, kind) in layout.items()
     }
+
+
+def packed(answer: dict[str, Any]) -> bytes:
+    """An answer as bytes."""
+    blob = pickle.dumps(answer)
+    if len(blob) <= ANSWER_MOST:
+        return blob
+    return pickle.dumps({"error": EngineError(f"an answer of {len(blob)} bytes is too large")})
+
+
+def portable(value: T, otherwise: T) -> T:
+    """A value that another process can read; if it cannot, the other."""
+    try:
+        return pickle.loads(pickle.dumps(value))
+    except Exception:
+        return otherwise
+
+
+def portable_error(error: Exception) -> Exception:
+    """An error that another process can read: itself, or its text."""
+    return portable(error, EngineError(f"{type(error).__name__}: {shown(str(error))}"))

@@ -25,8 +25,17 @@ import numpy as np
 from .. import backends
 from ..interface import INPUTS, Data, Model, forward, get_state, make_data, reset, set_state, step
 from ..processes import resident_memory
-from ._protocol import ANSWER, ANSWER_MOST, COMMAND, VERBS, packed, portable, portable_error
-from ._shared import arrays_in, open_block
+from ._shared import (
+    ANSWER,
+    ANSWER_MOST,
+    COMMAND,
+    VERBS,
+    arrays_in,
+    open_block,
+    packed,
+    portable,
+    portable_error,
+)
 
 _ENDS_IN = 1.0  # seconds in which Python code may clean up
 

@@ -24,8 +24,7 @@ from ..interface import Array, Ints, Model, State
 from ..interface.turns import alone
 from ..interface.worlds import Worlds, check_memory
 from ._process import WorldsProcess, end_all, lost_worlds
-from ._protocol import ANSWER_MOST
-from ._shared import SharedBlock, arrays_in, laid_out, shapes_of
+from ._shared import ANSWER_MOST, SharedBlock, arrays_in, laid_out, shapes_of
 
 _PATIENCE = 2.0  # seconds in which a process has to end a step that was interrupted
 _SCRATCH = 1 << 24  # bytes for what belongs to a command, at least
