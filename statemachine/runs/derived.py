@@ -1,13 +1,16 @@
-"""What an engine derives from the states of a run, read while the run is repeated."""
+"""What follows from the states of a run: what its engine derives, and energies by one yardstick."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import DivergedError, UnsupportedError
+from ..backends import on_default
+from ..engines import room
+from ..errors import DivergedError, StateMachineError, UnsupportedError
+from ..installed import DEFAULT
 from ..interface import DERIVED, Array, Data, Model, forward, get_state, make_data, set_state, step
 from .drive import Progress
 from .trace import COLUMNS, CONTACTS
@@ -105,3 +108,46 @@ def _read(
         contacts["contact_row"].append(np.full(len(touching), row))
         for name in ("geom", "dist", "pos", "frame", "force"):
             contacts[f"contact_{name}"].append(np.array(getattr(touching, name)))
+
+
+def energies(
+    model: Model,
+    defaults: Literal["model", "engine"],
+    qpos: Array,
+    qvel: Array,
+    gravity: Any = None,
+) -> tuple[Array, str]:
+    """Kinetic and potential energy of states.
+
+    They are those of the model's masses, rotors (armature) and gravity, computed by MuJoCo
+    whatever engine the states come from: so two runs are measured by one yardstick. An
+    engine that leaves something out (PyBullet as it comes has no rotors, and no gravity
+    until it is set) is measured by the file's, or by the gravity that it was given.
+
+    Args:
+        model: What the states are of.
+        defaults: What `load` was given for it.
+        qpos: (n, nq) positions [rad or m]; qvel: (n, nv) velocities.
+        qvel: See qpos.
+        gravity: (3,) that `Model.replace` was given for it [m/s²]; None for none.
+
+    Returns:
+        (n, 2) kinetic and potential energy [J], and the engine and version that gave them;
+        NaN and "" where MuJoCo is missing or cannot read the model.
+    """
+    unknown = np.full((len(qpos), 2), np.nan), ""
+    try:
+        yardstick = on_default(model)
+        if yardstick is not model:
+            if (yardstick.nq, yardstick.nv) != (qpos.shape[1], qvel.shape[1]):
+                return unknown
+            if defaults == "model":
+                yardstick = yardstick.replace(
+                    gravity=model.gravity, armature=model.dof_armature, mass=model.body_mass
+                )
+            elif gravity is not None:
+                yardstick = yardstick.replace(gravity=gravity)
+        joules = room(DEFAULT).energies(yardstick, qpos, qvel)
+    except StateMachineError:
+        return unknown
+    return joules, f"{DEFAULT} {yardstick.engine_version}"

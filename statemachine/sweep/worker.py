@@ -32,8 +32,8 @@ from ..measures.text import listed
 from ..models import resolve
 from ..processes import end_with_parent
 from ..runs.controllers import function_file
+from ..runs.derived import energies
 from ..runs.drive import check_length, drive, steps_in
-from ..runs.energy import energies
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario
 from ..silence import silence
