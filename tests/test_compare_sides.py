@@ -400,7 +400,7 @@ def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
     assert largest(compare(run.left, run.right)) > 0.01
 
 
-def test_a_recorded_run_is_played_on_both(files: Path) -> None:
+def test_a_recorded_run_is_played_on_both(files: Path, here: Cli) -> None:
     model = sm.load(files / "arm.xml")
     ctrl = [0.3, -0.2]
     path = write(record(model, lambda time, data: ctrl, 0.2, qpos=[0.1, 0.2]), files / "run.npz")
@@ -411,6 +411,9 @@ def test_a_recorded_run_is_played_on_both(files: Path) -> None:
         assert trace.qpos[0, trace.header.joints.index("shoulder")] == 0.1
         told = dict(zip(trace.header.actuators, trace.ctrl[0], strict=True))
         assert told == {"shoulder": 0.3, "elbow": -0.2}
+    # So it is where the sides run again: the two files are one robot.
+    why = json.loads(here("compare", "run.npz", "turned.xml", "arm.xml", "--why", "--json").stdout)
+    assert why["gap"] == 0
     same = run_sides(Request((str(path),), sides=(Side(str(files / "arm.xml")),) * 2))
     assert largest(compare(same.left, same.right)) == 0
     with pytest.raises(BadInputError, match="--seconds is of a run"):

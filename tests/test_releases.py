@@ -363,6 +363,7 @@ class TestReleases:
         model.path.write_text(LINKS_AND_BALL.replace('damping="0.1"', 'damping="0.2"'))
         sm.step(model, first)  # which was made before
         refused((EngineError, "another file than when it was loaded", lambda: sm.make_data(model)))
+        assert Server.of(model._reading.engine).forgotten  # what was read of it
 
     def test_what_is_closed_or_collected_is_forgotten_there(
         self, request: pytest.FixtureRequest

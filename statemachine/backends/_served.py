@@ -85,6 +85,7 @@ class Server:
                 answer, values = _child_server.receive(self._process.out)
         except (OSError, ValueError, EOFError, pickle.UnpicklingError) as error:
             self.lives, ended = False, self._process.how_it_ended()
+            self._process.kill()  # one that lives is asked nothing more
             raise LostError(f"its process is gone: {ended or error}") from error
         except BaseException:  # Ctrl-C: what it still says would be taken for another answer
             self.lives = False
@@ -133,13 +134,15 @@ class ServedWorld(HiddenWorld):
         self._server, self._placed = Server.of(self._engine), True
         try:
             model, said = self._opened(self._server)
+            numbers = [model]
+            # No call: it may be collected in the midst of another.
+            self._end = weakref.finalize(self, self._server.forgotten.extend, numbers)
             self._world = self._server.ask("make", model=model)[0]["world"]
+            numbers.append(self._world)
         except (LostError, AnswerError) as error:
             raise EngineError(f"{self.engine} cannot make a world: {error}") from error
         self.memory_layout = tuple((name, int(length)) for name, length in said["memory"])
         self.untold = frozenset(said.get("untold", ()))
-        # No call: it may be collected in the midst of another.
-        self._end = weakref.finalize(self, self._server.forgotten.extend, (model, self._world))
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True

@@ -171,12 +171,15 @@ def _opened(
     said, _, digest = _loaded(server, path, reading.model.raw)
     number = said["model"]
     if digest != reading.digest:
+        server.forgotten.append(number)
         raise AnswerError(f"{path} is another file than when it was loaded")
     if edits:
         arrays = {name: value for name, value in edits.items() if name not in _FLAGS}
         flags = {name: value for name, value in edits.items() if name in _FLAGS}
-        answer, _ = server.ask("edit", arrays, model=number, flags=flags)
-        server.forgotten.append(number)
+        try:
+            answer, _ = server.ask("edit", arrays, model=number, flags=flags)
+        finally:
+            server.forgotten.append(number)
         number = answer["model"]
     return number, said
 

@@ -374,7 +374,10 @@ class Trials:
         own = self._scenario.own
         if self._recordings and side and COMMANDS not in brought:
             return commands_of(self._recordings[1])
-        told = self._scenario.controller(model if own else self._models[0], self.seed)
+        if self._recordings:  # in the order of the left's actuators
+            told = commands_of(self._recordings[0])
+        else:
+            told = self._scenario.controller(model if own else self._models[0], self.seed)
         if side == 0:
             return told
         start = self._starts[1].ctrl
