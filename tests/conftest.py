@@ -97,7 +97,7 @@ def assert_not_in(whole: Container[Any], *parts: object) -> None:
 
 
 def refused(
-    *cases: tuple[type[Exception] | tuple[type[Exception], ...], str, Callable[[], object]],
+    *cases: tuple[type[BaseException] | tuple[type[BaseException], ...], str, Callable[[], object]],
 ) -> None:
     """Every call raises its error, with a text in which its pattern is."""
     for error, says, call in cases:

@@ -598,8 +598,7 @@ def test_a_room_of_another_package_may_have_some_of_the_methods(
     assert ask("timestep", "theirs") is None
     (phrase,) = phrasebook.run(["theirs"]).engines["theirs"]
     assert phrase == phrasebook.Phrase("load", "a = int(open(file).read())", True, "")
-    with pytest.raises(UnknownNameError, match="calls can be recorded"):
-        record("", "theirs")
+    refused((UnknownNameError, "calls can be recorded", lambda: record("", "theirs")))
 
 
 def test_a_room_that_cannot_be_imported_is_left_out(

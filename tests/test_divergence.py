@@ -18,7 +18,7 @@ from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.checks import HUGE
 from statemachine.report import compare as report
 
-from .conftest import need_engine, one_line_error, written
+from .conftest import need_engine, one_line_error, refused, written
 from .small_models import ROTOR, STUCK_POST
 
 
@@ -88,8 +88,7 @@ def explode(model: sm.Model) -> DivergedError:
         data.qpos[1] = -1
         with pytest.raises(DivergedError) as caught:
             sm.step(model, data, 500)
-        with pytest.raises(DivergedError, match=r"qvel\[\d\] diverged at"):
-            sm.step(model, data)
+        refused((DivergedError, r"qvel\[\d\] diverged at", lambda: sm.step(model, data)))
         sm.reset(model, data)
         assert data.time == 0
     return caught.value
@@ -149,8 +148,7 @@ def test_the_record_shows_the_bound(tmp_path: Path) -> None:
         assert f"where qvel is beyond {told} (max_qvel)" in record
     model = sm.load("so101")
     assert "beyond 1e+10, the engine's own bound" in str(model.capabilities)
-    with pytest.raises(UnsupportedError, match="max_qvel"):
-        model.replace(max_qvel=1e5)
+    refused((UnsupportedError, "max_qvel", lambda: model.replace(max_qvel=1e5)))
 
 
 @pytest.mark.usefixtures("bullet")

@@ -19,7 +19,7 @@ from statemachine.report import compare as report
 from statemachine.runs import Trace
 from statemachine.runs.rerun import Rerun
 
-from .conftest import Cli, shown
+from .conftest import Cli, refused, shown
 from .small_models import DOUBLE_PENDULUM, PENDULUM, TILTED_BOX, model_of
 
 
@@ -131,15 +131,13 @@ def test_the_ruler_of_causes_has_a_floor_too(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("word", ["0.1", "mm", "-1mm", "0deg", "1furlong", "nanmm"])
 def test_what_is_no_uncertainty_is_refused(word: str) -> None:
-    with pytest.raises(BadInputError, match="reads like"):
-        parse_uncertainty([word])
+    refused((BadInputError, "reads like", lambda: parse_uncertainty([word])))
 
 
 def test_uncertainties_are_read_in_their_units() -> None:
     size = parse_uncertainty(["0.1mm", "0.5deg"])
     assert (size.length, size.angle) == pytest.approx((1e-4, np.radians(0.5)))
-    with pytest.raises(BadInputError, match="twice"):
-        parse_uncertainty(["1mm", "2cm"])
+    refused((BadInputError, "twice", lambda: parse_uncertainty(["1mm", "2cm"])))
 
 
 @pytest.mark.usefixtures("bullet")

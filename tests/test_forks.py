@@ -21,7 +21,7 @@ from statemachine.errors import BadInputError
 from statemachine.processes.forks import forks_for, in_forks
 from statemachine.report.as_json import dumps
 
-from .conftest import ROOT, lives, soon
+from .conftest import ROOT, lives, refused, soon
 from .explained import ALONE, ARM, SWING, changed, explained, write
 
 forks = pytest.mark.skipif(forks_for(2, 1.0, 2) == 1, reason="no forks here")
@@ -179,8 +179,7 @@ def test_how_many_forks() -> None:
         assert forks_for(1, 1.0, 3) == 1
         assert forks_for(10, 0.001, 2) == 2
     assert forks_for(10, 0.001, None) == 1  # short work
-    with pytest.raises(BadInputError, match="jobs must be at least 1"):
-        forks_for(10, 1.0, 0)
+    refused((BadInputError, "jobs must be at least 1", lambda: forks_for(10, 1.0, 0)))
 
 
 @pytest.mark.slow

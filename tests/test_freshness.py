@@ -312,13 +312,11 @@ def test_what_cannot_be_asked_is_said(backend: str) -> None:
         ((DivergedError, BadInputError), "", lambda: sm.step(model, data)),
     )
     if backend == "mujoco":
-        with pytest.raises(DivergedError):
-            sm.freshness(model, data)
+        refused((DivergedError, "", lambda: sm.freshness(model, data)))
     sm.reset(model, data)
     assert sm.freshness(model, data).stale
     data.close()
-    with pytest.raises(ClosedDataError):
-        sm.freshness(model, data)
+    refused((ClosedDataError, "", lambda: sm.freshness(model, data)))
 
 
 @pytest.mark.usefixtures("bullet")

@@ -48,8 +48,7 @@ def test_a_step_that_is_stopped_did_not_happen(
         before, force = sm.get_state(model, data), data.qfrc_constraint.copy()
         with monkeypatch.context() as patch:
             patch.setattr(ExampleWorld, "step", stopping)
-            with pytest.raises(stop):
-                sm.step(model, data, 3)
+            refused((stop, "", lambda: sm.step(model, data, 3)))
         assert sm.get_state(model, data) == before
         assert np.array_equal(data.qfrc_constraint, force)
         for each in (data, twin):
@@ -63,8 +62,7 @@ def test_what_was_not_read_before_a_stop_is_computed_after_it(
     with held(model) as data, held(model) as twin:
         with monkeypatch.context() as patch:
             patch.setattr(ExampleWorld, "read", lambda _: 1 / 0)
-            with pytest.raises(ZeroDivisionError):
-                sm.step(model, data)
+            refused((ZeroDivisionError, "", lambda: sm.step(model, data)))
         # By another world, which starts from the moment before the last step.
         assert np.array_equal(data.xpos, twin.xpos)
         assert np.allclose(data.qfrc_constraint, twin.qfrc_constraint, atol=1e-9)

@@ -362,8 +362,7 @@ def test_an_attachment_that_cannot_be_read_is_refused(
     )
     _write(tmp_path / "parts", text, "arm.xml")
     stand = STAND.format(inside=f"<attach {attach} prefix='x'/>", beside="", name="name='arm'")
-    with pytest.raises(ModelError, match=said):
-        sm.Kinematics(_write(tmp_path, stand))
+    refused((ModelError, said, lambda: sm.Kinematics(_write(tmp_path, stand))))
 
 
 def test_what_was_done_to_the_text_is_told(tmp_path: Path) -> None:
@@ -424,8 +423,7 @@ def test_included_files_are_found_as_mujoco_finds_them(tmp_path: Path) -> None:
     assert again.site_pos[0].tolist() == [0, 0, 5]
     assert _poses_agree(again, sm.Kinematics(main)) < 1e-12
     twice = _write(tmp_path, "<mujoco>{0}{0}</mujoco>".format("<include file='parts/arm.xml'/>"))
-    with pytest.raises(ModelError, match="more than once"):
-        sm.Kinematics(twice)
+    refused((ModelError, "more than once", lambda: sm.Kinematics(twice)))
 
 
 def test_a_urdf_with_a_floating_link_and_meshes_elsewhere(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from statemachine.kinematics import Kinematics
 from statemachine.models import models_dir
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, one_line_error, written, written_all
+from .conftest import Cli, one_line_error, refused, written, written_all
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -482,8 +482,7 @@ def test_an_mjcf_goes_on_without_its_meshes(pair: Pair) -> None:
     assert (found.where, found.one, found.two) == ("hand: mesh", "nothing", "mesh")
     assert any("gone.stl are not there" in note for note in result.two.notes)
     two.write_text(text.replace("<worldbody>", "<worldbody><nonsense/>"))
-    with pytest.raises(ModelError, match="nonsense"):
-        compare(one, two)
+    refused((ModelError, "nonsense", lambda: compare(one, two)))
 
 
 def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
@@ -499,8 +498,7 @@ def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
     assert len(GroupTree(read(path)).groups) == 1500
     many = "".join(f'<link name="l{k}"/>' for k in range(3000))
     path.write_text(f'<robot name="r">{many}</robot>')
-    with pytest.raises(ModelError, match="3,000 links"):
-        read(path)
+    refused((ModelError, "3,000 links", lambda: read(path)))
 
 
 @pytest.mark.usefixtures("bullet")

@@ -17,7 +17,7 @@ import statemachine as sm
 from statemachine.backends import _mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
-from .conftest import ROOT, opened, runs_in_silence
+from .conftest import ROOT, opened, refused, runs_in_silence
 from .small_models import SLIDE, TWO_SLIDES, crowded, model_of
 
 
@@ -60,8 +60,7 @@ def test_a_divergence_is_noticed_whoever_set_the_handler(
         assert len(heard) == (handler == "a function")
         sm.reset(mujoco_scene, data)
         data.qvel[1] = np.nan
-        with pytest.raises(DivergedError, match=r"qvel\[1\]"):
-            sm.step(mujoco_scene, data, nstep)
+        refused((DivergedError, r"qvel\[1\]", lambda: sm.step(mujoco_scene, data, nstep)))
         if heard:
             assert len(heard) > 1  # it is in the chain now
 
@@ -73,8 +72,7 @@ def test_the_handler_of_somebody_else_hears_all() -> None:
         _step_raw_to_nan()
         assert len(heard) == 1
         data.qpos[0] = np.nan
-        with pytest.raises(DivergedError):
-            sm.step(model, data)
+        refused((DivergedError, "", lambda: sm.step(model, data)))
         assert any("QPOS" in text for text in heard[1:])
         before = len(heard)
         sm.step(model, other)
@@ -174,8 +172,7 @@ def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) 
             sm.step(model, data)
         sm.reset(model, data)
         with warnings.catch_warnings(action="error"):
-            with pytest.raises(EngineWarning):
-                sm.step(model, data)
+            refused((EngineWarning, "", lambda: sm.step(model, data)))
             sm.get_state(model, data)  # a warning is no trouble
 
 
@@ -189,8 +186,7 @@ def test_a_data_that_raw_drove_to_nan_says_so_at_the_next_step() -> None:
         data.qpos[4] = np.nan
         mujoco.mj_step(model.raw, data.raw)
         data.qpos[:], data.qvel[:] = 0, 0
-        with pytest.raises(StateMachineError):
-            sm.step(model, data)
+        refused((StateMachineError, "", lambda: sm.step(model, data)))
         sm.reset(model, data)
         sm.step(model, data)
 
@@ -212,6 +208,5 @@ def test_the_first_entry_inside_a_bulk_step_is_named_where_it_is_known(
         assert ("qpos[1] (b)" in str(caught.value)) == known
         assert ("an entry of qpos (MuJoCo did not tell which)" in str(caught.value)) != known
         assert caught.value.time == pytest.approx(1e10 / 9.5e9, abs=0.003)
-        with pytest.raises(DivergedError, match=r"qpos\[1\]|an entry of qpos"):
-            sm.step(model, data)
+        refused((DivergedError, r"qpos\[1\]|an entry of qpos", lambda: sm.step(model, data)))
     mujoco.set_mju_user_warning(None)

@@ -47,8 +47,7 @@ def test_substeps_and_timestep_compose_in_any_order(mujoco_arm: sm.Model) -> Non
 
 def test_too_many_substeps_in_one_call_are_refused() -> None:
     with opened(sm.load("so101").replace(substeps=1000)) as (model, data):
-        with pytest.raises(BadInputError, match="too large"):
-            sm.step(model, data, 2**31 - 1)
+        refused((BadInputError, "too large", lambda: sm.step(model, data, 2**31 - 1)))
         assert data.time == 0.0
 
 
@@ -251,7 +250,6 @@ def test_a_model_whose_bodies_sleep_promises_no_exact_restore(tmp_path: Path) ->
 def test_the_record_of_a_model_with_rk4_says_what_it_breaks(tmp_path: Path) -> None:
     model = loaded(tmp_path, f"<body><joint name='j'/>{GEOM}</body>", "<option integrator='RK4'/>")
     assert model.capabilities.behaviours["stale after a step"].support == "unsupported"
-    with pytest.raises(UnknownNameError, match="implicitfast"):
-        model.replace(integrator="rk4")
+    refused((UnknownNameError, "implicitfast", lambda: model.replace(integrator="rk4")))
     better = model.replace(integrator="implicitfast")
     assert better.capabilities.behaviours["stale after a step"].support == "native"

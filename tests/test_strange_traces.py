@@ -23,7 +23,7 @@ from statemachine.report import compare as report
 from statemachine.runs import Trace, model_file, read, record, write
 from statemachine.runs.whole import check_place, replace_file
 
-from .conftest import Cli, one_line, one_line_error, shown
+from .conftest import Cli, one_line, one_line_error, refused, shown
 from .small_models import TWO_NAMELESS, model_of
 
 
@@ -167,8 +167,7 @@ def test_time_goes_on() -> None:
     def back(_time: float, data: sm.Data) -> None:
         data.time = 0.0
 
-    with pytest.raises(TraceError, match="time does not go on"):
-        record(sm.load("so101"), back, 0.1)
+    refused((TraceError, "time does not go on", lambda: record(sm.load("so101"), back, 0.1)))
 
 
 def test_a_strange_archive_is_one_line(box: Trace, tmp_path: Path) -> None:
@@ -244,8 +243,7 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     elsewhere.mkdir()
     monkeypatch.chdir(elsewhere)
     monkeypatch.delenv("MENAGERIE", raising=False)
-    with pytest.raises(ModelFileError, match="say which it is with --model"):
-        model_file(trace.header)
+    refused((ModelFileError, "say which it is with --model", lambda: model_file(trace.header)))
     assert model_file(trace.header, menagerie=tmp_path) == (robots / "one.xml", True)
     assert model_file(trace.header, beside=robots / "t.npz") == (robots / "one.xml", True)
     # Another file of that name here does not take the place of the one that it was.

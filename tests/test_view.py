@@ -132,8 +132,7 @@ def test_what_cannot_be_done_is_refused_and_changes_nothing(
     with LiveSession([sm.load(SCENE)], "held") as session:
         session.play()
         before = session.frame()
-        with pytest.raises((BadInputError, UnknownNameError)):
-            getattr(session, call)(*value)
+        refused(((BadInputError, UnknownNameError), "", lambda: getattr(session, call)(*value)))
         after = session.frame()
         assert (after.time, after.running, after.resets) == (before.time, True, before.resets)
         np.testing.assert_array_equal(after.ctrl, before.ctrl)
@@ -417,8 +416,7 @@ def test_a_recording_is_played_and_sought(mujoco_scene: sm.Model) -> None:
     recording.seek(1e9)
     recording.play()  # from the end, again from the start
     assert (recording.frame().steps, recording.running) == (0, True)
-    with pytest.raises(BadInputError):
-        recording.set_ctrl(0, 1.0)
+    refused((BadInputError, "", lambda: recording.set_ctrl(0, 1.0)))
 
 
 def test_moments_that_are_not_the_same_are_not_compared(mujoco_scene: sm.Model) -> None:
