@@ -99,21 +99,12 @@ def assert_not_in(whole: Container[Any], *parts: object) -> None:
 def refused(
     *cases: tuple[type[BaseException] | tuple[type[BaseException], ...], str, Callable[[], object]],
 ) -> None:
-    """Every call raises its error, with a text in which its pattern is."""
+    """Every call raises its error, with one line of text in which its pattern is."""
     for error, says, call in cases:
-        with pytest.raises(error, match=says or None):  # noqa: PT012
+        with pytest.raises(error, match=says or None) as caught:  # noqa: PT012
             call()
             pytest.fail(f"nothing was refused, where {error} was to say: {says}")
-
-
-@contextmanager
-def one_line_error(
-    error: type[Exception], *, match: str | None = None
-) -> Iterator[pytest.ExceptionInfo[Any]]:
-    """Something raises this error, and its text is one line."""
-    with pytest.raises(error, match=match) as caught:
-        yield caught
-    assert "\n" not in str(caught.value)
+        assert "\n" not in str(caught.value)
 
 
 def after(model: Model, nstep: int, keyframe: int | str | None = None) -> np.ndarray:

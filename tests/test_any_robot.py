@@ -72,10 +72,7 @@ SEVERAL = """<mujoco><worldbody><body name="b"><joint name="ball" type="ball"/><
 
 @pytest.fixture
 def model(tmp_path: Path) -> Any:
-    def make(text: str, name: str = "robot.xml") -> sm.Model:
-        return sm.load(written(tmp_path / name, text))
-
-    return make
+    return lambda text, name="robot.xml": sm.load(written(tmp_path / name, text))
 
 
 def lesson(name: str, model: sm.Model, **options: Any) -> tuple[Any, Page, str]:
@@ -360,8 +357,13 @@ def no_network(menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_robot_by_name_without_a_network(no_network: list[float]) -> None:
-    with pytest.raises(errors.ModelFileError, match=r"could not be downloaded .*not known"):
-        models.resolve("menagerie:unitree_g1")
+    refused(
+        (
+            errors.ModelFileError,
+            r"could not be downloaded .*not known",
+            lambda: models.resolve("menagerie:unitree_g1"),
+        )
+    )
     assert no_network == [5.0]  # and no further try
 
 
@@ -402,8 +404,9 @@ def test_a_package_that_is_missing_is_named(
 ) -> None:
     for module in ("mujoco_menagerie", "robot_descriptions"):
         monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(errors.MissingEngineError, match=rf"statemachine-sim\[{extra}\]"):
-        models.resolve(name)
+    refused(
+        (errors.MissingEngineError, rf"statemachine-sim\[{extra}\]", lambda: models.resolve(name))
+    )
 
 
 def test_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -276,8 +276,13 @@ def test_a_roster_gives_every_student_a_row(
         assert {row["file"] for row in rows[4:]} == {
             "bob", "cy", "dee", "eve.py", "fay.py", "x_41018.py", "x_again_41018.py",
         }  # fmt: skip
-    with pytest.raises(BadInputError, match=r"the roster nowhere\.csv cannot be read"):
-        enrolled([], tmp_path / "nowhere.csv")
+    refused(
+        (
+            BadInputError,
+            r"the roster nowhere\.csv cannot be read",
+            lambda: enrolled([], tmp_path / "nowhere.csv"),
+        )
+    )
 
 
 def test_tests_and_predictions_are_in_the_same_table(

@@ -27,7 +27,7 @@ from statemachine.report import compare as report
 from statemachine.runs import record, write
 from statemachine.runs.controllers import function_scenario
 
-from .conftest import Cli, need_engine, one_line, one_line_error, refused, written, written_all
+from .conftest import Cli, need_engine, one_line, refused, written, written_all
 from .small_models import BENT, TWO_LINKS, TWO_SERVOS
 
 _FUNCTION = """
@@ -162,8 +162,7 @@ def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
     ],
 )
 def test_what_is_no_side_is_said_in_one_line(words: list[str], says: str) -> None:
-    with one_line_error(StateMachineError, match=says):
-        parse_sides(words)
+    refused((StateMachineError, says, lambda: parse_sides(words)))
 
 
 # The four combinations.
@@ -252,8 +251,13 @@ def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
         assert {"shoulder", "elbow"} <= {each.name for each in found.agreements}
         assert bool(run.unmatched) == (not given)  # a guess is said
     # A map that says otherwise is followed: the elbow is then held against the shoulder.
-    with pytest.raises(UnknownNameError, match="Gelenk_3"):
-        run_sides(asked("hold", *sides, names={"elbow": "Gelenk_3"}))
+    refused(
+        (
+            UnknownNameError,
+            "Gelenk_3",
+            lambda: run_sides(asked("hold", *sides, names={"elbow": "Gelenk_3"})),
+        )
+    )
 
 
 @pytest.mark.usefixtures("bullet")
@@ -331,8 +335,13 @@ def test_a_function_starts_at_a_keyframe_and_the_right_without_it_where_the_left
     assert run.right.ctrl[0].tolist() == [0.3, -0.4]
     assert largest(compare(run.left, run.right)) == 0
     assert any("no keyframe 'bent'" in line for line in run.said)
-    with pytest.raises(UnknownNameError, match="no keyframe named 'home'"):
-        run_sides(asked(what, *sides, keyframe="home"))
+    refused(
+        (
+            UnknownNameError,
+            "no keyframe named 'home'",
+            lambda: run_sides(asked(what, *sides, keyframe="home")),
+        )
+    )
 
 
 def test_a_function_imports_what_lies_beside_it(files: Path) -> None:
@@ -354,8 +363,7 @@ def test_a_function_imports_what_lies_beside_it(files: Path) -> None:
 )
 def test_a_mistake_in_a_function_is_one_line_about_it(files: Path, name: str, says: str) -> None:
     arm = Side(str(files / "arm.xml"))
-    with one_line_error(BadInputError, match=says):
-        run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))
+    refused((BadInputError, says, lambda: run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))))
     refused(
         (
             BadInputError,
@@ -416,8 +424,13 @@ def test_a_recorded_run_is_played_on_both(files: Path, here: Cli) -> None:
     assert why["gap"] == 0
     same = run_sides(Request((str(path),), sides=(Side(str(files / "arm.xml")),) * 2))
     assert largest(compare(same.left, same.right)) == 0
-    with pytest.raises(BadInputError, match="--seconds is of a run"):
-        run_sides(Request((str(path),), sides=sides, seconds=1.0))
+    refused(
+        (
+            BadInputError,
+            "--seconds is of a run",
+            lambda: run_sides(Request((str(path),), sides=sides, seconds=1.0)),
+        )
+    )
 
 
 # The words.

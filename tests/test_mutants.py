@@ -22,7 +22,7 @@ from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
 from statemachine.report.grading import mutants_page
 
-from .conftest import ROOT, Cli, one_line_error, opened, refused, shown, written_all
+from .conftest import ROOT, Cli, opened, refused, shown, written_all
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -51,10 +51,7 @@ Write = Callable[[str], Path]
 def write(tmp_path: Path) -> Write:
     """Tests of a student, in a folder of their own."""
 
-    def write(text: str) -> Path:
-        return written_all(tmp_path / "student", {"test_mine.py": text}) / "test_mine.py"
-
-    return write
+    return lambda text: written_all(tmp_path / "student", {"test_mine.py": text}) / "test_mine.py"
 
 
 # The faults.
@@ -263,8 +260,9 @@ def test_tests_that_fail_on_the_healthy_arm_are_told(body: str, why: str, write:
     ],
 )
 def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: Write) -> None:
-    with one_line_error(BadInputError, match=message):
-        examine(write(text), clock=2 if "sleep" in text else 300)
+    refused(
+        (BadInputError, message, lambda: examine(write(text), clock=2 if "sleep" in text else 300))
+    )
 
 
 # By the faults that are put in: tests that pass, and nothing in their process tells of a fault.
@@ -309,8 +307,9 @@ def test_a_fault_that_cannot_be_put_in_is_not_caught(
 ) -> None:
     path = write("def test_x(): pass")
     monkeypatch.setitem(MUTANTS, "unheard-of", Mutant("unheard-of", "", ""))
-    with pytest.raises(EngineError, match=r"before the tests: .*unheard-of"):
-        examine(path, only=["unheard-of"])
+    refused(
+        (EngineError, r"before the tests: .*unheard-of", lambda: examine(path, only=["unheard-of"]))
+    )
 
 
 @pytest.mark.slow

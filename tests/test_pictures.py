@@ -52,7 +52,6 @@ from .conftest import (
     assert_in,
     need_engine,
     one_line,
-    one_line_error,
     processes_with,
     refused,
     soon,
@@ -183,8 +182,13 @@ def test_smaller_pictures_are_means() -> None:
 def test_a_film_that_cannot_be_is_refused(how: dict[str, Any], says: str, ball: Path) -> None:
     model, film = sm.load(ball), ball.with_name("a.webp")
     trace = record(model, seconds=4.0, derive=False)
-    with pytest.raises(BadInputError, match=says):
-        write_film(film, [trace], [model], probe.Renderer("mujoco"), **how)
+    refused(
+        (
+            BadInputError,
+            says,
+            lambda: write_film(film, [trace], [model], probe.Renderer("mujoco"), **how),
+        )
+    )
 
 
 # Pictures that are drawn.
@@ -375,8 +379,7 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
     )
     missing = Mock(side_effect=MissingEngineError("pybullet is not installed here"))
     monkeypatch.setattr(pybullet_room, "require", missing)
-    with one_line_error(MissingEngineError, match="nothing here can draw"):
-        probe.renderer_here()
+    refused((MissingEngineError, "nothing here can draw", lambda: probe.renderer_here()))
     monkeypatch.setattr(pybullet_room, "require", lambda name: None)
     assert probe.renderer_here() == probe.Renderer("pybullet")
 

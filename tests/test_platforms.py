@@ -10,7 +10,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -144,29 +144,10 @@ def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str
     assert "CPython 3.11 to 3.13" in line
 
 
-@pytest.fixture
-def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str, int], None]:
-    """Another machine, as far as Python tells, on which no engine is installed."""
-
-    def go(system: str, processor: str, minor: int) -> None:
-        monkeypatch.setattr(installed.sys, "platform", system)
-        monkeypatch.setattr(machine, "machine", lambda: processor)
-        monkeypatch.setattr(machine, "system", lambda: system)
-        monkeypatch.setattr(
-            installed.sys, "version_info", SimpleNamespace(major=3, minor=minor, micro=0)
-        )
-        monkeypatch.setattr(
-            importlib.metadata,
-            "version",
-            Mock(side_effect=importlib.metadata.PackageNotFoundError("nothing")),
-        )
-
-    return go
-
-
-def test_what_to_install_depends_on_the_machine(
-    elsewhere: Callable[[str, str, int], None],
-) -> None:
+def test_what_to_install_depends_on_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On another machine, as far as Python tells, on which no engine is installed."""
+    nothing = Mock(side_effect=importlib.metadata.PackageNotFoundError("nothing"))
+    monkeypatch.setattr(importlib.metadata, "version", nothing)
     told = {
         ("linux", "x86_64", 11): "pip install pybullet (",
         ("linux", "x86_64", 13): "pip install pybullet-arm64==3.2.8 (",
@@ -180,7 +161,12 @@ def test_what_to_install_depends_on_the_machine(
         ("win32", "ARM64", 12): "no wheel for win32 ARM64 and Python 3.12",
     }
     for where, text in told.items():
-        elsewhere(*where)
+        system, processor, minor = where
+        version = SimpleNamespace(major=3, minor=minor, micro=0)
+        monkeypatch.setattr(installed.sys, "platform", system)
+        monkeypatch.setattr(machine, "machine", lambda processor=processor: processor)
+        monkeypatch.setattr(machine, "system", lambda system=system: system)
+        monkeypatch.setattr(installed.sys, "version_info", version)
         with pytest.raises(MissingEngineError, match=re.escape(text)):
             engine_version("pybullet")
 

@@ -273,16 +273,26 @@ def test_memory_is_measured_and_no_process_is_left_by_a_refusal(
         return begin(worlds, *arguments)
 
     monkeypatch.setattr(pool.PoolWorlds, "_begun", begun)
-    with pytest.raises(EngineError, match=r"takes [23]\d MB, and 0.2 GB are free: make 1[0-3] "):
-        make_worlds(model, 1000, workers=2)
+    refused(
+        (
+            EngineError,
+            r"takes [23]\d MB, and 0.2 GB are free: make 1[0-3] ",
+            lambda: make_worlds(model, 1000, workers=2),
+        )
+    )
     assert len(started) == 3
     assert not running(started)
 
 
 def test_a_model_that_no_other_process_can_read(model: sm.Model) -> None:
     vars(model)["inner"] = lambda: None
-    with pytest.raises(UnsupportedError, match="in processes of their own, which cannot read"):
-        make_worlds(model, 2)
+    refused(
+        (
+            UnsupportedError,
+            "in processes of their own, which cannot read",
+            lambda: make_worlds(model, 2),
+        )
+    )
 
 
 _SCRIPT = """
