@@ -23,7 +23,7 @@ import pytest
 from statemachine import backends, load, releases
 from statemachine.backends import backend_engine, backend_names
 from statemachine.cli import main
-from statemachine.errors import MissingEngineError
+from statemachine.errors import MissingEngineError, StateMachineError
 from statemachine.installed import ENGINES, engine_version, require
 from statemachine.interface import Data, Model, make_data, reset, step
 from statemachine.lessons import LESSONS
@@ -99,12 +99,13 @@ def assert_not_in(whole: Container[Any], *parts: object) -> None:
 def refused(
     *cases: tuple[type[BaseException] | tuple[type[BaseException], ...], str, Callable[[], object]],
 ) -> None:
-    """Every call raises its error, with one line of text in which its pattern is."""
+    """Every call raises its error, with its pattern in the text; one of ours is one line."""
     for error, says, call in cases:
         with pytest.raises(error, match=says or None) as caught:  # noqa: PT012
             call()
             pytest.fail(f"nothing was refused, where {error} was to say: {says}")
-        assert "\n" not in str(caught.value)
+        ours = isinstance(caught.value, (StateMachineError, TypeError))
+        assert not ours or "\n" not in str(caught.value)
 
 
 def after(model: Model, nstep: int, keyframe: int | str | None = None) -> np.ndarray:
