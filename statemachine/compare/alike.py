@@ -41,7 +41,7 @@ def match_sides(
     return matched
 
 
-def told_alike(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
+def named_as_left(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
     """Both runs with the names of the first; commands in its order where both have all of them.
 
     What a joint, body or site of the first is called, its counterpart is called too. One
@@ -63,8 +63,8 @@ def told_alike(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
     }
     ours, columns = dict(one.columns), dict(two.columns)
     if any(only.get("joint") for only in matched.only):
-        for each in (ours, columns):
-            each.pop("energy", None)
+        for side in (ours, columns):
+            side.pop("energy", None)
     order = [there for _, there in matched.actuators]
     if len(order) == a.nu == b.nu:
         columns["ctrl"] = columns["ctrl"][:, order]
@@ -160,8 +160,8 @@ def _renamed(ours: Sequence[str], theirs: Sequence[str], pairs: Pairs) -> tuple[
     return tuple(names)
 
 
-def retold(controller: Controller, matched: Matched, start: Array) -> Controller:
-    """What a controller tells the left, told to the right.
+def controller_for_right(controller: Controller, matched: Matched, start: Array) -> Controller:
+    """A controller that gives the right what another one gives the left.
 
     Where it gives no command ctrl stays as it is, as it does on the left.
 
@@ -171,8 +171,8 @@ def retold(controller: Controller, matched: Matched, start: Array) -> Controller
         start: (nu,) ctrl of the right, for the actuators that have no counterpart.
     """
 
-    def told(time: float, data: Data) -> Any:
-        wanted = controller(time, data)
-        return None if wanted is None else matched.ctrl(np.asarray(wanted, np.float64), start)
+    def translate(time: float, data: Data) -> Any:
+        ctrl = controller(time, data)
+        return None if ctrl is None else matched.ctrl(np.asarray(ctrl, np.float64), start)
 
-    return told
+    return translate

@@ -68,10 +68,6 @@ class ChaosFloor:
     bands: tuple[FloorBand, ...]
     time: Array = field(repr=False, metadata={"json": False})
 
-    def of(self, name: str) -> FloorBand | None:
-        """The band of a quantity; None if it has none."""
-        return next((band for band in self.bands if band.name == name), None)
-
 
 def chaos_floor(
     comparison: Comparison,

@@ -58,7 +58,7 @@ def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterato
         parts = [
             # Where the other side has some over, too, they may be the same.
             f"{kind}{'s' * (len(names) > 1)} {few(names, 6)}"
-            + " (--map LEFT=RIGHT)" * all(each.get(kind) for each in only)
+            + " (--map LEFT=RIGHT)" * all(side.get(kind) for side in only)
             for kind, names in own.items()
             if names
         ]

@@ -107,13 +107,15 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
             )
     ours = {a: b for a, b in given.items() if a in robots[0].names}
     trees = [GroupTree(renamed(robots[0], ours)), GroupTree(robots[1])]
-    found = match(trees[0], trees[1], one_world=all(robot.rooted for robot in robots))
-    moving = [(p.left.joint, p.right.joint) for p in found.pairs if p.left.joint and p.right.joint]
+    matching = match(trees[0], trees[1], one_world=all(robot.rooted for robot in robots))
+    moving = [
+        (p.left.joint, p.right.joint) for p in matching.pairs if p.left.joint and p.right.joint
+    ]
     joints = tuple(sorted((a.number, b.number) for a, b in moving if a.kind == b.kind))
     # A body with several joints is several parts of a description, of which the last has its mass.
-    by_body = {solid.left: solid for solid in map(_solid, found.pairs)}
+    by_body = {solid.left: solid for solid in map(_solid, matching.pairs)}
     solids = (*by_body.values(), *_led(one, two, given))
-    sites = _sites(one, two, given, found, trees)
+    sites = _sites(one, two, given, matching, trees)
     actuators = _actuators(one, two, joints, given)
     only = tuple(
         {
@@ -135,7 +137,7 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
         actuators=actuators,
         solids=solids,
         only=(only[0], only[1]),
-        notes=(*found.notes(), *_site_notes(one, two, sites, given)),
+        notes=(*matching.notes(), *_site_notes(one, two, sites, given)),
     )
 
 
@@ -210,7 +212,7 @@ def _sites(
     one: Model,
     two: Model,
     given: Mapping[str, str],
-    found: Matching,
+    matching: Matching,
     trees: Sequence[GroupTree],
 ) -> Pairs:
     """By name, then by place: of what is left, those in one place of the same solid."""
@@ -225,7 +227,7 @@ def _sites(
 
     def in_one_place(sites: tuple[int, int]) -> bool:
         (number, place), (there, other) = places[0][sites[0]], places[1][sites[1]]
-        pair = found.of(number)
+        pair = matching.of(number)
         if pair is None or there != pair.right.number:
             return False
         return (pair.align @ place).distance(other) < _ONE_PLACE

@@ -292,17 +292,17 @@ def _by_unit(
     for unit in _UNITS:
         places = [k for k, of in enumerate(column.units) if of == unit]
         apart = _distances(left[:, places], right[:, places])
-        told = np.flatnonzero(np.isfinite(apart).all(axis=0))
-        if len(told):
+        known = np.flatnonzero(np.isfinite(apart).all(axis=0))
+        if len(known):
             null = np.nan_to_num(_distances(running[:, places], left[:, places]))
             sizes = _sizes(column.stage, left[:, places], right[:, places])
             acting = sizes[sizes > _LEAST * sizes.max(initial=0.0)]
             yield StageMeasure(
                 column.stage,
                 unit,
-                [column.names[places[k]] for k in told.tolist()],
-                apart[:, told],
-                null[:, told],
+                [column.names[places[k]] for k in known.tolist()],
+                apart[:, known],
+                null[:, known],
                 # The median, of those that are no thousandth of the largest.
                 float(np.median(acting)) if len(acting) else 0.0,
             )

@@ -20,12 +20,12 @@ from ..runs.rerun import Rerun, SideStart, beginning_with, commands_of, replayed
 from ..runs.scenarios import SCENARIOS, Controller, Scenario
 from .alike import (
     called,
+    controller_for_right,
     for_left,
     in_terms_of_right,
     match_sides,
-    retold,
+    named_as_left,
     same_commands,
-    told_alike,
 )
 from .labels import files_apart, labels_of, lacking
 from .matching import Matched, missing_parts
@@ -141,7 +141,7 @@ def prepare_sides(
     def theirs(model: Model) -> Controller:
         controller = own(model if scenario.own else left)
         if matched and not scenario.own:
-            controller = retold(controller, matched, own_start.ctrl)
+            controller = controller_for_right(controller, matched, own_start.ctrl)
         return beginning_with(lambda _, ctrl=begin.ctrl: ctrl, controller) if begin else controller
 
     one, two = (
@@ -213,7 +213,7 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
         names = files_apart(left.path.parts, right.path.parts)
         one, rights = called(one, names[0]), [called(run, names[1]) for run in rights]
     if matched is not None:
-        both = [told_alike(one, run, matched) for run in rights]
+        both = [named_as_left(one, run, matched) for run in rights]
         one, rights = both[0][0], [run for _, run in both]
     return SidesRun(
         left=one,

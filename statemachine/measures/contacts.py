@@ -62,10 +62,10 @@ class ContactNames:
             ordered = sorted((one, two), key=self._distance, reverse=True)
             owners = [self._owner(geom) for geom in ordered]
             pair, own = " on ".join(owners), [self._geoms[geom] for geom in ordered]
-            told = [
+            shapes = [
                 name for name, owner in zip(own, owners, strict=True) if name not in ("", owner)
             ]
-            self._pairs[one, two] = pair, pair + (f" ({' on '.join(told)})" if told else "")
+            self._pairs[one, two] = pair, pair + (f" ({' on '.join(shapes)})" if shapes else "")
         return self._pairs[one, two]
 
     def _owner(self, geom: int) -> str:

@@ -44,9 +44,9 @@ from .sides import (
     commanded,
     contact_words,
     emulated,
+    loop_note,
     loops,
     provenance,
-    told,
     unmatched,
 )
 from .template import if_true
@@ -116,7 +116,7 @@ def page(
     blocks: list[Block] = [
         *unmatched(run),
         *([Text(one.header.says)] if one.header.says else []),
-        *told(run),
+        *loop_note(run),
         *commanded(one, two, labels),
         *in_words(comparison),
         *([] if comparison.ended or not touching else [contact_words(comparison, touching)]),

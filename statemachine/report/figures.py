@@ -161,12 +161,11 @@ def draw_picture(axes: Any, picture: Drawn) -> None:
     cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
 
 
-def chart(picture: Traces, form: str, size: tuple[float, float], box: Box) -> bytes:
-    """Curves without a legend, where something of the caller's goes along the axis of time.
+def chart(picture: Traces, size: tuple[float, float], box: Box) -> str:
+    """Curves as SVG without a legend, where something of the caller's goes along the axis of time.
 
     Args:
         picture: The curves.
-        form: "svg" or "png".
         size: Width and height [inches].
         box: Left, bottom, width and height of the axes, as shares of that.
 
@@ -177,12 +176,12 @@ def chart(picture: Traces, form: str, size: tuple[float, float], box: Box) -> by
     def draw() -> Any:
         from matplotlib.figure import Figure
 
-        figure = Figure(size, facecolor="none" if form == "svg" else _PAPER)
+        figure = Figure(size, facecolor="none")
         draw_picture(figure.add_axes(box), picture)
         return figure
 
     settings = {"font.size": 8, "axes.linewidth": 0.6, "axes.facecolor": "none"}
-    return saved(draw, form, {**SETTINGS, **settings}, 100)
+    return saved(draw, "svg", {**SETTINGS, **settings}).decode()
 
 
 def _traces(axes: Any, picture: Traces) -> None:

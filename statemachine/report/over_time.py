@@ -21,6 +21,10 @@ from .finding import Event, name_of
 
 CHARTS_SHOWN = 20  # of a page or a figure
 GAP = "how far apart"
+SAID = (
+    "{title}, difference over time: at most {far} at {at}, settled at {settled}; tolerance "
+    "{tolerance}, left: {since}."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +54,13 @@ class QuantityChart(Interactive):
     def said(self) -> str:
         """What it shows, for those who do not see it."""
         gap = self.agreement
-        far, settled, tolerance = (
-            quantity(size, gap.unit) for size in (gap.max, gap.settled, gap.tolerance)
-        )
-        since = "never" if gap.since is None else f"at {short_time(gap.since)}"
-        return (
-            f"{self.title}, difference over time: at most {far} at {short_time(gap.at)}, "
-            f"settled at {settled}; tolerance {tolerance}, left: {since}."
+        return SAID.format(
+            title=self.title,
+            far=quantity(gap.max, gap.unit),
+            at=short_time(gap.at),
+            settled=quantity(gap.settled, gap.unit),
+            tolerance=quantity(gap.tolerance, gap.unit),
+            since="never" if gap.since is None else f"at {short_time(gap.since)}",
         )
 
     def values(self) -> Traces | None:

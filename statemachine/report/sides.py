@@ -125,7 +125,7 @@ def unmatched(run: SidesRun | None) -> list[Block]:
     return [Items([sentence(line) for line in lines])] if lines else []
 
 
-def told(run: SidesRun | None) -> list[Block]:
+def loop_note(run: SidesRun | None) -> list[Block]:
     """Whether the two sides were told the same, where that takes one sentence."""
     if run is None:
         return []

@@ -43,11 +43,11 @@ class Cause:
     @property
     def refused(self) -> str:
         """Why it cannot be brought to the same; "" if it can."""
-        return next((each.refused for each in self.differences if each.refused), "")
+        return next((row.refused for row in self.differences if row.refused), "")
 
     def edits(self, side: int) -> tuple[Edit, ...]:
         """What is done to the first (0) or the second (1) compiled model."""
-        sides = [each.edits if side else each.edits_one for each in self.differences]
+        sides = [row.edits if side else row.edits_one for row in self.differences]
         return tuple(edit for edits in sides for edit in edits)
 
 
@@ -127,8 +127,8 @@ def _change(row: ModelDifference) -> object:
     """What is equal for two differences that are the same change of different elements."""
     if row.subject == "extra actuator":  # a file without motors is one difference
         return row.subject, repr(row.values)
-    whole = not row.where or row.subject.startswith("extra ")
-    return row.title if whole else (row.kind, row.subject, repr(row.values))
+    single = not row.where or row.subject.startswith("extra ")
+    return row.title if single else (row.kind, row.subject, repr(row.values))
 
 
 def _grouped(

@@ -26,7 +26,7 @@ from ...processes.forks import forks_for, in_forks
 from ...runs import Trace
 from ...runs.rerun import Rerun, SideStart, beginning_with, commands_of, start_of
 from ...runs.scenarios import Controller, Scenario
-from ..alike import commands_alike, retold, translated
+from ..alike import commands_alike, controller_for_right, translated
 from ..matching import Matched
 from ..perturbed import RUNS, Uncertainty, perturbed_run
 from .causes import (
@@ -179,9 +179,9 @@ class Trials:
             rows += of_the_run(self._matched, self._starts, self._keyframes[1])
         if self._recordings:
             left, right = self._recordings
-            told = translated(left, self._matched, self._starts[1])
+            given = translated(left, self._matched, self._starts[1])
             rows += (
-                [] if commands_alike(told, right) else [ModelDifference(COMMANDS, "run", "", ())]
+                [] if commands_alike(given, right) else [ModelDifference(COMMANDS, "run", "", ())]
             )
         for side, settings in enumerate(self._own):
             rows += settings.differences(side) if settings else []
@@ -253,12 +253,13 @@ class Trials:
     def integrator_of(self, side: int) -> str:
         """What a side integrates with as it comes; "its own" where that has no name."""
         model: Any = self._models[side]
+        own = None if model.compiled is None else model.compiled.opt.integrator
         names = {
             model.replace(integrator=name).compiled.opt.integrator: name
             for name in model.capabilities.integrators
-            if model.compiled is not None
+            if own is not None
         }
-        return names.get(model.compiled.opt.integrator, "its own") if names else "its own"
+        return names.get(own, "its own")
 
     def can_be_without(self, feature: Feature) -> bool:
         """Whether a feature can be left out on both sides, and is not what the experiment sets."""
@@ -326,8 +327,8 @@ class Trials:
         )
         model = built(model, edits)
         if run.side and not own:
-            facts = [BY_OPTION[name] for name in sorted(run.brought & self._replaced)]
-            options = {o: getattr(left, fact) for each in facts for o, fact in each.items()}
+            replaced = [BY_OPTION[name] for name in sorted(run.brought & self._replaced)]
+            options = {o: getattr(left, fact) for facts in replaced for o, fact in facts.items()}
             model = model.replace(**options) if options else model
         if run.integrator:
             model = model.replace(integrator=run.integrator)
@@ -375,19 +376,19 @@ class Trials:
         if self._recordings and side and COMMANDS not in brought:
             return commands_of(self._recordings[1])
         if self._recordings:  # in the order of the left's actuators
-            told = commands_of(self._recordings[0])
+            controller = commands_of(self._recordings[0])
         else:
-            told = self._scenario.controller(model if own else self._models[0], self.seed)
+            controller = self._scenario.controller(model if own else self._models[0], self.seed)
         if side == 0:
-            return told
+            return controller
         start = self._starts[1].ctrl
         if not own or ORDER in brought:
-            told = retold(told, self._matched, start)
+            controller = controller_for_right(controller, self._matched, start)
         # Without a keyframe of its own it starts with the commands of the left, too.
         return (
-            told
+            controller
             if self._keyframes[0] == self._keyframes[1]
-            else beginning_with(lambda _: start, told)
+            else beginning_with(lambda _: start, controller)
         )
 
     def repeats(self) -> bool:
@@ -421,7 +422,7 @@ class Trials:
         )
         if None in curves:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
-        return self.ruler.floor(first, [each[0] for each in curves if each], measure)
+        return self.ruler.floor(first, [run[0] for run in curves if run], measure)
 
     def _measured(self, side: int, model: Model, trace: Trace) -> _Outcome:
         curves = self.ruler.curves(trace, self._posed(model), side)

@@ -218,7 +218,7 @@ def quantity_row(quantity: QuantityChart) -> Html:
 def _figure(picture: Traces, caption: str, said: str) -> Html:
     """A chart with the cursor of time over its axes; a line where matplotlib is not installed."""
     try:
-        text = chart(picture, "svg", _SIZE, _BOX).decode()
+        text = chart(picture, _SIZE, _BOX)
     except MissingEngineError as error:
         return tag("p", f"No chart: {error}.", class_="foot")
     text = text[text.index("<svg") :]

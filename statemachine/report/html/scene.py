@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...compare.series import world_forces
 from ...drawing import Drawing
 from ...drawing.scene import Motion, camera_for
 from ...interface import Array, Ints
@@ -237,7 +238,7 @@ def _way(trace: Trace, tip: str, shown: Array) -> dict[str, str]:
 
 
 def _contacts(trace: Trace, rows: Ints, most: int) -> tuple[dict[str, str], float, bool]:
-    """Where contacts are in each row, the strongest first, and the force on the second [N].
+    """Where contacts are in each row, the strongest first, and the force there [N].
 
     Returns:
         These, the largest of the forces, and whether a row has more contacts.
@@ -252,10 +253,8 @@ def _contacts(trace: Trace, rows: Ints, most: int) -> tuple[dict[str, str], floa
         a + np.argsort(-strength[a:b], kind="stable")[:count]
         for a, b, count in zip(begins, ends, counts, strict=True)
     ])  # fmt: skip
-    # Rows of a contact frame are its axes; the force on the second geom is along them.
-    axes = trace["contact_frame"][chosen].reshape(-1, 3, 3)
-    force = np.einsum("cij,ci->cj", axes, trace["contact_force"][chosen])
-    where = np.nan_to_num(np.hstack([trace["contact_pos"][chosen], force]))
+    forces = world_forces(trace)[chosen]
+    where = np.nan_to_num(np.hstack([trace["contact_pos"][chosen], forces]))
     strongest = float(np.linalg.norm(where[:, 3:], axis=1).max(initial=0.0))
     more = bool((ends - begins > most).any())
     return {"count": packed(counts, "u1"), "at": packed(where, "f4")}, strongest, more
