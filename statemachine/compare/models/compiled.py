@@ -15,7 +15,7 @@ from ...interface import Model
 from ...measures.text import few
 from ..matching import Matched, match_models
 from ..why.causes import differences_of, sensors_of
-from .ledger import Key, Ledger, Telling, Value
+from .ledger import Key, Ledger, Value
 
 _CALLED = {"com": "centre of mass", "moments": "inertia"}  # of a part that is cut otherwise
 _SETTINGS = ("option", "flag")
@@ -132,14 +132,14 @@ def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) ->
         if name.endswith("limited") and len(difference.values) > 1:
             continue  # the range says so
         metres = difference.unit == "m" and "[rad]" not in name
-        more: Telling = {"keys": [key]} if metres else {"keys": [key], "share": 0.5}
         book.enter(
             *(subject, difference.where, name, [_value(value) for value in values]),
             difference.unit,
             scale=reach if metres else math.pi if "[rad]" in name else 0.0,
             slack=4,
             against=reach,
-            **more,
+            share=None if metres else 0.5,
+            keys=[key],
         )
 
 
@@ -179,18 +179,24 @@ def _enter_keyframes(book: Ledger, matched: Matched) -> None:
 def _enter_sensors(book: Ledger, matched: Matched) -> None:
     """What only a controller that reads them meets: it changes no motion by itself."""
     only: tuple[list[str], list[str]] = [], []
-    more: Telling = {
-        "share": 0.0,
-        "effect": "only a controller that reads it moves otherwise",
-        "matters": False,
-    }
+    effect = "only a controller that reads it moves otherwise"
     for difference in sensors_of(matched):
         for name, one, two in difference.values:
             if difference.subject == "extra sensor":
                 only[one is None].append(difference.where)
                 continue
             where = f"sensor {difference.where}" if difference.where else "sensordata"
-            book.enter("further", where, name, [_value(one), _value(two)], **more)
+            book.enter(
+                *("further", where, name, [_value(one), _value(two)]),
+                share=0.0,
+                effect=effect,
+                matters=False,
+            )
     if any(only):
         sides = [few(names, 6) or "nothing" for names in only]
-        book.differ("further", "sensors", "that only one has", sides, **more)
+        book.differ(
+            *("further", "sensors", "that only one has", sides),
+            share=0.0,
+            effect=effect,
+            matters=False,
+        )

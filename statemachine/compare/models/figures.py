@@ -13,39 +13,34 @@ from itertools import zip_longest
 import numpy as np
 
 from ...engines.description.match import Pair
-from ...engines.description.records import SCALAR, Actuator, RobotJoint, Setting
+from ...engines.description.records import OF_A_SLIDE, SCALAR, Actuator, RobotJoint, Setting
 from ...engines.description.tree import GroupTree
 from ...measures.text import few, milliseconds, rounded
 from .ledger import Ledger
 
-# Of each figure its subject and what of it it is, the field of a `RobotJoint` or an `Actuator`, its
-# unit of a hinge and of a slide, and what the compiled models call it.
-_DAMPING = ("N·m·s", "N·s/m")
-_STIFFNESS = ("N·m/rad", "N/m")
-_FORCE = ("N·m", "N")
-_PLAIN = ("", "")
+# Of a joint each figure's subject and what of it it is, the field of a `RobotJoint`, its unit, and
+# what the compiled models call it.
 _JOINT = (
-    ("speed", "", "velocity", ("rad/s", "m/s"), "speed"),
-    ("effort", "", "effort", _FORCE, "force limit"),
-    ("spring", "stiffness", "stiffness", _STIFFNESS, "spring"),
-    ("spring", "slack at", "rest", ("rad", "m"), "rest of the spring"),
-    ("armature", "", "armature", ("kg m²", "kg"), "armature"),
-    ("damping", "", "damping", _DAMPING, "damping"),
-    ("dry friction", "", "friction", _FORCE, "dry friction"),
+    ("speed", "", "velocity", "rad/s", "speed"),
+    ("effort", "", "effort", "N·m", "force limit"),
+    ("spring", "stiffness", "stiffness", "N·m/rad", "spring"),
+    ("spring", "slack at", "rest", "rad", "rest of the spring"),
+    ("armature", "", "armature", "kg m²", "armature"),
+    ("damping", "", "damping", "N·m·s", "damping"),
+    ("dry friction", "", "friction", "N·m", "dry friction"),
 )
 _ANY_JOINT = ("armature", "damping", "friction")  # the rest only a hinge or a slide has
-_GAINS = (
-    ("drive", "kp", "kp", _STIFFNESS, ("gains", "law", "extra actuator")),
-    ("drive", "kv", "kv", _DAMPING, ("gains", "law", "extra actuator")),
-)
-_DRIVE = (
-    *_GAINS,
-    ("drive", "gain", "gain", _PLAIN, ("gains", "law")),
-    ("drive", "gear", "gear", _PLAIN, ("gear",)),
-    ("drive", "ctrlrange", "controls", ("rad", "m"), ("range of ctrl",)),
-    ("drive", "forcerange", "forces", _PLAIN, ("force range",)),
-)
-_MATTER_MOST = ("gravity", "timestep")  # of the settings
+# The same of an `Actuator`; of one that only one side has, its gains.
+_GAINS = {
+    "kp": ("N·m/rad", ("gains", "law", "extra actuator")),
+    "kv": ("N·m·s", ("gains", "law", "extra actuator")),
+}
+_DRIVE = _GAINS | {
+    "gain": ("", ("gains", "law")),
+    "gear": ("", ("gear",)),
+    "ctrlrange": ("rad", ("range of ctrl",)),
+    "forcerange": ("", ("force range",)),
+}
 _UNITS = {"timestep": "s", "gravity": "m/s²", "wind": "m/s"}
 
 
@@ -83,7 +78,7 @@ class _Driven:
             case "kv", _ if kp > 0 < self.inertia:
                 damping = (drive.kv or 0.0) + (self.joint.damping or 0.0)
                 return f"damping ratio {damping / (2 * math.sqrt(kp * self.inertia)):.2g}"
-            case ("kp" | "kv", _) | ("controls", "position"):
+            case ("kp" | "kv", _) | ("ctrlrange", "position"):
                 return ""
         return f"at most {self.force(self.joint.effort)}"
 
@@ -91,7 +86,11 @@ class _Driven:
         """A force of the joint in words."""
         if value is None or math.isinf(value):
             return "nothing" if value is None else "unlimited"
-        return rounded(value, _FORCE[self.slides])
+        return rounded(value, self.unit("N·m"))
+
+    def unit(self, name: str) -> str:
+        """The unit of a figure that has this one of a hinge."""
+        return OF_A_SLIDE.get(name, name) if self.slides else name
 
 
 def of_joints(
@@ -121,7 +120,7 @@ def of_joints(
         ]
         if words[0] != words[1]:
             book.differ("structure", a.name, "follows", words, keys=keys)
-    for subject, figure, field, units, called in _JOINT:
+    for subject, figure, field, unit, called in _JOINT:
         slack = field == "rest" and not (a.stiffness and b.stiffness)
         if slack or not (scalar or field in _ANY_JOINT):
             continue
@@ -130,7 +129,7 @@ def of_joints(
         if field == "effort" and None not in values and 0 < min(values) < max(values) < math.inf:
             effect = f"{max(values) / min(values):.3g} times"
         book.enter(
-            *(subject, a.name, figure, values, units[sides[0].slides]),
+            *(subject, a.name, figure, values, sides[0].unit(unit)),
             scale=float(field == "rest"),
             against=max(side.against.get(field, 0.0) for side in sides),
             effect=effect,
@@ -177,16 +176,17 @@ def _drives(book: Ledger, left: _Driven, right: _Driven) -> None:
         book.enter("drive", name, "drive", kinds, effect=silent, keys=keys)
         if x and y and x.kind != y.kind:
             continue
-        for subject, figure, field, units, words in _DRIVE if x and y else _GAINS:
+        for field, (unit, words) in (_DRIVE if x and y else _GAINS).items():
             values = [getattr(drive, field, None) for drive in (x, y)]
-            if field in ("controls", "forces"):
+            if field.endswith("range"):
                 values = [value or "none" for value in values]
             effects = [s.effect_of_drive(field, d) for s, d in zip(sides, (x, y), strict=True) if d]
-            servo = field == "controls" and (x or y).kind == "position"
-            unit = units[left.slides] if field != "controls" or servo else ""
-            effect = _joined(effects) if len({*effects}) == len(effects) else ""
-            keys = [("actuator", called, word) for word in words]
-            book.enter(subject, name, figure, values, unit, effect=effect, keys=keys)
+            commanded = field == "ctrlrange" and (x or y).kind != "position"
+            book.enter(
+                *("drive", name, field, values, "" if commanded else left.unit(unit)),
+                effect=_joined(effects) if len({*effects}) == len(effects) else "",
+                keys=[("actuator", called, word) for word in words],
+            )
 
 
 def of_loose_drives(book: Ledger, left: GroupTree, right: GroupTree) -> None:
@@ -237,4 +237,4 @@ def _share(name: str, left: Setting, right: Setting) -> float:
     a, b = np.ravel(left), np.ravel(right)
     most = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
     share = float(np.linalg.norm(a - b)) / most if most else 0.0
-    return share if name in _MATTER_MOST else min(share, 0.2)
+    return share if name in ("gravity", "timestep") else min(share, 0.2)

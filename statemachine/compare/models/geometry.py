@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ...engines.description.tree import GRAVITY, GroupTree
 from ...interface import Array
 from ...measures.text import few, rounded
 from ...rotations import HERE
-from .ledger import Key, Ledger, Telling, plain
+from .ledger import Key, Ledger, plain
 
 _SIDES = ("-x", "-y", "-z", "+x", "+y", "+z")
 _STILL = "stands still"
@@ -49,7 +50,7 @@ def of_joints(
     shift, turn = off.of(anchor) - anchor, off.angle(HERE)
     far = max(float(np.linalg.norm(off.of(tip) - tip)) for tip in _tips(tree, pair))
     effect = f"moves what it carries by up to {rounded(far, 'm')}" if far else ""
-    more: Telling = {"share": max(far / reach, turn / math.pi), "effect": effect, "keys": place}
+    moves = partial(book.measure, share=max(far / reach, turn / math.pi), effect=effect, keys=place)
     # Turned about its axis, or moved along it, it only has its zero elsewhere.
     aside = off.mat @ axis - axis if hinge else shift - (shift @ axis) * axis
     sine = off.mat[[2, 0, 1], [1, 2, 0]] - off.mat[[1, 2, 0], [2, 0, 1]]
@@ -57,12 +58,12 @@ def of_joints(
     small = book.tolerance * (2 * math.pi if hinge else reach)
     if abs(zero) > small and float(np.linalg.norm(aside)) <= small:
         unit = "rad" if hinge else "m"
-        book.differ("places", where, "zero position", (0.0, zero), unit, abs(zero), **more)
+        moves("places", where, "zero position", abs(zero), unit, 0.0, (0.0, zero))
         shift, turn = (shift, 0.0) if hinge else (aside, turn)
     values = [plain(p.pos) for p in (above.align @ pair.left.place, pair.right.place)]
     size = float(np.linalg.norm(shift))
-    book.measure("places", where, "origin", size, "m", reach, values, slack=2, **more)
-    book.measure("places", where, "frame turned", turn, "rad", math.pi, slack=4, **more)
+    moves("places", where, "origin", size, "m", reach, values, slack=2)
+    moves("places", where, "frame turned", turn, "rad", math.pi, slack=4)
     # The axis itself, in the frame of the second one's link.
     mine = pair.align.mat @ a.axis
     tilt = math.atan2(float(np.linalg.norm(np.cross(mine, axis))), float(mine @ axis))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -97,15 +96,6 @@ class AgreedFigures:
     digits: int
 
 
-class Telling(TypedDict, total=False):
-    """What is said of a difference, beside its figures: as for `Ledger.differ`."""
-
-    share: float
-    effect: str
-    matters: bool
-    keys: Sequence[Key]
-
-
 def plain(vector: Iterable[float]) -> tuple[float, ...]:
     """A vector as a value of a difference."""
     return tuple(map(float, vector))
@@ -157,7 +147,7 @@ class Ledger:
     ) -> None:
         """Enter a difference; in its effect "{share}" is its share."""
         share = float(matters) * (1.0 if math.isnan(share) else min(max(share, 0.0), 1.0))
-        one, two = ["unlimited" if value in (math.inf, -math.inf) else value for value in values]
+        left, right = ["unlimited" if v in (math.inf, -math.inf) else v for v in values]
         size = None if size is None or not math.isfinite(size) else size
         known = [difference for key in keys for difference in self.compiled.get(key, ())]
         if self.complete and keys and not known and keys[0][0] != "site":  # a link is a frame too
@@ -168,7 +158,7 @@ class Ledger:
         effect = effect.format(share=share)
         self.differences.append(
             Difference(
-                *(subject, where, figure, one, two, unit, size, share, effect, matters),
+                *(subject, where, figure, left, right, unit, size, share, effect, matters),
                 causes=tuple(causes),
                 refused=refused,
             )
@@ -185,7 +175,10 @@ class Ledger:
         values: Sequence[Value] = (None, None),
         *,
         slack: float = 1.0,
-        **more: Unpack[Telling],
+        share: float = 1.0,
+        effect: str = "",
+        matters: bool = True,
+        keys: Sequence[Key] = (),
     ) -> None:
         """Enter how far two things are apart, as a difference or as an agreement.
 
@@ -198,11 +191,20 @@ class Ledger:
             scale: What it is set against.
             values: The two; None, if they say nothing to a reader.
             slack: How many roundings may have come together.
-            more: As for `differ`.
+            share: How much a difference matters, from 0 to 1.
+            effect: What it does.
+            matters: Whether it makes the two readings differ.
+            keys: What the compiled models call it.
         """
         relative = size / scale if scale and math.isfinite(size) else math.inf if size else 0.0
         if relative > self.tolerance * slack:
-            self.differ(subject, where, figure, values, unit, size, **more)
+            self.differ(
+                *(subject, where, figure, values, unit, size),
+                share=share,
+                effect=effect,
+                matters=matters,
+                keys=keys,
+            )
         else:
             self._equal.setdefault((subject, unit), []).append((relative, size, where))
 
@@ -217,7 +219,10 @@ class Ledger:
         scale: float = 0.0,
         slack: float = 1.0,
         against: float = 0.0,
-        **more: Unpack[Telling],
+        share: float | None = None,
+        effect: str = "",
+        matters: bool = True,
+        keys: Sequence[Key] = (),
     ) -> None:
         """Enter a figure of both, None where one does not say.
 
@@ -230,28 +235,38 @@ class Ledger:
             scale: What a difference is set against to be rounding, if it is more than they are.
             slack: How many roundings may have come together.
             against: What its share is of; 0: of the larger one.
-            more: As for `differ`.
+            share: How much a difference matters, if that is something else.
+            effect: What it does.
+            matters: Whether it makes the two readings differ.
+            keys: What the compiled models call it.
         """
-        said = [value for value in values if value is not None]
-        if len(said) < 2:
-            if any(said):  # what is not said is no zero, but nothing lacks where the other has none
-                size = abs(said[0]) if isinstance(said[0], float | int) else None
-                more.setdefault("share", size / against if size and against else 1.0)
-                self.differ(subject, where, figure, values, unit, size, **more)
-            return
-        arrays = [np.atleast_1d(np.asarray(value)) for value in said]
-        if arrays[0].dtype.kind == "U" or arrays[0].shape != arrays[1].shape:
-            same = said[0] == said[1]
-            self.measure(subject, where, figure, 0.0 if same else math.inf, "", 0.0, values, **more)
-            return
-        with np.errstate(invalid="ignore"):
-            apart = np.where(arrays[0] == arrays[1], 0.0, arrays[0] - arrays[1])
-        size = float(np.abs(apart).max() if apart.size == 2 else np.linalg.norm(apart))
-        most = max(float(np.linalg.norm(array)) for array in arrays)
-        usual = max(float(np.ptp(array)) for array in arrays) if apart.size == 2 else most
-        more.setdefault("share", size / (against or usual) if 0 < most < math.inf else 1.0)
-        scale = max(most, scale)
-        self.measure(subject, where, figure, size, unit, scale, values, slack=slack, **more)
+        known = [value for value in values if value is not None]
+        arrays = [np.atleast_1d(np.asarray(value)) for value in known]
+        part = 1.0  # its share, unless that is given
+        if len(known) < 2:
+            if not any(known):
+                return  # what is not said is no zero, but nothing lacks where the other has none
+            size = abs(known[0]) if isinstance(known[0], float | int) else math.inf
+            part = size / against if size and against else 1.0
+            scale = 0.0
+        elif arrays[0].dtype.kind == "U" or arrays[0].shape != arrays[1].shape:
+            size, unit, scale = 0.0 if known[0] == known[1] else math.inf, "", 0.0
+        else:
+            with np.errstate(invalid="ignore"):
+                apart = np.where(arrays[0] == arrays[1], 0.0, arrays[0] - arrays[1])
+            size = float(np.abs(apart).max() if apart.size == 2 else np.linalg.norm(apart))
+            most = max(float(np.linalg.norm(array)) for array in arrays)
+            usual = max(float(np.ptp(array)) for array in arrays) if apart.size == 2 else most
+            part = size / (against or usual) if 0 < most < math.inf else 1.0
+            scale = max(most, scale)
+        self.measure(
+            *(subject, where, figure, size, unit, scale, values),
+            slack=slack,
+            share=part if share is None else share,
+            effect=effect,
+            matters=matters,
+            keys=keys,
+        )
 
     def agreements(self) -> Iterator[AgreedFigures]:
         """How well the rest agrees, by subject and unit."""

@@ -18,6 +18,11 @@ from ...rotations import HERE, Placement, rotation
 
 Range = tuple[float, float]
 SCALAR = ("hinge", "slide")  # kinds of a joint whose position is a number
+# Units of what a hinge is set to, and what they are of a slide.
+OF_A_SLIDE = {
+    **{"rad": "m", "rad/s": "m/s", "N·m/rad": "N/m", "N·m·s": "N·s/m"},
+    **{"N·m": "N", "kg m²": "kg"},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +158,7 @@ class Actuator:
         kp, kv: Gains of a position servo.
         gain: Force for each unit of ctrl, where it is no position servo.
         gear: Joint force for each unit of its own.
-        forces, controls: Ranges, None where unlimited.
+        ctrlrange, forcerange: None where unlimited.
     """
 
     name: str
@@ -163,8 +168,8 @@ class Actuator:
     kv: float | None
     gain: float | None
     gear: float
-    forces: Range | None
-    controls: Range | None
+    ctrlrange: Range | None
+    forcerange: Range | None
 
 
 Setting = float | str | tuple[float, ...] | None

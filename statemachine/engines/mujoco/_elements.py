@@ -12,13 +12,13 @@ from ...installed import require
 from ...interface import Array, JointType
 from ...measures.text import grouped
 from ...rotations import HERE, Placement, matrix_from_quat
+from ..description.records import OF_A_SLIDE
 from ..records import Edit, ModelDifference
 from ._geoms import NO_TOUCH, touches
 from ._sides import Pairs, Sides, differing, name_of, plain, quat_of, same, zeros
 
 # In the place of a field: what a pair has is to be that of its geoms, as edited as these are.
 AS_GEOMS = "pair as its geoms"
-_OF_A_SLIDE = {"rad": "m", "N·m/rad": "N/m", "N·m": "N", "kg m²": "kg", "N·m·s": "N·s/m"}
 _NUMBERED = (1, 2)  # mjtWrap: a joint with its coefficient, a pulley with its divisor
 _WRAPS = {1: "joint", 3: "site", 4: "geom", 5: "geom"}  # mjtWrap, what an entry refers to
 _SLACK = (
@@ -76,7 +76,7 @@ def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     for difference in differences:
         unit = difference.unit
         yield replace(
-            difference, unit=_OF_A_SLIDE.get(unit, "") if kind == JointType.SLIDE else unit
+            difference, unit=OF_A_SLIDE.get(unit, "") if kind == JointType.SLIDE else unit
         )
 
 

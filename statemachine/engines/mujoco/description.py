@@ -214,7 +214,7 @@ def _notes(raw: Any, links: list[Link], actuators: tuple[Actuator, ...]) -> list
 
 def _beyond(raw: Any, i: int, drive: Actuator) -> str:
     """A servo that may be commanded to where its joint cannot go."""
-    joint, ends = int(raw.actuator_trnid[i, 0]), drive.controls
+    joint, ends = int(raw.actuator_trnid[i, 0]), drive.ctrlrange
     kp, bias = raw.actuator_gainprm[i, 0], raw.actuator_biasprm[i, 1]
     servo = raw.actuator_trntype[i] == 0 and kp and bias == -kp and drive.gear == 1
     hinge = raw.jnt_limited[joint] and raw.jnt_type[joint] == JointType.HINGE
@@ -249,10 +249,10 @@ def _effort(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> float | No
 
 def _most(raw: Any, i: int, drive: Actuator) -> float:
     """The largest force of an actuator itself."""
-    if drive.forces:
-        return max(map(abs, drive.forces))
-    if drive.controls and not raw.actuator_biastype[i] and not raw.actuator_gaintype[i]:
-        return abs(float(raw.actuator_gainprm[i, 0])) * max(map(abs, drive.controls))
+    if drive.forcerange:
+        return max(map(abs, drive.forcerange))
+    if drive.ctrlrange and not raw.actuator_biastype[i] and not raw.actuator_gaintype[i]:
+        return abs(float(raw.actuator_gainprm[i, 0])) * max(map(abs, drive.ctrlrange))
     return math.inf
 
 
@@ -277,6 +277,6 @@ def _actuator(raw: Any, i: int) -> Actuator:
         kv=float(-bias[2]) if position else None,
         gain=None if position else float(gain[0]),
         gear=float(raw.actuator_gear[raw.actuator_outadr[i], 0]),
-        forces=_limited(raw.actuator_forcerange[i], raw.actuator_forcelimited[i]),
-        controls=_limited(raw.actuator_ctrlrange[control], raw.actuator_ctrllimited[control]),
+        forcerange=_limited(raw.actuator_forcerange[i], raw.actuator_forcelimited[i]),
+        ctrlrange=_limited(raw.actuator_ctrlrange[control], raw.actuator_ctrllimited[control]),
     )
