@@ -61,13 +61,15 @@ class Geoms:
         """What they differ in."""
         for a, b in self.pairs:
             yield from self._shape(a, b)
-        for side, raw in enumerate((self._sides.left, self._sides.right)):
-            matched = {pair[side] for pair in self.pairs}
-            for g in (g for g in self._acting[side] if g not in matched):  # is switched off there
-                edits = zeros(("geom_contype", "geom_conaffinity", "geom_fluid"), raw, g)
-                pairs = np.flatnonzero((raw.pair_geom1 == g) | (raw.pair_geom2 == g)).tolist()
-                edits += tuple(("pair_margin", (k,), NO_TOUCH) for k in pairs)
-                yield self._sides.alone(side, "geom", g, edits, "shape", shapes.kind(raw, g))
+        yield from self._sides.extras("geom", self.pairs, self._without, "shape", shapes.kind)
+
+    def _without(self, raw: Any, g: int) -> tuple[Edit, ...]:
+        """What switches a geom off, if it acts."""
+        if g not in self._acting[raw is self._sides.right]:
+            return ()
+        pairs = np.flatnonzero((raw.pair_geom1 == g) | (raw.pair_geom2 == g)).tolist()
+        edits = zeros(("geom_contype", "geom_conaffinity", "geom_fluid"), raw, g)
+        return (*edits, *(("pair_margin", (k,), NO_TOUCH) for k in pairs))
 
     def _shape(self, a: int, b: int) -> Iterator[ModelDifference]:
         sides, left, right = self._sides, self._sides.left, self._sides.right

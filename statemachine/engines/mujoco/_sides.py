@@ -298,37 +298,33 @@ class Sides:
         ]
 
     def extras(
-        self, kind: str, pairs: Pairs, without: Callable[[Any, int], tuple[Edit, ...]]
-    ) -> Iterator[ModelDifference]:
-        """Elements that only one model has; `without` tells what takes the effect of one away."""
-        for side, names in enumerate(self._names(kind)):
-            for k in sorted({*range(len(names))} - {pair[side] for pair in pairs}):
-                if edits := without((self.left, self.right)[side], k):
-                    yield self.alone(side, kind, k, edits)
-
-    def alone(
         self,
-        side: int,
         kind: str,
-        k: int,
-        edits: tuple[Edit, ...],
+        pairs: Pairs,
+        without: Callable[[Any, int], tuple[Edit, ...]],
         called: str = "",
-        what: str = "there",
-    ) -> ModelDifference:
-        """What only one of two has; without it, it is as the other.
+        what: Callable[[Any, int], str] = lambda _raw, _k: "there",
+    ) -> Iterator[ModelDifference]:
+        """Elements that only one model has; without one, that model is as the other.
 
         Args:
-            side: Whose it is: 0 of the first, 1 of the second.
-            kind: Of the element.
-            k: Its id.
-            edits: What takes its effect away.
-            called: What it is called instead of its kind.
-            what: What stands for it as a value.
+            kind: Of the elements.
+            pairs: Ids of those that both have.
+            without: Tells the edits that take the effect of one away, if it has any.
+            called: What they are called instead of their kind.
+            what: Tells what stands for one as a value.
         """
-        subject, name = f"extra {called or kind}", name_of((self.left, self.right)[side], kind, k)
-        if side:
-            return ModelDifference(subject, kind, name, ((kind, None, what),), edits=edits)
-        return ModelDifference(subject, kind, name, ((kind, what, None),), edits_one=edits)
+        for side, names in enumerate(self._names(kind)):
+            raw = (self.left, self.right)[side]
+            for k in sorted({*range(len(names))} - {pair[side] for pair in pairs}):
+                edits, values = without(raw, k), (what(raw, k), None)
+                if edits:
+                    yield ModelDifference(
+                        *(f"extra {called or kind}", kind, name_of(raw, kind, k)),
+                        ((kind, *(values[::-1] if side else values)),),
+                        edits=edits if side else (),
+                        edits_one=() if side else edits,
+                    )
 
     def elsewhere(
         self, kind: str, a: int, b: int, wanted: Placement, theirs: Placement
