@@ -108,16 +108,11 @@ def for_left(trace: Trace, model: Model, request: Request) -> Trace:
     return translated(trace, matched, start_of(model, None))
 
 
-def in_terms_of_right(left: Trace, right: Trace | None, matched: Matched | None) -> Trace:
+def in_terms_of_right(left: Trace, right: Trace, matched: Matched | None) -> Trace:
     """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
     if matched is None:
         return left
-    start = (
-        start_of(matched.two, None)
-        if right is None
-        else (right.qpos[0], right.qvel[0], right.ctrl[0])
-    )
-    return translated(left, matched, start)
+    return translated(left, matched, (right.qpos[0], right.qvel[0], right.ctrl[0]))
 
 
 def same_commands(theirs: Trace, right: Trace) -> bool:
