@@ -29,7 +29,6 @@ _CONTACT = {
     "gap": "margin",
     **dict.fromkeys(("solref", "solimp", "solmix"), "softness"),
 }
-ShapePair = tuple[CollisionShape | None, CollisionShape | None]
 
 
 def of_joints(
@@ -271,7 +270,9 @@ def _solids(
     book.measure("shapes", label, "turned", turn, "rad", math.pi, slack=8, share=share, keys=keys)
 
 
-def _paired(ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]) -> list[ShapePair]:
+def _paired(
+    ours: Sequence[CollisionShape], theirs: Sequence[CollisionShape]
+) -> list[tuple[CollisionShape | None, CollisionShape | None]]:
     """Each shape with that of its name, the rest by kind and place; in the axes of the first."""
     pairs = likest(ours, theirs)
     rest = [other for i, other in enumerate(theirs) if i not in pairs.values()]

@@ -29,16 +29,15 @@ _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves 
 _COUNTED = {"equality": "eq"}  # in the names of counts and of views
 
 Pairs = Sequence[tuple[int, int]]
-Values = Iterable[tuple[Any, ...]]
 
 
-def same(left: Any, right: Any, slack: float = _ROUNDING) -> bool:
+def same(left: Any, right: Any) -> bool:
     """Whether two values are equal, but for rounding."""
     a, b = np.asarray(left), np.asarray(right)
     if a.shape != b.shape or "f" not in (a.dtype.kind, b.dtype.kind):
         return bool(np.array_equal(a, b))
     # A range without an end is told by its flag.
-    return bool((np.isclose(a, b, slack, 1e-15) | np.isinf(a) | np.isinf(b)).all())
+    return bool((np.isclose(a, b, _ROUNDING, 1e-15) | np.isinf(a) | np.isinf(b)).all())
 
 
 def plain(value: Any) -> Any:
@@ -240,7 +239,7 @@ class Sides:
         subject: str,
         kind: str,
         element: int,
-        values: Values = (),
+        values: Iterable[tuple[Any, ...]] = (),
         unit: str = "",
         edits: Iterable[Edit] = (),
         back: Iterable[Edit] = (),
