@@ -386,11 +386,7 @@ def test_each_figure_of_a_model_is_found_and_brought_over(model):
 def test_shapley_values_of_a_game_whose_values_are_known():
     """Of v(S) = 1 - max over S each gets what it adds, as in the airport game."""
     costs = {"a": 0.1, "b": 0.3, "c": 0.6, "d": 1.0}
-
-    def value(brought: frozenset[str]) -> float:
-        return 1.0 - max((costs[name] for name in brought), default=0.0)
-
-    found = shapley(list(costs), value, 1.0)
+    found = shapley(list(costs), lambda s: 1.0 - max((costs[n] for n in s), default=0.0), 1.0)
     known = {"a": 0.025, "b": 0.025 + 0.2 / 3, "c": 0.025 + 0.2 / 3 + 0.15}
     known["d"] = 1.0 - sum(known.values())
     assert found.method == "all sets"
@@ -411,10 +407,7 @@ def test_drawn_orders_come_with_their_error():
 
 
 def test_a_set_that_cannot_be_run_is_told():
-    def value(brought: frozenset[str]) -> float | None:
-        return None if brought == {"a"} else 1.0 - 0.5 * len(brought)
-
-    found = shapley(["a", "b"], value, 1.0)
+    found = shapley(["a", "b"], lambda s: None if s == {"a"} else 1.0 - 0.5 * len(s), 1.0)
     assert found.impossible == (("a",),)
     assert found.alone["a"] is None
     assert found.share["a"] is None

@@ -212,11 +212,11 @@ def test_finer_splits_what_changed_alike(arm: Model) -> None:
 
 def test_causes_that_do_nothing_alone_and_nothing_last_get_their_part() -> None:
     """Either of two redundant causes takes away what both do, once a third is brought over."""
-
-    def value(brought: frozenset[str]) -> float:
-        return 1.0 - 0.73 * ("a" in brought) - 0.27 * bool(brought & {"b", "c"}) * ("a" in brought)
-
-    result = shapley(["a", "b", "c"], value, 1.0)
+    result = shapley(
+        ["a", "b", "c"],
+        lambda brought: 1.0 - ("a" in brought) * (0.73 + 0.27 * bool(brought & {"b", "c"})),
+        1.0,
+    )
     assert result.alone["b"] == result.last["b"] == 0.0
     assert result.share == {
         "a": pytest.approx(0.73 + 0.27 * 2 / 3),
