@@ -103,7 +103,10 @@ WORLD = "<mujoco><worldbody>{}</worldbody></mujoco>"
         ("<mujoco><compiler eulerseq='xy'/></mujoco>", "eulerseq"),
         ("<mujoco><default class='own'/></mujoco>", "own"),
         (WORLD.format("<body><joint class='c'/></body>"), "no default class"),
-        (WORLD.format("<site pos='1 2'/><body euler='1 2 x'/><frame pos='1 2'/>"), "3 numbers"),
+        (
+            WORLD.format("<site pos='1 2'/><body euler='1 2 x'/><frame pos='1 2'/>"),
+            "numbers wanted: 3",
+        ),
         ("<mujoco><worldbody", "not an XML file"),
         ("<sdf/>", "neither MJCF nor URDF"),
         ("", "not an XML file"),
@@ -379,7 +382,7 @@ def test_what_was_done_to_the_text_is_told(tmp_path: Path) -> None:
     }.items():
         assert said in " ".join(sm.Kinematics(_write(tmp_path, TRAPS[trap])).prepared), trap
     (said,) = sm.Kinematics("so101").prepared  # its baseframe
-    assert "sites of the world, or of a root body without a joint" in said
+    assert "sites that are fixed to the world" in said
 
 
 def test_a_place_that_pinocchio_drops_is_said_to_be_kept(tmp_path: Path) -> None:

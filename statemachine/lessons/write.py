@@ -159,7 +159,7 @@ def slots(result: Write) -> dict[str, Any]:
         "what_changed": ", ".join(result.changed) or "no derived array",
         "contacts_with": count(result.contacts, "contact"),
         "contacts_without": count(result.contacts_without, "contact"),
-        "speed_change": f"{position(result.speed_change, result.slide, 1)}/s",
+        "speed_change": f"{position(abs(result.speed_change), result.slide, 1)}/s",
         "emulated": emulated(result, "stale after a write"),
     }
 

@@ -6,6 +6,7 @@ import itertools
 import re
 import sys
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from ..page import (
@@ -105,7 +106,7 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
     last: list[Block] = []
     if len(answered) > 1:
         last.append(Text(f"You had {sum(answered)} of {len(answered)} right."))
-    if reader and views:
+    if reader and views and find_spec("viser"):  # else there is nothing to look at it with
         last.append(Text(f"To look at it: {views[0]}"))
     if page.headline:  # last, where it stays in sight
         last.append(Verdict(page.headline.text, page.headline.holds))

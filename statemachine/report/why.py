@@ -33,8 +33,8 @@ MISSING = {
 ADD = "add what the left has"
 PLAYED = "the models were run again, with the recorded starts and commands"
 ANSWERS = {
-    "rounding": "The two sides move alike: {gap} is rounding",
-    "alike": "The two sides move alike, although they differ: {gap} is rounding",
+    "rounding": "The two sides move alike: {gap}",
+    "alike": "The two sides move alike, although they differ: {gap}",
     "chaos": "Nothing can be concluded: the gap is {gap}, and the chaos floor {floor}",
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
@@ -98,6 +98,8 @@ def answer(result: Explanation) -> str:
     if result.is_rounding:
         differ = "alike" if result.shares else "rounding"
         kind = differ if result.gap <= result.negligible else "chaos"
+        if kind != "chaos":
+            gap = f"{gap} is rounding" if result.gap else "the gap is 0"
         return ANSWERS[kind].format(gap=gap, floor=floor)
     causes = [row for row in result.shares if row.share]
     places = sorted(result.found_in, key=lambda place: -place.share)
