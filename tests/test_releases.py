@@ -358,7 +358,7 @@ class TestReleases:
         assert not Path(f"/proc/{pid}/exe").exists()
 
     def test_a_file_that_changed_is_not_another_robot(self, tmp_path: Path) -> None:
-        model = model_of(tmp_path, LINKS_AND_BALL, backend=OLD)
+        model: Any = model_of(tmp_path, LINKS_AND_BALL, backend=OLD)
         first = sm.make_data(model)
         model.path.write_text(LINKS_AND_BALL.replace('damping="0.1"', 'damping="0.2"'))
         sm.step(model, first)  # which was made before
