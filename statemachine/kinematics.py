@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from .errors import BadInputError, ModelError, check_name
 from .installed import require
 from .interface import Array, Model
-from .interface.checks import as_numbers, as_vector
+from .interface.options import as_numbers, as_vector
 from .models import resolve
 from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz
 from .witness import Segment, WitnessModel, read_file, read_numbers

@@ -28,7 +28,7 @@ from statemachine.installed import ENGINES, engine_version, require
 from statemachine.interface import Data, Model, make_data, reset, step
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import take
-from statemachine.measures.readings import readings
+from statemachine.measures.quantities import readings
 from statemachine.page import Page
 from statemachine.report import terminal
 

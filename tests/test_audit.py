@@ -19,16 +19,17 @@ import statemachine as sm
 from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
-from statemachine.engines.futures import FutureGap, gap
 from statemachine.engines.mujoco.audit import MujocoDriver
+from statemachine.engines.pile import FutureGap, gap
 from statemachine.errors import BadInputError, EngineError, EngineWarning
 from statemachine.installed import require
 from statemachine.interface import JointType
 from statemachine.measures import JointPlaces
 from statemachine.page import Items, Page, Table
 from statemachine.probes import audit
-from statemachine.probes.audit import drivers_of, elsewhere, trials
+from statemachine.probes.audit import drivers_of, trials
 from statemachine.probes.audit.conclusions import conclude
+from statemachine.probes.audit.interface_driver import run_elsewhere
 from statemachine.probes.audit.points import points
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
@@ -267,7 +268,7 @@ def test_what_cannot_be_audited_is_one_line(tmp_path: Path) -> None:
     failed = "a fresh process failed: ValueError"  # of a seed that is none
     refused(
         (BadInputError, "nothing moves", lambda: audit.run(loaded(tmp_path, '<geom size="1"/>'))),
-        (EngineError, failed, lambda: elsewhere.run(sm.load(SCENE), -1, 10, {}, ())),
+        (EngineError, failed, lambda: run_elsewhere(sm.load(SCENE), -1, 10, {}, ())),
     )
 
 

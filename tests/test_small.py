@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import statemachine as sm
 from statemachine import errors, rotations
-from statemachine.interface.checks import as_vector
+from statemachine.interface.options import as_vector
 from statemachine.report.as_json import dumps
 
 from .conftest import opened, refused

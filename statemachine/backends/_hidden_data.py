@@ -14,8 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError, DivergedError, EngineError
 from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Ints, Model, State
-from ..interface.checks import HUGE, check_entries, check_writable
-from ..interface.options import unsupported
+from ..interface.options import HUGE, check_entries, check_writable, unsupported
 from ._hidden_world import HiddenWorld, LookAhead, Memory, Moment, bounded
 
 

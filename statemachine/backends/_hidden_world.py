@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..interface import DERIVED, POSES, Array
-from ..interface.checks import HUGE
+from ..interface.options import HUGE
 
 _MANY = HUGE * HUGE
 Read = Callable[[str], Any]

@@ -17,8 +17,7 @@ from mujoco.batch import Batch, SimulationError
 
 from ..errors import BadInputError
 from ..interface import Array, Ints, Model, State
-from ..interface.checks import check_vector
-from ..interface.options import unsupported
+from ..interface.options import check_vector, unsupported
 from ..interface.worlds import WRITABLE, Worlds, check_memory
 from ._delays import hold, places_of, with_room_of
 from ._mujoco_alarms import (

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import EngineError
 from ..interface import DERIVED, Array, Contacts
-from ..interface.checks import HUGE
+from ..interface.options import HUGE
 from ..processes.pipes import PipedChild
 from . import _child_server
 from ._hidden_world import HiddenWorld, Memory, Moment, Read

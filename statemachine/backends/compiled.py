@@ -27,7 +27,7 @@ import numpy as np
 
 from ..errors import EngineWarning, ModelError, shown
 from ..interface import Array, Ints, JointType, Keyframe
-from ..interface.checks import HUGE, TINY
+from ..interface.options import HUGE, TINY
 from ..models import mesh_file
 from ._delays import delay_steps, from_binary, with_room
 from ._edits import edited, servos, step_length

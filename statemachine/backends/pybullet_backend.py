@@ -27,8 +27,7 @@ from ..interface import (
     Behaviour,
     Capabilities,
 )
-from ..interface.checks import HUGE
-from ..interface.options import checked_options
+from ..interface.options import HUGE, checked_options
 from ..measures.text import few
 from ..releases import version_of
 from . import _bullet_urdf as urdf

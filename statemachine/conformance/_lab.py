@@ -27,7 +27,7 @@ from ..interface import (
     step,
 )
 from ..interface.options import unsupported
-from ..measures.readings import readings
+from ..measures.quantities import readings
 from ..probes.audit.interface_driver import InterfaceDriver
 from ..probes.audit.trials import AuditFinding
 

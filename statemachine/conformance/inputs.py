@@ -18,7 +18,7 @@ from ..errors import (
     UnknownNameError,
 )
 from ..interface import INPUTS, Data, Model, forward, get_state, make_data, reset, set_state, step
-from ..measures.readings import readings
+from ..measures.quantities import readings
 from ._lab import Lab, check, require, require_equal, require_raises
 
 

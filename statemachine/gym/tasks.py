@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..backends import load
 from ..errors import check_name
 from ..interface import Array, Model, forward, make_data
-from ..interface.checks import as_count, as_vector
+from ..interface.options import as_count, as_vector
 
 TIP = "gripperframe"  # the site between the tips of the jaws
 _BEYOND_RANGE = 0.5  # rad; joint limits are soft, and random commands go beyond by 0.06

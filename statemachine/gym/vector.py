@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import BadInputError, DivergedWarning, check_name, shown
 from ..installed import DEFAULT
 from ..interface import Array
-from ..interface.checks import as_count
+from ..interface.options import as_count
 from ..worlds import forward, make_worlds, reset, step
 from .env import FRAME_SKIP, metadata_of
 from .render import TaskPictures

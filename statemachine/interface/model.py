@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadInputError, ReadOnlyError, unknown_name
-from .checks import TINY, index_of, whole_number
-from .options import checked_options, unsupported
+from .options import TINY, checked_options, index_of, unsupported, whole_number
 from .records import Array, Capabilities, Ints, JointType, Keyframe, read_only
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import BadInputError, check_name
 from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
 from ..kinematics import Kind
-from ..measures.readings import readings
+from ..measures.quantities import readings
 from ..runs.commands import farther, is_servo, load_at_start, start_keyframe
 from ..runs.robot import carried_by, scalar_joint
 from ..witness import labels

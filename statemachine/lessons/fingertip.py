@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import BadInputError, ModelError, UnknownNameError, refuse
 from ..installed import WITNESS
 from ..interface import Array, JointType, Model, forward, make_data
-from ..interface.checks import as_count
+from ..interface.options import as_count
 from ..kinematics import Kind, Kinematics, shared_joints
 from ..rotations import Placement, angle_between, matrix_from_quat
 from ..runs.drive import Progress, silent

@@ -13,7 +13,7 @@ import numpy as np
 from ..backends import load
 from ..errors import BadInputError
 from ..interface import Array, Data, Model, make_data, step
-from ..interface.checks import as_count
+from ..interface.options import as_count
 from ..measures.text import count, duration
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import provenance

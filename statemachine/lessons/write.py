@@ -21,7 +21,7 @@ from ..interface import (
     set_state,
     step,
 )
-from ..interface.checks import as_scalar
+from ..interface.options import as_scalar
 from ..measures.text import count, position
 from ..page import Table
 from ..runs.drive import Progress

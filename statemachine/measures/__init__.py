@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from .contacts import ContactNames, overlaps, same_pairs, together
 from .gap import (
+    SAME,
+    Common,
     Deviation,
     Gap,
     JointPlaces,
+    at_moments,
+    common_moments,
     distances,
     farthest,
     joint_gap,
     largest,
     largest_or_inf,
+    nearest,
     turns,
 )
-from .moments import SAME, Common, at_moments, common_moments, nearest
 from .quantities import (
     COUNT,
     QUANTITIES,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import BadInputError, check_name
-from ..interface import Array
+from ..errors import BadInputError, UnsupportedError, check_name
+from ..interface import DERIVED, Array, Contacts, Data
 from .text import milliseconds, rounded
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
@@ -167,3 +168,22 @@ def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
             )
         tolerances[kind] = value
     return tolerances
+
+
+Readings = Mapping[str, "Array | Contacts"]
+
+
+def readings(data: Data, copied: bool = False) -> dict[str, Array | Contacts]:
+    """Everything derived that the backend of a Data yields: arrays by name, and "contacts".
+
+    Args:
+        data: Read, and not touched.
+        copied: Whether the arrays stay as they are when the Data goes on.
+    """
+    derived: dict[str, Array | Contacts] = {}
+    for name in DERIVED:
+        with suppress(UnsupportedError):
+            array = getattr(data, name)
+            derived[name] = np.array(array) if copied else array
+    derived["contacts"] = data.contacts
+    return derived

@@ -32,7 +32,7 @@ from ..interface import (
     make_data,
     set_state,
 )
-from ..measures.readings import Readings, readings
+from ..measures.quantities import Readings, readings
 from ..measures.text import count, few, listed, milliseconds
 from ..rotations import times
 from .stale_rows import Freshness, Row, gaps, same

@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from ..measures import Gap
-from ..measures.readings import readings
+from ..measures.quantities import readings
 from ..measures.text import few
 from .freshness import DEPEND, Age, Scratch, age_of, row
 from .stale_rows import Row, StaleRead, gaps_text, table

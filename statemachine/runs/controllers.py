@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import BadInputError, did_you_mean, refuse
 from ..interface import Data, Model
-from ..interface.checks import as_vector
+from ..interface.options import as_vector
 from ..measures.text import count
 from ..python_files import line_of, load_module, misfit, said
 from .drive import Controller

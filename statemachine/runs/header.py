@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import TraceError, refuse
 from ..interface import OPTIONS, JointType
-from ..interface.checks import HUGE
+from ..interface.options import HUGE
 from .provenance import Provenance
 
 SCHEMA = 1

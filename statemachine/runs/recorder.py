@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError, DivergedError, EngineError
 from ..interface import Array, Data, Model, State, make_data, reset, set_state
-from ..interface.checks import HUGE
+from ..interface.options import HUGE
 from .derived import derived, energies
 from .drive import Controller, Progress, drive, part_of, silent, steps_in
 from .header import Header

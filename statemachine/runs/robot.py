@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Contacts, JointType, Model
-from ..interface.checks import check_entries
+from ..interface.options import check_entries
 from ..measures import ContactNames
 
 ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import TraceError, refuse
 from ..interface import Array, Ints
-from ..interface.checks import HUGE, index_of
+from ..interface.options import HUGE, index_of
 from ..measures import ContactNames, overlaps
 from .header import COLUMNS, CONTACTS, INPUTS, Header
 

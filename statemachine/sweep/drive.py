@@ -225,8 +225,8 @@ def _results(
         here: The same for cells that are run again; it may be the same list.
         look: Called between any two waits.
     """
-    coming, again, ended = iter(batches), deque[SweepCell](), list[Any]()
-    waiting: dict[Future[list[Row]], Any] = {}
+    coming, again = iter(batches), deque[SweepCell]()
+    waiting: dict[Future[list[Row]], tuple[Batch, bool, list[Submit], Submit]] = {}
 
     def begin(batch: Batch, is_again: bool, idle: list[Submit]) -> None:
         submit = idle.pop()
@@ -237,12 +237,10 @@ def _results(
             begin([again.popleft()], True, here)
         for batch in itertools.islice(coming, len(workers)):
             begin(batch, False, workers)
-        yield from ended  # while every worker has something to do: rows may be written now
         if not waiting:
             return
         done = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done
         look()
-        ended.clear()
         for future in done:
             batch, is_again, idle, submit = waiting.pop(future)
             idle.append(submit)
@@ -252,7 +250,7 @@ def _results(
                 again += () if is_again else batch
                 error = WorkerEndedError("its process ended before it was done, twice")
                 rows = [row_of(ready, cell, error) for cell in batch if is_again]
-            ended.append(rows)
+            yield rows
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import numpy as np
 from ..compare.perturbed import Uncertainty, displaced
 from ..errors import BadInputError, StateMachineError, check_name
 from ..interface import Array, JointType, Model
-from ..interface.checks import index_of
+from ..interface.options import index_of
 from ..runs.robot import scalar_joint
 from .design import Value, Vary
 

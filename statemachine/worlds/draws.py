@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import BadInputError, check_name, shown
 from ..interface import Array, Model
-from ..interface.checks import as_count, as_scalar, kind_of, whole_number
+from ..interface.options import as_count, as_scalar, kind_of, whole_number
 
 # Options of `Model.replace` that can be drawn, and their value in a Model. One that is drawn
 # as it is, and multiplies nothing, has none.

@@ -20,8 +20,7 @@ from ..errors import (
     shown,
 )
 from ..interface import Array, Ints, Model, State
-from ..interface.checks import as_count, as_vector, check_state, kind_of
-from ..interface.options import checked_options
+from ..interface.options import as_count, as_vector, check_state, checked_options, kind_of
 from ..interface.turns import alone
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world
 from ..processes import checked_jobs, free_memory

@@ -16,12 +16,12 @@ from ...engines import room
 from ...engines.auditing import Driver, Measured, ReferenceRun, SavePoint
 from ...errors import BadInputError, DivergedError
 from ...interface import Model
-from ...interface.checks import as_count
+from ...interface.options import as_count
 from ...runs.drive import Progress, silent
 from ...runs.provenance import Provenance, provenance
-from . import elsewhere, trials
+from . import trials
 from .conclusions import Conclusion, conclude
-from .interface_driver import InterfaceDriver
+from .interface_driver import InterfaceDriver, findings_elsewhere, run_elsewhere
 from .points import points
 from .trials import AuditFinding
 
@@ -97,7 +97,7 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
     kinds = tuple(map(type, drivers))
     findings: dict[Driver, list[AuditFinding]] = {driver: [] for driver in drivers}
     with ThreadPoolExecutor(1) as pool:
-        child = pool.submit(elsewhere.run, model, seed, nstep, states, kinds)
+        child = pool.submit(run_elsewhere, model, seed, nstep, states, kinds)
         work = [(driver, run) for driver in drivers for run in runs[driver]]
         for done, (driver, run) in enumerate(work):
             progress(done / (len(work) + len(drivers)))
@@ -109,7 +109,7 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
                 *trials.smallest(driver, runs[driver], findings[driver]),
                 *trials.forgets(driver, runs[driver]),
                 *trials.threads(driver, runs[driver]),
-                *elsewhere.findings(child.result(), driver, runs[driver], states),
+                *findings_elsewhere(child.result(), driver, runs[driver], states),
                 *(trials.falls(driver) if driver.layer == "engine" else ()),
             ]
     audited = tuple(

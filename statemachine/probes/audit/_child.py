@@ -8,8 +8,7 @@ from pathlib import Path
 
 from ...engines.auditing import Driver
 from ...interface import Model, State
-from .elsewhere import Answer, Traces
-from .interface_driver import InterfaceDriver
+from .interface_driver import Answer, InterfaceDriver, Traces
 from .points import points
 
 

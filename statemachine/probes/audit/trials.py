@@ -26,7 +26,7 @@ from ...engines.auditing import (
     SaveMethod,
     SavePoint,
 )
-from ...engines.futures import FutureGap, gap, worst
+from ...engines.pile import FutureGap, gap, worst
 from ...interface import Array, Model
 
 AGAIN, RESET, PIECES, LOOK = "again", "reset", "step(n)", "look"
@@ -44,7 +44,7 @@ class AuditFinding:
     """One experiment and what came of it.
 
     Attributes:
-        experiment: One of the words above, or of `elsewhere`.
+        experiment: One of the words above, or of `findings_elsewhere`.
         layer: Who was asked: the engine itself, or our interface to it.
         point: The save point.
         case: What was tried: a candidate for the state, a call, a way to run.
