@@ -251,7 +251,7 @@ class Trials:
         return sorted(set[str].intersection(*choices)) if choices else []
 
     def integrator_of(self, side: int) -> str:
-        """What a side integrates with as it comes; "its own" where that has no name."""
+        """What a side integrates with as it comes; "of the file" if that cannot be chosen."""
         model: Any = self._models[side]
         own = None if model.compiled is None else model.compiled.opt.integrator
         names = {
@@ -259,7 +259,7 @@ class Trials:
             for name in model.capabilities.integrators
             if own is not None
         }
-        return names.get(own, "its own")
+        return names.get(own, "of the file" if names else "its own")
 
     def can_be_without(self, feature: Feature) -> bool:
         """Whether a feature can be left out on both sides, and is not what the experiment sets."""
