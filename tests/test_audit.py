@@ -19,8 +19,8 @@ import statemachine as sm
 from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
+from statemachine.engines.futures import FutureGap, gap
 from statemachine.engines.mujoco.audit import MujocoDriver
-from statemachine.engines.pile import FutureGap, gap
 from statemachine.errors import BadInputError, EngineError, EngineWarning
 from statemachine.installed import require
 from statemachine.interface import JointType

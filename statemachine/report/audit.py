@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..engines.pile import FutureGap, worst
+from ..engines.futures import FutureGap, worst
 from ..measures.text import NONE, grouped, milliseconds, rough
 from ..page import Block, Page, Table
 from ..probes.audit import Audit, Audited

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ...engines.auditing import ITSELF, ONLY
-from ...engines.pile import FutureGap, worst
+from ...engines.futures import FutureGap, worst
 from ...measures.text import grouped
 from .trials import (
     EACH_OTHER,

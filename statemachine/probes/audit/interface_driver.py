@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...engines.auditing import Disturbance, Driver, ReferenceRun, SaveMethod, SavePoint, copied
-from ...engines.pile import gap
+from ...engines.futures import gap
 from ...errors import EngineError
 from ...interface import (
     INPUTS,
