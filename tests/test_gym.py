@@ -23,8 +23,8 @@ from statemachine.errors import (
     DivergedWarning,
     UnknownNameError,
 )
+from statemachine.gym.env import CAMERA, SIZE
 from statemachine.gym.policies import play, random_policy, scripted_policy
-from statemachine.gym.render import CAMERA, SIZE
 from statemachine.gym.tasks import TASKS, HeldBox, Reach
 from statemachine.gym.vector import ArmVectorEnv
 

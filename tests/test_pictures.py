@@ -20,8 +20,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import compare, series
-from statemachine.drawing.scene import Camera, framed
-from statemachine.drawing.shots import Shot, compose, smaller
+from statemachine.drawing.scene import Camera, Shot, compose, framed, smaller
 from statemachine.engines import pictures as probe
 from statemachine.engines import pybullet as pybullet_room
 from statemachine.engines.mujoco import rendering as mujoco_rendering

@@ -25,8 +25,7 @@ from ..errors import BadInputError, MissingEngineError, UnsupportedError
 from ..installed import raise_if_interrupted
 
 if TYPE_CHECKING:
-    from ..drawing.scene import Camera
-    from ..drawing.shots import Drawer
+    from ..drawing.scene import Camera, Drawer
     from ..interface import Array, Data, Model
     from .auditing import Driver
     from .call_watch import CallWatch

@@ -25,8 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing.scene import Camera, Motion
-from ..drawing.shots import Pixels, compose, smaller
+from ..drawing.scene import Camera, Motion, Pixels, compose, smaller
 from ..errors import EngineError, MissingEngineError, check_name
 from ..installed import DEFAULT, require
 from ..interface import Array

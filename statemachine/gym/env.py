@@ -1,20 +1,94 @@
-"""One world of a task as a gymnasium.Env."""
+"""One world of a task as a gymnasium.Env, and pictures of worlds of a task with their targets."""
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from ..errors import BadInputError, DivergedError, EngineError
+from ..drawing.scene import Camera, poses_through
+from ..engines.pictures import LivePictures, renderer_here
+from ..errors import BadInputError, ClosedDataError, DivergedError, EngineError, check_name
 from ..installed import DEFAULT
 from ..interface import Array, forward, make_data, reset, step
-from .render import RENDER_MODES, TaskPictures
 from .tasks import Task, make_task
+
+RENDER_MODES = ("rgb_array",)
+SIZE = (480, 360)  # pixels
+CAMERA = Camera((0.16, 0.0, 0.16), 1.15, 140.0, -20.0)
+_BALL = """
+<mujoco><visual><headlight ambient=".8 .8 .8" diffuse=".6 .6 .6" specular="0 0 0"/></visual>
+<worldbody><body name="target"><freejoint/><geom size="{}"/></body></worldbody></mujoco>
+"""
+_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+class TaskPictures:
+    """Draws a task's model, in a process that is started with the first picture.
+
+    The target is drawn as a ghost is: a violet ball, as large as what is near enough for a
+    success. What stands in front of it hides it.
+    """
+
+    def __init__(self, task: Task, mode: str | None) -> None:
+        """Draw in a render mode; None for no pictures.
+
+        Raises:
+            UnknownNameError: There is no such render mode.
+        """
+        if mode is not None:
+            check_name("render mode", mode, RENDER_MODES)
+        self._model, self._radius, self._mode = task.model, task.near, mode
+        self._closed = False
+        self._live: LivePictures | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+
+    def of(self, qpos: Array, targets: Array | None) -> tuple[NDArray[np.uint8], ...] | None:
+        """Pictures (height, width, 3) uint8; None without a render mode.
+
+        Args:
+            qpos: (n, nq), of each world.
+            targets: (n, 3) [m]; None where no episode has begun.
+
+        Raises:
+            ResetNeeded: No episode has begun.
+            ClosedDataError: They are closed.
+        """
+        if self._mode is None:
+            return None
+        if targets is None:
+            raise ResetNeeded("call reset before render: no episode has begun")
+        if self._closed:
+            raise ClosedDataError("this environment is closed: make another")
+        poses = poses_through(self._model, qpos)
+        if self._live is None:
+            renderer = renderer_here()
+            self._folder = tempfile.TemporaryDirectory()
+            ball = Path(self._folder.name) / "target.xml"
+            ball.write_text(_BALL.format(self._radius), encoding="utf-8")
+            self._live = LivePictures([self._model.path, ball], SIZE, CAMERA, renderer)
+        pictures = []
+        for xpos, xquat, target in zip(*poses, targets, strict=True):
+            ball_at = np.stack([np.zeros(3), target]), np.array([_UPRIGHT, _UPRIGHT])
+            self._live.ask([(xpos, xquat), ball_at])
+            pictures.append(self._live.take().copy())
+        return tuple(pictures)
+
+    def close(self) -> None:
+        """End the process. Idempotent."""
+        if self._live is not None:
+            self._live.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+        self._live = self._folder = None
+        self._closed = True
+
 
 FRAME_SKIP = 4  # timesteps of 5 ms: 50 commands a second
 

@@ -19,8 +19,7 @@ from ..installed import DEFAULT
 from ..interface import Array
 from ..interface.options import as_count
 from ..worlds import forward, make_worlds, reset, step
-from .env import FRAME_SKIP, metadata_of
-from .render import TaskPictures
+from .env import FRAME_SKIP, TaskPictures, metadata_of
 from .tasks import make_task
 
 _SEEN = "site_xpos"

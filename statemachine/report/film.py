@@ -18,8 +18,7 @@ import numpy as np
 
 from ..compare import Comparison, labels_of, series
 from ..drawing import drawing_of
-from ..drawing.scene import Camera, Motion, camera_for, poses_through
-from ..drawing.shots import Pixels
+from ..drawing.scene import Camera, Motion, Pixels, camera_for, poses_through
 from ..engines.pictures import Renderer, drawn
 from ..errors import BadInputError, EngineError, TraceError
 from ..installed import require_extra

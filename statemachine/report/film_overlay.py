@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing.shots import GHOST
+from ..drawing.scene import GHOST
 from ..interface import Array
 from ..measures.text import quantity
 from .figures import INK, SETTINGS, draw_picture, saved

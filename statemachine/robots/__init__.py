@@ -9,8 +9,7 @@ row, and not the table.
 
 from __future__ import annotations
 
-from .files import ModelFile, find
-from .many import examine_all
+from .many import ModelFile, examine_all, find
 from .records import BackendRow, ExaminedModel, RunGap, Survey, WitnessRow
 
 __all__ = [

@@ -21,9 +21,8 @@ from .analysis_data import Runs, SweepData, gap_between, read_runs
 from .design import Value, Vary
 from .drive import run_apart
 from .prepare import prepared
-from .request import DESIGN, REQUEST, PreparedSweep, Sweep, SweepCell
+from .request import DESIGN, REQUEST, PreparedSweep, Sweep, SweepCell, own_value
 from .rows import require_parquet, schema_of
-from .settings import own_value
 
 NUDGES = 2  # perturbed runs at a setting, for the chaos floor
 # A backend, the values of the factors and a seed; a value that is None is the model's own.

@@ -24,9 +24,8 @@ from ..runs.drive import check_length, cost_of_a_second, steps_in
 from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario, scenario
 from .design import MODEL, Design, Vary, parse_vary, require_qmc, with_kinds
-from .request import PreparedSweep, Sweep
+from .request import PreparedSweep, Sweep, beyond_ranges, options_at, start_at
 from .rows import require_parquet
-from .settings import beyond_ranges, options_at, start_at
 from .worker import digest_of, load_of
 
 MODEL_OF_A_FUNCTION = "so101/scene"

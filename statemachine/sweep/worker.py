@@ -38,9 +38,8 @@ from ..runs.provenance import model_digest
 from ..runs.scenarios import Scenario
 from ..silence import silence
 from .design import digest
-from .request import PreparedSweep, Sweep, SweepCell
+from .request import PreparedSweep, Sweep, SweepCell, drawn_start, options_at, start_at
 from .rows import DONE, FAILED, known
-from .settings import drawn_start, options_at, start_at
 
 T = TypeVar("T")
 Row = dict[str, Any]

@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ...backends import load
-from ...drawing.scene import Camera
-from ...drawing.shots import GHOST, Shot
+from ...drawing.scene import GHOST, Camera, Shot
 from ...installed import require
 from ...interface import Array
 from ...rotations import matrix_from_quat

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ...backends import load
 from ...backends._bullet_client import connect, pb
 from ...drawing import Part, drawing_of
-from ...drawing.scene import Camera
-from ...drawing.shots import GHOST, Shot
+from ...drawing.scene import GHOST, Camera, Shot
 from ...interface import Array
 from ...rotations import xyzw_from_wxyz
 
