@@ -259,7 +259,7 @@ def main(functions):
     except Exception as error:
         if options.traceback:
             raise
-        place, known = where(error, functions["__file__"]), isinstance(error, StateMachineError)
+        place, known = where(error, functions.get("__file__")), isinstance(error, StateMachineError)
         print(f"{called}: {place}{error if known else f'{type(error).__name__}: {error}'}")
         return 2 if known else 1
     if result is None:

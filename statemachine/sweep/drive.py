@@ -225,8 +225,8 @@ def _results(
         here: The same for cells that are run again; it may be the same list.
         look: Called between any two waits.
     """
-    coming, again = iter(batches), deque[SweepCell]()
-    waiting: dict[Future[list[Row]], tuple[Batch, bool, list[Submit], Submit]] = {}
+    coming, again, ended = iter(batches), deque[SweepCell](), list[Any]()
+    waiting: dict[Future[list[Row]], Any] = {}
 
     def begin(batch: Batch, is_again: bool, idle: list[Submit]) -> None:
         submit = idle.pop()
@@ -237,10 +237,12 @@ def _results(
             begin([again.popleft()], True, here)
         for batch in itertools.islice(coming, len(workers)):
             begin(batch, False, workers)
+        yield from ended  # while every worker has something to do: rows may be written now
         if not waiting:
             return
         done = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done
         look()
+        ended.clear()
         for future in done:
             batch, is_again, idle, submit = waiting.pop(future)
             idle.append(submit)
@@ -250,7 +252,7 @@ def _results(
                 again += () if is_again else batch
                 error = WorkerEndedError("its process ended before it was done, twice")
                 rows = [row_of(ready, cell, error) for cell in batch if is_again]
-            yield rows
+            ended.append(rows)
 
 
 @contextmanager
