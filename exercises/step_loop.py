@@ -71,7 +71,7 @@ def demo_gravity(model, seconds=4):
         (on, off): Two lists of seconds + 1 numbers: the position of the joint shoulder_lift
         at 0, 1, 2 … seconds, in DEGREES, with the servos on and with the servos off.
     """
-    raise NotImplementedError("TODO(you): let the arm alone, with servos and without")
+    raise NotImplementedError("TODO(you): leave the arm alone, with servos and without")
 
 
 def demo_state(model):

@@ -490,7 +490,7 @@ def test_the_exercise_runs_as_a_program(
     assert sum("TODO(you)" in line for line in lines) == 4
     assert run(STUDENT, "--gravity") == (
         1,
-        ["demo_gravity: TODO(you): let the arm alone, with servos and without"],
+        ["demo_gravity: TODO(you): leave the arm alone, with servos and without"],
     )
     assert run(STUDENT, "--state", "--backend", "mujcoo")[0] == 2
     shown = {name: run(SOLUTION, f"--{name}") for name in ("gravity", "state", "forward", "replay")}

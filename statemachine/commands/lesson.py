@@ -133,7 +133,7 @@ def run(options: argparse.Namespace) -> int:
 _NEXT = f"""\
 Where to go next:
   {PROGRAM} lesson questions              six questions: check yourself
-  {PROGRAM} lesson worlds                 many worlds of one Model: what do they share?
+  {PROGRAM} lesson worlds                 many worlds of one Model
   python exercises/step_loop.py              four functions for you to write
   {PROGRAM} check exercises/step_loop.py  what they do, judged
   {PROGRAM} lesson gravity --backend all  on all engines, side by side
