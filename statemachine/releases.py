@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from .errors import BadInputError, EngineError, MissingEngineError, check_name
+from .errors import BadInputError, EngineError, MissingEngineError, check_name, refuse
 from .installed import DEFAULT, ENGINES, engine_version
 
 _NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)")
@@ -101,6 +101,7 @@ def backends_of(versions: str) -> list[str]:
     """
     names = [f"{DEFAULT}=={word.strip()}" for word in versions.split(",")]
     others = [name for name in names if version_of(name) != engine_version(DEFAULT)]
+    refuse((not others, f"{versions} is installed: name an older release to compare it with"))
     missing = [name for name in others if not is_here(name)]
     if missing:
         raise MissingEngineError(_ADD.format(" and ".join(missing), " ".join(missing)))
@@ -197,6 +198,8 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
             shutil.rmtree(home / name, ignore_errors=True)  # one whose Python is gone
             with suppress(OSError):  # another one is there now
                 place.rename(home / name)
+            if not is_here(name):
+                raise EngineError(f"{home / name} is in the way: remove it")
 
 
 def _run(name: str, *command: str) -> None:
@@ -216,7 +219,8 @@ def remove(name: str) -> None:
     Raises:
         MissingEngineError: It is not here.
     """
-    python_of(name)
+    if not (version_of(name) and os.path.lexists(folder() / name)):
+        python_of(name)  # raises
     gone = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=folder()))
     (folder() / name).rename(gone / "it")  # at once: nobody finds a part of it
     shutil.rmtree(gone)

@@ -28,6 +28,7 @@ from statemachine.compare import around_a_change
 from statemachine.compare.models import read
 from statemachine.errors import (
     BadInputError,
+    DivergedError,
     EngineError,
     MissingEngineError,
     ModelError,
@@ -36,10 +37,12 @@ from statemachine.errors import (
 )
 from statemachine.installed import engine_version
 from statemachine.interface import Behaviour
+from statemachine.lessons import LESSONS
+from statemachine.lessons.session import take
 from statemachine.worlds import make_worlds, step
 
 from .conftest import RELEASES, assert_in, refused, registered
-from .small_models import LINKS_AND_BALL, model_of
+from .small_models import LINKS_AND_BALL, mjcf, model_of
 
 OLD, STRANGE, SAME, BULLET = RELEASES
 HOLD = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]
@@ -51,6 +54,12 @@ def nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user without any release."""
     monkeypatch.setenv("STATEMACHINE_ENGINES", str(tmp_path))
     return tmp_path
+
+
+def run_all(model: Any, data: Any, nstep: int) -> None:
+    """Twenty calls of so many steps."""
+    for _ in range(20):
+        sm.step(model, data, nstep)
 
 
 def process_of(model: Any) -> int:
@@ -95,6 +104,7 @@ def test_commands_without_any(nothing: Path, capsys: pytest.CaptureFixture[str])
     assert main(["engines", "add", OLD, "--python", "no-such-python"]) == BAD_INPUT
     assert main(["compare", "hold", f"so101@{OLD}", "so101"]) == MISSING
     assert main(["compare", "hold", "--versions", ""]) == BAD_INPUT
+    assert main(["compare", "hold", "--versions", engine_version("mujoco")]) == BAD_INPUT
     assert main(["compare", "hold", "a", "b", "--models"]) == BAD_INPUT
     assert main(["compare", "hold", "--versions", "3.1.6,3.3.7"]) == MISSING
     said = capsys.readouterr().err
@@ -319,6 +329,52 @@ class TestReleases:
         assert np.array_equal(other.qpos, whole[-1])
         sm.reset(model, data)
         sm.step(model, data)
+
+    def test_another_release_in_its_place_is_seen(self, nothing: Path) -> None:
+        strange, broken = nothing / "mujoco==3.3.6", nothing / OLD
+        strange.symlink_to(Path(sys.prefix, "engines", OLD))
+        (broken / "bin").mkdir(parents=True)
+        (broken / "bin" / "python").touch()
+        refused(
+            (
+                EngineError,
+                "has 3.3.7: statemachine",
+                lambda: sm.load("so101", backend=strange.name),
+            ),
+            (
+                EngineError,
+                "Permission denied.*; to make it anew",
+                lambda: sm.load("so101", backend=OLD),
+            ),
+        )
+        assert take(LESSONS["hold"], sm.load("so101/scene"), "mujoco").result.older.recorded
+        releases.remove(OLD)
+        assert not broken.exists()
+
+    def test_one_that_begins_anew_by_itself_has_diverged(self, tmp_path: Path) -> None:
+        """Until 3.3 no flag keeps it from that."""
+        body = "<body><joint name='j' axis='0 1 0'/><geom size='.1' pos='.2 0 0'/></body>"
+        drive = "<actuator><motor joint='j' gear='1e12'/></actuator>"
+        model = model_of(tmp_path, mjcf(body, drive), backend=STRANGE)
+        for nstep in (1, 20):
+            data = sm.make_data(model)
+            data.ctrl[:] = 1e5
+            with pytest.raises(DivergedError):
+                run_all(model, data, nstep)
+
+    def test_a_fork_while_a_thread_steps(self) -> None:
+        model = sm.load("so101", backend=OLD)
+        data = sm.make_data(model)
+        thread = threading.Thread(target=sm.step, args=(model, data, 100_000))
+        thread.start()
+        pid = os.fork()
+        if not pid:
+            os._exit(0)
+        deadline = time.monotonic() + 10
+        while not (ended := os.waitpid(pid, os.WNOHANG)[0]) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        thread.join()
+        assert ended
 
     def test_a_kill_at_any_moment_is_one_error(self) -> None:
         """The next state goes on where the last call that ended was."""

@@ -57,27 +57,32 @@ class Simulation:
     def advance(self, steps: int, fastest: float) -> int:
         """Take engine steps up to one after which a coordinate is beyond its bound; how many.
 
-        All at once; if the last one is beyond, or the engine has warned, again one by one.
+        All at once; if they end beyond it, or the engine has warned, again one by one. A release
+        that begins anew by itself has warned: then qpos is NaN, as nobody may go on from there.
         """
         model, data = self.model, self.data
-        qpos, qvel = data.qpos, data.qvel  # views of the engine's memory
         if steps > 1:
-            start, ctrl, warned = self.state(), data.ctrl.copy(), self.warned()
+            start, ctrl = self.state(), data.ctrl.copy()
             mujoco.mj_step(model, data, steps)
-            near = qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < fastest * fastest
-            if near and self.warned() == warned:
+            if self._near(fastest) and not self.warned():
                 return steps
             self.place(start)
             self.command(ctrl)
         for k in range(1, steps + 1):
             mujoco.mj_step(model, data)
-            if not (qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < fastest * fastest):
+            if self.warned():
+                data.qpos[:] = np.nan
+            if not self._near(fastest):
                 return k
         return steps
 
-    def warned(self) -> list:
-        """How often the engine found a number bad; old releases then begin anew without a word."""
-        return [self.data.warning[int(kind)].number for kind in ALARMS]
+    def _near(self, fastest: float) -> bool:
+        qpos, qvel = self.data.qpos, self.data.qvel
+        return bool(qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < fastest * fastest)
+
+    def warned(self) -> bool:
+        """Whether the engine has found a number bad since a state was placed."""
+        return any(self.data.warning[int(kind)].number for kind in ALARMS)
 
     def forward(self) -> None:
         """Derive of the present."""

@@ -17,6 +17,7 @@ from ..errors import EngineError
 from ..interface import DERIVED, Array, Contacts
 from ..interface.options import HUGE
 from ..processes.pipes import PipedChild
+from ..releases import is_release, version_of
 from . import _child_server
 from ._hidden_world import HiddenWorld, Memory, Moment, Read
 
@@ -37,6 +38,13 @@ class ServedEngine(NamedTuple):
     python: str
     child: str
     title: str
+
+
+def check_version(engine: ServedEngine, version: str) -> None:
+    """Raise EngineError where a release's environment has another one."""
+    if is_release(engine.name) and version != version_of(engine.name):
+        again = f"statemachine engines remove {engine.name}, then add"
+        raise EngineError(f"the environment of {engine.name} has {version}: {again}")
 
 
 class LostError(Exception):
@@ -131,16 +139,18 @@ class ServedWorld(HiddenWorld):
 
     def _begin(self) -> None:
         """Be in the process of the engine, which begins anew where it has ended."""
-        self._server, self._placed = Server.of(self._engine), True
+        self._placed = True
         try:
+            self._server = Server.of(self._engine)
             model, said = self._opened(self._server)
             numbers = [model]
             # No call: it may be collected in the midst of another.
             self._end = weakref.finalize(self, self._server.forgotten.extend, numbers)
             self._world = self._server.ask("make", model=model)[0]["world"]
             numbers.append(self._world)
-        except (LostError, AnswerError) as error:
+        except (LostError, AnswerError, OSError) as error:
             raise EngineError(f"{self.engine} cannot make a world: {error}") from error
+        check_version(self._engine, said["version"])
         self.memory_layout = tuple((name, int(length)) for name, length in said["memory"])
         self.untold = frozenset(said.get("untold", ()))
 

@@ -25,7 +25,7 @@ from ..releases import engine_of, is_release, python_of, version_of
 from . import _release_child as child
 from ._edits import put
 from ._hidden_data import HiddenModel
-from ._served import AnswerError, LostError, ServedEngine, ServedWorld, Server
+from ._served import AnswerError, LostError, ServedEngine, ServedWorld, Server, check_version
 from .binary import is_binary
 from .compiled import check_numbers, facts, fastest, spec_with_packages
 from .mujoco_backend import MujocoModel
@@ -113,16 +113,18 @@ def _compiled(engine: ServedEngine, path: Path, installed: MujocoModel) -> FileR
     Raises:
         ModelError: It cannot read the file, or finds other parts in it.
     """
-    server, raw, title = Server.of(engine), copy.copy(installed.raw), engine.title
+    raw, title = copy.copy(installed.raw), engine.title
     try:
+        server = Server.of(engine)
         answer, fields, digest = _loaded(server, path, raw)
     except AnswerError as error:
         raise ModelError(f"{title} cannot read {path}: {error}") from error
-    except LostError as error:
+    except (LostError, OSError) as error:
         anew = f"; to make it anew: statemachine engines remove {engine.name}, then add"
         advice = anew if is_release(engine.name) else ""
         raise EngineError(f"{title} cannot be run: {error}{advice}") from error
     server.forgotten.append(answer["model"])
+    check_version(engine, answer["version"])
     for name in _SAME:
         if name in fields and int(fields[name]) != getattr(raw, name):
             raise ModelError(

@@ -91,7 +91,8 @@ _LIVING: weakref.WeakSet[PipedChild] = weakref.WeakSet()
 
 def _let_go() -> None:
     for process in _LIVING:
-        process.leave()
+        for pipe in (process.to, process.out):  # not `leave`: another thread may hold their locks
+            pipe.raw.close()  # pyright: ignore[reportAttributeAccessIssue]
 
 
 if hasattr(os, "register_at_fork"):
