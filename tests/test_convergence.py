@@ -103,7 +103,7 @@ def test_the_command_line_answers_both_questions(cli: Cli) -> None:
     heavy = cli(
         "compare", "waves", "so101", "so101", "damping=1", "--seconds", "0.2", "--one-step", code=1
     )
-    assert "part in the stage “passive”" in " ".join(heavy.stdout.split())
+    assert "stage of a step that differs is “passive”" in " ".join(heavy.stdout.split())
     told = json.loads(cli(*asked, "--one-step", "--json").stdout)
     assert told["first"] is None
     assert [stage["stage"] for stage in told["stages"]][:2] == ["kinematics", "mass matrix"]

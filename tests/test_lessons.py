@@ -172,7 +172,7 @@ def test_the_code_is_typed_run_and_questioned(name: str, backend: str) -> None:
     assert printed.by_engine == {backend: taken.printed}
     assert taken.printed.strip()
     assert "Error" not in taken.printed
-    (question,) = (block for block in page.blocks if isinstance(block, Question))
+    question, *_ = (block for block in page.blocks if isinstance(block, Question))
     assert question.right is not None
     assert 2 <= len(question.choices) <= 4
     # A prediction comes before the answer.

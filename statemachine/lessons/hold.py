@@ -202,11 +202,14 @@ def slots(result: Hold) -> dict[str, Any]:
         "contact_steps": f"{result.contact_steps} of {len(result.time) - 1} steps",
         "free": free is not None,
         "free_worst": _farthest(result, free_gaps),
-        "older": older,
-        "installed": result.provenance.versions[result.provenance.backend],
+        "older": bool(older),
         "older_right": sum(older.gap > np.radians(limit) for limit in (1e-3, 1)) if older else 0,
-        "older_recorded": older and older.recorded,
+        "older_version": older and older.version,
+        "older_joint": older and older.joint,
+        "older_at": short_time(older.at) if older else "",
         "older_gap": position(older.gap, False) if older else "",
+        "older_recorded": older and older.recorded,
+        "installed": result.provenance.versions[result.provenance.backend],
     }
 
 
