@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -208,16 +209,15 @@ def tables(results: Mapping[str, Forward], first: Forward) -> dict[str, Any]:
     return {
         "readings": readings,
         "differences": differences(
-            results,
-            {
-                f"{first.site}, reading {k + 1}": lambda left, right, k=k: (
-                    f"{math.dist(left.readings[k].fingertip, right.readings[k].fingertip):.1e} m"
-                )
-                for k in range(4)
-            },
+            results, {f"{first.site}, reading {k + 1}": partial(_apart, k) for k in range(4)}
         ),
         "changes": change_tables(changes) if first.changes else [],
         "own_write": own_tables(answers, "write"),
         "lag_tables": lag_tables(lags) if lags else [],
         "own_step": own_tables(answers, "step"),
     }
+
+
+def _apart(reading: int, left: Forward, right: Forward) -> str:
+    gap = math.dist(left.readings[reading].fingertip, right.readings[reading].fingertip)
+    return f"{gap:.1e} m"

@@ -234,23 +234,7 @@ def tables(results: Mapping[str, Gravity], first: Gravity) -> dict[str, Any]:
         ]
         if long_runs
         else [],
-        "alone": [
-            Table(
-                (f"{name} itself", result.joint, "its own motor"),
-                [
-                    (
-                        a.label,
-                        position(a.position, result.slide),
-                        f"{signed(a.motor)} {result.unit}",
-                    )
-                    for a in result.alone
-                ],
-                title=f"The same model as {name}'s own users load it, left alone, at "
-                f"{result.alone[0].time:.3g} s",
-            )
-            for name, result in results.items()
-            if result.alone
-        ],
+        "alone": [_alone(name, result) for name, result in results.items() if result.alone],
         "differences": differences(
             results,
             {
@@ -321,6 +305,18 @@ def _curves(runs: Mapping[str, Droop], first: Gravity) -> Traces:
             )
             for name, run in runs.items()
         },
+    )
+
+
+def _alone(name: str, result: Gravity) -> Table:
+    return Table(
+        (f"{name} itself", result.joint, "its own motor"),
+        [
+            (a.label, position(a.position, result.slide), f"{signed(a.motor)} {result.unit}")
+            for a in result.alone
+        ],
+        title=f"The same model as {name}'s own users load it, left alone, at "
+        f"{result.alone[0].time:.3g} s",
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -228,7 +229,7 @@ def tables(results: Mapping[str, Replay], first: Replay) -> dict[str, Any]:
         "most": lambda r: str(r.contacts.max()),
         "on average": lambda r: f"{r.contacts.mean():.1f}",
         **{
-            pair: lambda r, pair=pair: f"{r.pairs.get(pair, 0)} of {len(r.contacts)} steps"
+            pair: partial(_touched, pair)
             for pair in dict.fromkeys(pair for r in results.values() for pair in r.pairs)
         },
     }
@@ -252,6 +253,10 @@ def tables(results: Mapping[str, Replay], first: Replay) -> dict[str, Any]:
             },
         ),
     }
+
+
+def _touched(pair: str, result: Replay) -> str:
+    return f"{result.pairs.get(pair, 0)} of {len(result.contacts)} steps"
 
 
 def _hinges_apart(left: Replay, right: Replay) -> str:

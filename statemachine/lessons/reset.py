@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -197,10 +198,7 @@ def slots(result: Reset) -> dict[str, Any]:
 def tables(results: Mapping[str, Reset], first: Reset) -> dict[str, Any]:
     """What each keyframe shows, and what becomes of it."""
     rises = {
-        f"rise of the {scene.body}, {scene.name}": lambda left, right, k=k: (
-            f"{millimetres(right.scenes[k].rise, 3)} instead of "
-            f"{millimetres(left.scenes[k].rise, 3)}"
-        )
+        f"rise of the {scene.body}, {scene.name}": partial(_rise, k)
         for k, scene in enumerate(first.scenes)
         if scene.body
     }
@@ -232,3 +230,8 @@ def _keyframe(number: int, scenes: Mapping[str, KeyframeScene]) -> Table:
         rows or [("nothing", *("" for _ in scenes))],
         title=f"Keyframe {number} ({first.name!r}, time {first.time:g} s), after forward",
     )
+
+
+def _rise(number: int, left: Reset, right: Reset) -> str:
+    rises = [millimetres(result.scenes[number].rise, 3) for result in (right, left)]
+    return " instead of ".join(rises)

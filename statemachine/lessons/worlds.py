@@ -230,24 +230,7 @@ def tables(results: Mapping[str, WorldsSpeed], _first: WorldsSpeed) -> dict[str,
     title = "What is made once, and what for each world, on this machine, now"
     return {
         "made": by_engine(results, made, title),
-        "costs": [
-            Table(
-                ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
-                [
-                    (
-                        f"{cost.n:,}",
-                        f"{cost.workers}",
-                        duration(cost.made),
-                        duration(cost.step),
-                        cost.faster.spread(" ×"),
-                    )
-                    for cost in result.costs
-                ],
-                title=f"Wall time with the number of worlds: {name}",
-                words=frozenset(),
-            )
-            for name, result in results.items()
-        ],
+        "costs": [_costs(name, result) for name, result in results.items()],
         "curves": Traces(
             "What a step of one world costs",
             "number of worlds: 2 to the power of",
@@ -262,6 +245,24 @@ def tables(results: Mapping[str, WorldsSpeed], _first: WorldsSpeed) -> dict[str,
             log=True,
         ),
     }
+
+
+def _costs(name: str, result: WorldsSpeed) -> Table:
+    return Table(
+        ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
+        [
+            (
+                f"{cost.n:,}",
+                f"{cost.workers}",
+                duration(cost.made),
+                duration(cost.step),
+                cost.faster.spread(" ×"),
+            )
+            for cost in result.costs
+        ],
+        title=f"Wall time with the number of worlds: {name}",
+        words=frozenset(),
+    )
 
 
 def _memory(size: float | None) -> str:
