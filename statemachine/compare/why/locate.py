@@ -86,15 +86,18 @@ def locate(
             continue
         without, integrator = more, best
         setting = len(trials.selects) == 1 and not feature and not without
-        on_left, on_right = (
-            best if setting and side in trials.selects else trials.integrator_of(side)
-            for side in (0, 1)
-        )
+        values = None
+        if not feature:
+            on_left, on_right = (
+                best if setting and side in trials.selects else trials.integrator_of(side)
+                for side in (0, 1)
+            )
+            values = on_left, on_right
         rows.append(
             Located(
                 name=feature.name if feature else "integrator",
                 without=feature.without if feature else best,
-                values=None if feature else (on_left, on_right),
+                values=values,
                 share=(left - rest) / gap,
                 gap=rest,
                 moved=trials.moved(quantity, without, integrator),
