@@ -12,11 +12,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from .errors import BadInputError, EngineError, MissingEngineError, check_name, refuse
 from .installed import DEFAULT, ENGINES, engine_version
@@ -202,6 +203,46 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
                 raise EngineError(f"{home / name} is in the way: remove it")
 
 
+def around_a_change(
+    backends: Sequence[str],
+    compared: Callable[[tuple[str, str]], Any],
+    report: Callable[[str], object],
+) -> list[str]:
+    """The first and the last of a row of releases, and two neighbours between that differ.
+
+    By bisection: the left bound agrees with the first one. Releases that are not here are added;
+    of one that cannot be, a neighbour takes the place.
+
+    Args:
+        backends: Of the releases, the oldest first.
+        compared: Runs two of them.
+        report: Told what is being done.
+
+    Raises:
+        EngineError: The first or the last cannot be run.
+    """
+    rows = list(backends)
+
+    def differs(k: int) -> bool:
+        for name in (rows[0], rows[k]):
+            if is_release(name) and not is_here(name):
+                add(name, say=report)
+        return not compared((rows[0], rows[k])).agrees
+
+    left, right = 0, len(rows) - 1
+    if not differs(right):
+        return [rows[0], rows[-1]]
+    while right - left > 1:
+        middle = (left + right) // 2
+        try:
+            left, right = (left, middle) if differs(middle) else (middle, right)
+        except EngineError as error:  # it has no wheel for this Python
+            report(f"{error}; it is left out")
+            del rows[middle]
+            right -= 1
+    return [rows[k] for k in sorted({0, left, right, len(rows) - 1})]
+
+
 def _run(name: str, *command: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)  # noqa: PLW1510
     if done.returncode:
@@ -219,8 +260,9 @@ def remove(name: str) -> None:
     Raises:
         MissingEngineError: It is not here.
     """
-    if not (version_of(name) and os.path.lexists(folder() / name)):
-        python_of(name)  # raises
+    version_of(name)
+    if not os.path.lexists(folder() / name):  # one whose Python is gone can be removed, too
+        raise MissingEngineError(_ADD.format(name, name), engine=name)
     gone = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=folder()))
     (folder() / name).rename(gone / "it")  # at once: nobody finds a part of it
     shutil.rmtree(gone)

@@ -24,7 +24,6 @@ import statemachine as sm
 from statemachine import conformance, releases
 from statemachine.backends.release_backend import ServedEngine, Server, served
 from statemachine.cli import main
-from statemachine.compare import around_a_change
 from statemachine.compare.models import read
 from statemachine.errors import (
     BadInputError,
@@ -179,6 +178,7 @@ def test_two_that_add_it_at_once(adding: Callable[[str], Any]) -> None:
     assert [release.name for release in releases.releases()] == [OLD]
 
 
+@pytest.mark.usefixtures("nothing")
 def test_bisection_leaves_out_what_cannot_be_added(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is 5 that changed the motion; 4 and 5 have no wheel for this Python."""
 
@@ -186,10 +186,10 @@ def test_bisection_leaves_out_what_cannot_be_added(monkeypatch: pytest.MonkeyPat
         if name[-1] in "45":
             raise EngineError(f"{name} cannot be installed")
 
-    monkeypatch.setattr(sys.modules[around_a_change.__module__], "add", add)
+    monkeypatch.setattr(releases, "add", add)
     rows, said = [*(f"mujoco==3.0.{k}" for k in range(9)), "mujoco"], list[str]()
     changed = set(rows[5:])
-    found = around_a_change(
+    found = releases.around_a_change(
         rows, lambda pair: SimpleNamespace(agrees=pair[1] not in changed), said.append
     )
     assert found == [rows[0], rows[3], rows[6], "mujoco"]

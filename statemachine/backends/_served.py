@@ -7,7 +7,7 @@ import pickle
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -40,13 +40,6 @@ class ServedEngine(NamedTuple):
     title: str
 
 
-def check_version(engine: ServedEngine, version: str) -> None:
-    """Raise EngineError where a release's environment has another one."""
-    if is_release(engine.name) and version != version_of(engine.name):
-        again = f"statemachine engines remove {engine.name}, then add"
-        raise EngineError(f"the environment of {engine.name} has {version}: {again}")
-
-
 class LostError(Exception):
     """The process of an engine has ended."""
 
@@ -63,7 +56,7 @@ class Server:
 
     def __init__(self, engine: ServedEngine) -> None:
         command = [engine.python, "-I", "-u", _FILE, engine.child]
-        self._turn, self.lives = threading.RLock(), True
+        self._engine, self._turn, self.lives = engine, threading.RLock(), True
         self.forgotten = deque[int]()  # models and worlds that it is to forget at the next call
         self._process = PipedChild(command, {**os.environ, "MUJOCO_GL": "disable"})
         self.pid = self._process.pid
@@ -102,6 +95,23 @@ class Server:
         if "error" in answer:
             raise AnswerError(answer["error"])
         return answer, values
+
+    def load(
+        self, text: str | bytes, file: str = "", fields: Sequence[str] = ()
+    ) -> tuple[dict[str, Any], dict[str, Array]]:
+        """Let it load a model; its number and what is said of it, and numeric fields by name.
+
+        Raises:
+            LostError, AnswerError: As `ask`.
+            EngineError: The environment of a release has another one.
+        """
+        said, values = self.ask("load", file=file, text=text, fields=fields)
+        name, version = self._engine.name, said["version"]
+        if is_release(name) and version != version_of(name):
+            self.forgotten.append(said["model"])
+            again = f"statemachine engines remove {name}, then add"
+            raise EngineError(f"the environment of {name} has {version}: {again}")
+        return said, values
 
 
 class ServedWorld(HiddenWorld):
@@ -150,7 +160,6 @@ class ServedWorld(HiddenWorld):
             numbers.append(self._world)
         except (LostError, AnswerError, OSError) as error:
             raise EngineError(f"{self.engine} cannot make a world: {error}") from error
-        check_version(self._engine, said["version"])
         self.memory_layout = tuple((name, int(length)) for name, length in said["memory"])
         self.untold = frozenset(said.get("untold", ()))
 
@@ -220,5 +229,5 @@ class ServedWorld(HiddenWorld):
 
 def sent(opener: bytes, server: Server) -> tuple[int, dict[str, Any]]:
     """A pickled opener of worlds, told to a process that has this package."""
-    said, _ = server.ask("load", file="", text=opener, fields=[])
+    said, _ = server.load(opener)
     return said["model"], said

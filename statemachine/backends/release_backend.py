@@ -25,7 +25,7 @@ from ..releases import engine_of, is_release, python_of, version_of
 from . import _release_child as child
 from ._edits import put
 from ._hidden_data import HiddenModel
-from ._served import AnswerError, LostError, ServedEngine, ServedWorld, Server, check_version
+from ._served import AnswerError, LostError, ServedEngine, ServedWorld, Server
 from .binary import is_binary
 from .compiled import check_numbers, facts, fastest, spec_with_packages
 from .mujoco_backend import MujocoModel
@@ -124,7 +124,6 @@ def _compiled(engine: ServedEngine, path: Path, installed: MujocoModel) -> FileR
         advice = anew if is_release(engine.name) else ""
         raise EngineError(f"{title} cannot be run: {error}{advice}") from error
     server.forgotten.append(answer["model"])
-    check_version(engine, answer["version"])
     for name in _SAME:
         if name in fields and int(fields[name]) != getattr(raw, name):
             raise ModelError(
@@ -159,7 +158,7 @@ def _loaded(
     """The number of a model and what is said of it, its fields, and a digest of both."""
     spec = spec_with_packages(path)
     text, names = spec.to_xml() if spec else "", [*_SAME, *_fields(raw)]
-    answer, fields = server.ask("load", file=str(path.absolute()), text=text, fields=names)
+    answer, fields = server.load(text, str(path.absolute()), names)
     said = repr([answer.get("flags"), answer["memory"], answer["version"]]).encode()
     read = b"".join([said, *(array.tobytes() for array in fields.values())])
     return answer, fields, hashlib.sha256(read).hexdigest()

@@ -93,9 +93,9 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
 
 
 def _versions(options: argparse.Namespace, request: Any) -> int:
-    from ..compare import around_a_change, compare, run_sides
+    from ..compare import compare, run_sides
     from ..measures import parse_tolerances
-    from ..releases import backends_of, published
+    from ..releases import around_a_change, backends_of, published
     from ..report import steps
     from ..report.figures import write_pictures
     from ..report.progress import progress

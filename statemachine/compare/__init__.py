@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from ..runs.rerun import Rerun, rerun_of
 from .agreement import Agreement, Comparison, SideRun, compare
-from .convergence import QuantityLimit, TimestepConvergence, around_a_change, convergence
+from .convergence import QuantityLimit, TimestepConvergence, convergence
 from .floor import ChaosFloor, FloorBand, chaos_floor
 from .labels import Labels, labels_of
 from .one_step import StepComparison, one_step
@@ -45,7 +45,6 @@ __all__ = [
     "Touch",
     "Uncertainty",
     "Witness",
-    "around_a_change",
     "chaos_floor",
     "compare",
     "convergence",

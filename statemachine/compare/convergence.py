@@ -1,24 +1,22 @@
-"""Whether a gap vanishes with the timestep, and between which releases of an engine it comes.
+"""Whether a gap vanishes with the timestep: both sides run with finer and finer steps.
 
-Both sides run with finer and finer steps. What vanishes is discretisation: each side approaches
-the same motion, in its own way. What stays is a difference of the machines. After a touch that
-cannot be told apart so simply: the contact law of an engine depends on its timestep, and the runs
-have no common limit.
+What vanishes is discretisation: each side approaches the same motion, in its own way. What stays
+is a difference of the machines. After a touch that cannot be told apart so simply: the contact
+law of an engine depends on its timestep, and the runs have no common limit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import EndedEarlyError, EngineError
+from ..errors import EndedEarlyError
 from ..interface import Array, Ints
 from ..measures import common_moments
-from ..releases import add, is_release
 from ..runs import Trace
 from ..runs.drive import Progress, silent
 from .labels import labels_of
@@ -192,42 +190,3 @@ def _verdict(gaps: list[float], limit: float, rounding: float) -> Limit:
         return "in part" if third <= second <= first else "unclear"
     ratios = first / max(second, rounding), second / max(third, rounding)
     return "discretisation" if min(ratios) >= _FIRST_ORDER or third <= rounding else "unclear"
-
-
-def around_a_change(
-    backends: Sequence[str],
-    compared: Callable[[tuple[str, str]], Any],
-    report: Callable[[str], object],
-) -> list[str]:
-    """The first and the last of a row of releases, and two neighbours between that differ.
-
-    By bisection: the left bound agrees with the first one. Releases that are not here are added;
-    of one that cannot be, a neighbour takes the place.
-
-    Args:
-        backends: Of the releases, the oldest first.
-        compared: Runs two of them.
-        report: Told what is being done.
-
-    Raises:
-        EngineError: The first or the last cannot be run.
-    """
-    rows = list(backends)
-
-    def differs(k: int) -> bool:
-        for name in filter(is_release, (rows[0], rows[k])):
-            add(name, say=report)
-        return not compared((rows[0], rows[k])).agrees
-
-    left, right = 0, len(rows) - 1
-    if not differs(right):
-        return [rows[0], rows[-1]]
-    while right - left > 1:
-        middle = (left + right) // 2
-        try:
-            left, right = (left, middle) if differs(middle) else (middle, right)
-        except EngineError as error:  # it has no wheel for this Python
-            report(f"{error}; it is left out")
-            del rows[middle]
-            right -= 1
-    return [rows[k] for k in sorted({0, left, right, len(rows) - 1})]
