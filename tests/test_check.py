@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib
 import json
 import os
 import re
@@ -40,13 +39,9 @@ from .conftest import (
     written,
     written_all,
 )
-from .exercises import RIGHT, WRONG, Attempt
-
-for _module in ("gravity", "state", "forward", "replay"):
-    importlib.import_module(f"tests.exercises.{_module}")
+from .exercises import RIGHT, SOLUTION, WRONG, Attempt
 
 STUDENT = ROOT / "exercises" / "step_loop.py"
-SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
 
 
 Prepared = tuple[list[ExerciseWorld], list[Any]]

@@ -13,10 +13,6 @@ from typing import Any
 
 import pytest
 
-import tests.exercises.forward
-import tests.exercises.gravity
-import tests.exercises.replay
-import tests.exercises.state  # noqa: F401  (they fill WRONG)
 from statemachine.grading.mutants.faults import FAULTS
 from statemachine.lessons import LESSONS
 from statemachine.probes.phrasebook import CONCEPTS
