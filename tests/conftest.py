@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Container, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, redirect_stdout, suppress
+from functools import partial
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -96,16 +97,28 @@ def assert_not_in(whole: Container[Any], *parts: object) -> None:
     assert not [part for part in parts if part in whole], f"in {whole}"
 
 
+def assert_has(record: Any, **fields: object) -> None:
+    """Fields of a record, or entries of a dict, are these; a failure lists those that are not."""
+    of = record.__getitem__ if isinstance(record, dict) else partial(getattr, record)
+    assert {name: of(name) for name in fields} == fields
+
+
 def refused(
     *cases: tuple[type[BaseException] | tuple[type[BaseException], ...], str, Callable[[], object]],
-) -> None:
-    """Every call raises its error, with its pattern in the text; one of ours is one line."""
+) -> Any:
+    """Every call raises its error, with its pattern in the text; one of ours is one line.
+
+    Returns:
+        The error of the last.
+    """
+    raised: Any = None
     for error, says, call in cases:
         with pytest.raises(error, match=says or None) as caught:  # noqa: PT012
             call()
             pytest.fail(f"nothing was refused, where {error} was to say: {says}")
-        ours = isinstance(caught.value, (StateMachineError, TypeError))
-        assert not ours or "\n" not in str(caught.value)
+        raised = caught.value
+        assert not isinstance(raised, (StateMachineError, TypeError)) or "\n" not in str(raised)
+    return raised
 
 
 def after(model: Model, nstep: int, keyframe: int | str | None = None) -> np.ndarray:

@@ -15,7 +15,8 @@ from .conftest import ROOT
 
 SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
 _IMPORTS, *_FUNCTIONS, _ = re.split(r"^(?=def demo_|if )", SOLUTION.read_text("utf-8"), flags=re.M)
-_SOURCES = dict(zip(("gravity", "state", "forward", "replay"), _FUNCTIONS, strict=True))
+_NAMES: list[str] = ["gravity", "state", "forward", "replay"]
+_SOURCES = dict(zip(_NAMES, _FUNCTIONS, strict=True))
 
 Changes = dict[str, str]  # what stands in the solution, and what was written instead
 

@@ -27,7 +27,16 @@ from statemachine.runs import record_scenario
 from statemachine.runs.commands import hold_ctrl, is_servo
 from statemachine.runs.scenarios import SCENARIOS, fitting
 
-from .conftest import Cli, assert_not_in, one_line, opened, refused, written, written_all
+from .conftest import (
+    Cli,
+    assert_has,
+    assert_not_in,
+    one_line,
+    opened,
+    refused,
+    written,
+    written_all,
+)
 
 # A slide with a servo whose gear is 2, a hinge with a motor of gear 3 that holds a load, and a
 # hinge that a velocity servo drives.
@@ -215,9 +224,8 @@ def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch)
 
 def test_a_free_body_is_written_at_its_height(model: Any) -> None:
     found, page, code = lesson("write", model(BOX))
-    assert found.slide
+    assert_has(found, slide=True, value=1.05)
     assert "+ 2  # the height of a free body" in code
-    assert found.value == 1.05
     assert page.holds
 
 

@@ -15,7 +15,7 @@ from statemachine.interface import JointType
 from statemachine.models import model_names, models_dir
 from statemachine.rotations import matrix_from_quat
 
-from .conftest import need_engine, opened
+from .conftest import assert_has, need_engine, opened
 
 ARM = models_dir() / "so101" / "so101.xml"
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
@@ -46,9 +46,7 @@ def test_collision_shapes_are_primitives() -> None:
 
 def test_scene_box_has_the_sizes_of_the_course() -> None:
     model = sm.load("so101/scene_box")
-    assert (model.nq, model.nv, model.nu) == (13, 12, 6)
-    assert model.joint_names == (*JOINTS, "box")
-    assert model.actuator_names == JOINTS
+    assert_has(model, nq=13, nv=12, nu=6, joint_names=(*JOINTS, "box"), actuator_names=JOINTS)
     assert model.jnt_qposadr.tolist() == [0, 1, 2, 3, 4, 5, 6]
     assert model.jnt_type.tolist() == [JointType.HINGE] * 6 + [JointType.FREE]
     assert [frame.name for frame in model.keyframes] == ["held", "pickup"]

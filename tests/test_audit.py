@@ -38,6 +38,7 @@ from .conftest import (
     Cli,
     Patch,
     around,
+    assert_has,
     assert_in,
     bullet_clients,
     need_engine,
@@ -84,8 +85,7 @@ def test_quaternions_are_apart_by_their_angle(angle: float) -> None:
     assert gap(one, other, FREE).angle == pytest.approx(angle, rel=1e-6)
     other[0, 3:] *= -1
     off = gap(one, other, FREE)
-    assert off.angle == pytest.approx(angle, rel=1e-6)
-    assert off.length == 0
+    assert_has(off, angle=pytest.approx(angle, rel=1e-6), length=0)
     other = one.copy()
     other[0, 1] += 0.25
     assert gap(one, other, FREE).length == pytest.approx(0.25)
@@ -121,8 +121,7 @@ def test_mujoco_needs_its_warm_start_in_contact(of_mujoco: audit.Audit) -> None:
         "qfrc_applied",
         "xfrc_applied",
     }
-    assert found.smallest is True
-    assert found.idle == ()
+    assert_has(found, smallest=True, idle=())
     assert missing["warmstart"].points == ("default", "keyframe", "limp", "limit", "clock")
     assert missing["warmstart"].gap.first == 1
     assert 0 < missing["warmstart"].gap.size < 1e-6
@@ -145,8 +144,7 @@ def test_mujoco_is_tried_where_it_should_be(of_mujoco: audit.Audit) -> None:
     assert seen["keyframe"].contacts > 0
     assert seen["limp"].contacts > 0
     assert seen["limit"].limits
-    assert of_mujoco.without == ()
-    assert of_mujoco.holds
+    assert_has(of_mujoco, without=(), holds=True)
 
 
 @pytest.mark.slow

@@ -32,7 +32,7 @@ from statemachine.page import Text
 from statemachine.report.grading import class_page, gradescope_results
 from statemachine.runs.whole import csv_text, replace_csv
 
-from .conftest import ROOT, Cli, assert_in, one_line, refused, written, written_all
+from .conftest import ROOT, Cli, assert_has, assert_in, one_line, refused, written, written_all
 
 TEMPLATE = ROOT / "exercises" / "step_loop.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
@@ -87,8 +87,7 @@ def test_what_is_a_submission(folder: Path) -> None:
     assert list(found) == ["ann", "bob", "cy", "dee", "eve.py", "fay.py"]
     assert found["ann"].path == folder / "ann" / "my_solution.py"
     assert found["bob"].path == folder / "bob" / "deep" / "step_loop.py"
-    assert found["cy"].path is None
-    assert found["cy"].refusal == "no Python file in it has one of the functions"
+    assert_has(found["cy"], path=None, refusal="no Python file in it has one of the functions")
     assert found["dee"].refusal == "2 files in it have the functions: a.py, b.py"
     files = [folder / "eve.py", folder / "fay.py", folder / "eve.py"]
     assert [each.path for each in submissions(files)] == files[:2]
@@ -355,8 +354,7 @@ def test_functions_that_are_alike_are_told_whatever_is_named_how(
         " (model.jnt_dofadr, model.nv)))\n    return dict(zip(a, b)), 6.0\n"
     )
     entries = {e.name: e for e in judge_all(submissions([folder]), "mujoco")}
-    assert entries["gus.py"].alike == "100% ann"
-    assert entries["gus.py"].same_as == ""
+    assert_has(entries["gus.py"], alike="100% ann", same_as="")
     assert entries["ann"].alike.startswith("100% ")
     assert entries["bob"].alike == ""  # it is not written yet
     assert float(entries["hal.py"].alike.partition("%")[0]) < 50
@@ -415,8 +413,7 @@ def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -
     evil = written(tmp_path / '=HYPERLINK("x").py', "return 'refuse'\n")
     entries = judge_all([Submission(evil.name, evil)], "mujoco")
     (row,) = csv.DictReader(io.StringIO(csv_text(rows_of(entries))))
-    assert row["file"] == f"'{evil.name}"
-    assert row["remarks"] == "it is refused"
+    assert_has(row, file=f"'{evil.name}", remarks="it is refused")
 
 
 def test_all_of_a_students_folder_belongs_to_the_file(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from rich.cells import cell_len
 from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import ROOT, Cli, assert_in, assert_not_in, written
+from .conftest import ROOT, Cli, assert_has, assert_in, assert_not_in, written
 from .small_models import mjcf
 
 QUICK = {
@@ -56,12 +56,11 @@ def test_gravity_prints_the_table_of_the_course(here: Cli) -> None:
         assert re.search(row.replace(" ", r"\s+").replace(".", r"\."), page), row
     found = _json(here, "lesson", "gravity")["mujoco"]
     off = found["servos_off"]
-    assert off["ctrl_untouched"] is True
+    assert_has(off, ctrl_untouched=True, touching=["gripper on floor (fixed_stud_1)"])
     # The floor holds the fallen arm, not damping or dry friction.
     assert off["forces"]["contact"] / off["forces"]["bias"] > 0.95
     assert abs(off["forces"]["friction"]) < 0.052
     assert 0.5 < min(off["touches"].values()) < 1.0
-    assert off["touching"] == ["gripper on floor (fixed_stud_1)"]
     for run in (found["servos_on"], off):
         assert abs(run["forces"]["total"]) < 1e-5
     assert found["servos_on"]["forces"]["contact"] == 0.0

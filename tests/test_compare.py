@@ -29,7 +29,7 @@ from statemachine.report import compare as report
 from statemachine.runs import Trace, record, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import Cli, assert_in, one_line, refused
+from .conftest import Cli, assert_has, assert_in, one_line, refused
 from .small_models import NAMELESS_JOINTS, STILL, model_of
 from .test_strange_traces import changed
 from .test_strange_traces import named as by_name
@@ -55,9 +55,7 @@ def box() -> Trace:
 
 def test_a_trace_agrees_with_itself(box: Trace) -> None:
     found = compare(box, box)
-    assert found.agrees
-    assert found.moments == len(box)
-    assert not found.notes
+    assert_has(found, agrees=True, moments=len(box), notes=())
     assert {each.max for each in found.agreements} == {0.0}
     names = set(by_name(found))
     assert {"elbow_flex", "box, position", "box, rotation", "gripperframe, position"} <= names
@@ -70,12 +68,16 @@ def test_a_shifted_joint_is_found_with_its_size_and_time(hold: Trace) -> None:
     qpos[100:, 2] -= 0.001  # within
     found = by_name(compare(hold, changed(hold, qpos=qpos)))
     elbow = found.pop("elbow_flex")
-    assert elbow.max == pytest.approx(0.01, rel=1e-9)
-    assert elbow.at == pytest.approx(0.25)
-    assert elbow.since == pytest.approx(0.25)
-    assert elbow.rms == pytest.approx(np.sqrt((50 * 0.01**2 + 101 * 0.001**2) / 201), rel=1e-9)
-    assert elbow.settled == pytest.approx(0.001, rel=1e-9)
-    assert (elbow.verdict, elbow.tolerance) == ("settles", COUNT)
+    assert_has(
+        elbow,
+        max=pytest.approx(0.01, rel=1e-9),
+        at=pytest.approx(0.25),
+        since=pytest.approx(0.25),
+        rms=pytest.approx(np.sqrt((50 * 0.01**2 + 101 * 0.001**2) / 201), rel=1e-9),
+        settled=pytest.approx(0.001, rel=1e-9),
+        verdict="settles",
+        tolerance=COUNT,
+    )
     assert all(each.verdict == "agrees" for each in found.values())
 
 
@@ -110,8 +112,9 @@ def test_a_moved_and_turned_fingertip(hold: Trace) -> None:
     turn = np.array([[np.cos(0.1), -np.sin(0.1), 0], [np.sin(0.1), np.cos(0.1), 0], [0, 0, 1]])
     matrix[:, tip] = (turn @ matrix[:, tip].reshape(-1, 3, 3)).reshape(-1, 9)
     found = by_name(compare(hold, changed(hold, site_xpos=position, site_xmat=matrix)))
-    assert found["gripperframe, position"].max == pytest.approx(0.002, rel=1e-9)
-    assert found["gripperframe, position"].at == pytest.approx(0.5)
+    assert_has(
+        found["gripperframe, position"], max=pytest.approx(0.002, rel=1e-9), at=pytest.approx(0.5)
+    )
     assert found["gripperframe, rotation"].rms == pytest.approx(0.1, rel=1e-9)
     # One count of an encoder, over the reach: the arm's is near 0.4 m.
     assert 0.3 < found["gripperframe, position"].tolerance / COUNT < 0.5
@@ -159,8 +162,7 @@ def test_energy_against_what_the_run_turns_over(hold: Trace) -> None:
     total = hold["energy"].sum(axis=1)
     energy[60:, 1] += 0.02 * np.ptp(total)
     found = by_name(compare(hold, changed(hold, energy=energy)))["energy"]
-    assert found.max == pytest.approx(0.02 * np.ptp(total), rel=1e-9)
-    assert found.verdict == "differs"
+    assert_has(found, max=pytest.approx(0.02 * np.ptp(total), rel=1e-9), verdict="differs")
 
 
 def test_a_touch_that_is_late_and_one_that_never_comes(hold: Trace) -> None:
@@ -173,8 +175,7 @@ def test_a_touch_that_is_late_and_one_that_never_comes(hold: Trace) -> None:
     name = "gripper on floor, first touch"
     assert by_name(compare(hold, later(1)))[name].verdict == "agrees"
     late = by_name(compare(hold, later(3)))[name]
-    assert late.max == pytest.approx(0.015)
-    assert late.verdict == "differs"
+    assert_has(late, max=pytest.approx(0.015), verdict="differs")
     never = by_name(compare(hold, later(10_000)))[name]
     assert (never.verdict, never.note) == ("differs", "never on mujoco (second)")
     assert by_name(compare(later(10_000), hold))[name].max == never.max
@@ -184,8 +185,7 @@ def test_a_touch_that_is_late_and_one_that_never_comes(hold: Trace) -> None:
 def test_what_becomes_of_a_contact(box: Trace, hold: Trace) -> None:
     found = {touch.pair: touch for touch in touches(box, box)}
     grip = found["gripper on box"].one
-    assert (grip.first, grip.share, grip.ends) == (0.0, 1.0, True)
-    assert grip.last == pytest.approx(0.5)
+    assert_has(grip, first=0.0, share=1.0, ends=True, last=pytest.approx(0.5))
     # Two jaws press the box against each other: the same force, and that of the servo.
     assert grip.force == pytest.approx(found["moving_jaw_so101_v1 on box"].one.force, rel=0.05)
     assert touches(hold, box)[0].two.first is None
@@ -363,8 +363,7 @@ def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace, tmp_path: Pa
         position[30, tip, 0] += 0.001
         found = witness(trace, changed(trace, site_xpos=position))
         assert found.one < 1e-12
-        assert found.two == pytest.approx(0.001, rel=1e-9)
-        assert found.rows == 2 * len(trace)
+        assert_has(found, two=pytest.approx(0.001, rel=1e-9), rows=2 * len(trace))
     binary = tmp_path / "hold.mjb"  # which Pinocchio does not read, and nobody as XML
     binary.write_bytes(b"\x00binary")
     assert witness(hold, hold, binary) is None

@@ -27,7 +27,7 @@ from statemachine.report import compare as report
 from statemachine.runs import record, write
 from statemachine.runs.controllers import function_scenario
 
-from .conftest import Cli, need_engine, one_line, refused, written, written_all
+from .conftest import Cli, assert_has, need_engine, one_line, refused, written, written_all
 from .small_models import BENT, TWO_LINKS, TWO_SERVOS
 
 _FUNCTION = """
@@ -496,9 +496,8 @@ def test_what_a_side_has_nothing_of_is_said_first_and_its_switch_shows_the_rest(
         assert ["--floor left" in line for line in lines] == [False, True]
     both = ("--actuators", "left", "--floor", "left", "--json", "--no-chaos")
     found = json.loads(here(*words, "--why", *both).stdout)
-    assert found["missing"] == []
+    assert_has(found, missing=[], explained=pytest.approx(1.0))
     assert [row["name"] for row in found["shares"]] == ["damping of swing"]
-    assert found["explained"] == pytest.approx(1.0)
     assert json.loads(here(*words, *both).stdout)["commands"] == "the same"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -86,12 +87,11 @@ def explode(model: sm.Model) -> DivergedError:
     with sm.make_data(model) as data:
         pb.setPhysicsEngineParameter(globalCFM=0, physicsClientId=data.raw.client)
         data.qpos[1] = -1
-        with pytest.raises(DivergedError) as caught:
-            sm.step(model, data, 500)
+        error = refused((DivergedError, "", lambda: sm.step(model, data, 500)))
         refused((DivergedError, r"qvel\[\d\] diverged at", lambda: sm.step(model, data)))
         sm.reset(model, data)
         assert data.time == 0
-    return caught.value
+    return error
 
 
 def test_an_explosion_is_raised_early(tmp_path: Path) -> None:
@@ -115,8 +115,8 @@ def test_the_bound_can_be_set(tmp_path: Path) -> None:
             data.qvel[0] = top
             sm.step(variant, data, 3)
             data.qvel[0] = top + 2
-            with pytest.raises(DivergedError, match=r"qvel\[0\] \(rotor\) = .* went beyond max_"):
-                sm.step(variant, data)
+            says = r"qvel\[0\] \(rotor\) = .* went beyond max_"
+            refused((DivergedError, says, partial(sm.step, variant, data)))
     with sm.make_data(each) as data:  # another joint may be faster
         data.qvel[1] = 5000
         sm.step(each, data, 3)

@@ -14,7 +14,7 @@ from statemachine.compare.why import Explanation, explain
 from statemachine.compare.why.shapley import shapley
 from statemachine.runs.scenarios import scenario
 
-from .conftest import ROOT
+from .conftest import ROOT, assert_has
 from .explained import (
     ALONE,
     ARM,
@@ -62,8 +62,7 @@ def test_one_cause_is_found_and_explains_all(name, tmp_path):
     assert all(abs(share) <= 0.02 for cause, share in told.items() if cause != case.cause), told
     assert set(told) <= {case.cause, idle.cause, "extra actuator of more"}
     assert is_brought(found)
-    assert found.is_explained
-    assert found.located == 0
+    assert_has(found, is_explained=True, located=0)
 
 
 Game = tuple[str, str, dict[str, float]]
@@ -104,8 +103,7 @@ def test_two_causes_get_their_shapley_value(
     found = explained(
         tmp_path, left, right, scenario=STILL, seconds=seconds, measure="end", quantity="slides"
     )
-    assert found.gap == pytest.approx(parts.pop("gap"), rel=1e-3)
-    assert found.method == method
+    assert_has(found, gap=pytest.approx(parts.pop("gap"), rel=1e-3), method=method)
     assert {name: shares(found)[name] for name in parts} == pytest.approx(parts, abs=off)
 
 
@@ -279,8 +277,7 @@ def test_a_pair_that_is_taken_away_is_as_its_geoms_are_then(other, tmp_path):
     """Its geoms have another margin, or do not touch by themselves, until that is brought over."""
     right = changed(ARM, ALONE["pair"], ALONE[other])
     found = explained(tmp_path, ARM, right, scenario=HOME, quantity="ball")
-    assert found.brought == 0.0
-    assert found.method == "all sets"
+    assert_has(found, brought=0.0, method="all sets")
     alone = {row.name: row.alone for row in found.shares}
     # Without its pair the ball falls through the floor, from which it is excluded.
     assert ((alone["extra pair of pair 0"] or 0.0) < -1) == (other == "exclude")
@@ -389,8 +386,7 @@ def test_shapley_values_of_a_game_whose_values_are_known():
     found = shapley(list(costs), lambda s: 1.0 - max((costs[n] for n in s), default=0.0), 1.0)
     known = {"a": 0.025, "b": 0.025 + 0.2 / 3, "c": 0.025 + 0.2 / 3 + 0.15}
     known["d"] = 1.0 - sum(known.values())
-    assert found.method == "all sets"
-    assert found.share == pytest.approx(known)
+    assert_has(found, method="all sets", share=pytest.approx(known))
 
 
 def test_drawn_orders_come_with_their_error():
@@ -550,8 +546,7 @@ def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
     assert [each.name for each in found.shares] == (
         ["order of ctrl"] if name == "permuted actuators" else []
     )
-    assert found.is_rounding
-    assert found.is_explained
+    assert_has(found, is_rounding=True, is_explained=True)
 
 
 def _easily_missed(name: str) -> tuple[str, str, list[str], dict[str, Any]]:
@@ -649,8 +644,7 @@ def test_causes_are_brought_over(name, tmp_path):
     told = shares(found)
     assert sorted(told) == sorted(causes)
     assert len(told) > 1 or told[causes[0]] == pytest.approx(1.0)
-    assert found.brought == 0.0
-    assert found.is_explained
+    assert_has(found, brought=0.0, is_explained=True)
     assert found.unit == "rad" or "rotation" not in how.get("quantity", "")
 
 

@@ -17,7 +17,7 @@ from statemachine.errors import StateMachineError
 from statemachine.interface import Model
 from statemachine.runs.scenarios import SCENARIOS, fitting
 
-from .conftest import SHARED, shared
+from .conftest import SHARED, assert_has, shared
 
 pytestmark = pytest.mark.slow
 MODELS = SHARED / "robots" / "models"
@@ -61,7 +61,6 @@ def test_public_robots(path):
     found = explain(model, right, scenario, seconds=0.2, uncertain=None)
     assert {each.name.partition(" of ")[0] for each in found.shares} == {"mass", "damping"}
     assert len(found.shares) == 2
-    assert found.brought == 0.0
-    assert found.is_explained
+    assert_has(found, brought=0.0, is_explained=True)
     if not found.is_rounding:
         assert sum(each.share or 0.0 for each in found.shares) == pytest.approx(1.0, abs=0.02)

@@ -19,7 +19,7 @@ from fuzz.__main__ import run_apart, targets
 from statemachine.errors import BusyDataError
 from statemachine.runs import formats
 
-from .conftest import ROOT, in_its_own_python
+from .conftest import ROOT, assert_has, in_its_own_python
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are POSIX's")
 
@@ -29,8 +29,9 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are
 def test_each_target_runs_in_a_process_of_its_own(target: str) -> None:
     """Each with so many tries that none takes long, and the slow ones with several, too."""
     tally = run_apart(target, seed=3, times=0.04)
-    assert tally.failures == []
-    assert tally.tried == round(0.04 * importlib.import_module(f"fuzz.{target}").TRIES)
+    assert_has(
+        tally, failures=[], tried=round(0.04 * importlib.import_module(f"fuzz.{target}").TRIES)
+    )
 
 
 def test_the_same_seed_draws_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,7 @@ from statemachine.errors import BadInputError, ModelError, ModelFileError, Unkno
 from statemachine.rotations import matrix_from_quat
 from statemachine.runs.provenance import model_digest
 
-from .conftest import opened, refused, written
+from .conftest import assert_has, opened, refused, written
 from .small_models import ATTACHED, BODY, EVERY_JOINT, STAND
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
@@ -297,8 +297,7 @@ def _poses_agree(model: sm.Model, kinematics: sm.Kinematics) -> float:
 def test_what_could_be_misread_is_read_rightly(tmp_path: Path, trap: str) -> None:
     model = sm.load(_write(tmp_path, TRAPS[trap]))
     own = sm.Kinematics(model.path)
-    assert own.grade == "own reading"
-    assert own.joint_names == model.joint_names
+    assert_has(own, grade="own reading", joint_names=model.joint_names)
     assert _poses_agree(model, own) < 1e-12
     for site in {"s", "low", "t", "deep"} & set(own.site_names):
         for seed in range(3):

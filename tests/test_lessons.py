@@ -42,7 +42,17 @@ from statemachine.report import quiz
 from statemachine.runs.rerun import record_scenario
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import ROOT, Cli, assert_in, assert_not_in, lesson_result, one_line, refused, written
+from .conftest import (
+    ROOT,
+    Cli,
+    assert_has,
+    assert_in,
+    assert_not_in,
+    lesson_result,
+    one_line,
+    refused,
+    written,
+)
 
 _TIMED = {"time", "speed", "worlds", "objects", "questions"}  # print wall times
 _QUICK = {
@@ -498,12 +508,9 @@ def test_calls_beside_a_lesson(cli: Cli, backend: str) -> None:
 @pytest.mark.slow
 def test_our_keyframe_holds_the_box(backend: str) -> None:
     held, pickup = _take("reset", backend)[1].result.scenes
-    assert held.held
-    assert held.on_world == 0
-    assert held.robot_steps == held.nstep
+    assert_has(held, held=True, on_world=0, robot_steps=held.nstep)
     assert abs(held.rise) < 1e-3
-    assert not pickup.held
-    assert pickup.on_robot == 0
+    assert_has(pickup, held=False, on_robot=0)
 
 
 def test_real_time_is_the_loops_affair(cli: Cli) -> None:

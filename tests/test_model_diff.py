@@ -23,7 +23,7 @@ from statemachine.kinematics import Kinematics
 from statemachine.models import models_dir
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, refused, written, written_all
+from .conftest import Cli, assert_has, refused, written, written_all
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -54,8 +54,7 @@ def test_the_same_arm_in_two_formats_is_equal(pair: Pair) -> None:
     # The speed, for which an MJCF has no word, is said for the record.
     assert {each.subject for each in result.found.differences} == {"speed"}
     counts = {each.subject: each.count for each in result.found.agreements}
-    assert counts["mass"] == 4
-    assert counts["limits"] == 6
+    assert_has(counts, mass=4, limits=6)
     assert counts["damping"] == counts["dry friction"] == counts["effort"] == 3
     assert result.found.mass == (pytest.approx(0.96), pytest.approx(0.96))
 
@@ -105,8 +104,9 @@ def test_each_seeded_difference_is_found_with_its_size(
 def test_a_shifted_zero_is_told_from_a_turned_frame(pair: Pair) -> None:
     """0.3 rad of the frame are about the joint's own axis: 0.25 more are its zero."""
     (found,) = _differ(compare(*pair({"upper_rpy": "0 0 0.55"})))
-    assert (found.subject, found.where, found.figure) == ("places", "shoulder", "zero position")
-    assert found.two == pytest.approx(0.25)
+    assert_has(
+        found, subject="places", where="shoulder", figure="zero position", two=pytest.approx(0.25)
+    )
     # The tool is 0.32 m away from the axis of the shoulder, and turns with it.
     assert re.fullmatch(r"moves what it carries by up to \d+(\.\d+)? mm", found.effect)
 
@@ -179,8 +179,7 @@ def test_our_own_urdf_holds_all_that_a_urdf_can() -> None:
     whole = {raw.joint(i).name: raw.dof_M0[i] for i in range(6)}
     assert len(armature) == 6
     for each in armature:
-        assert each.two == 0.028
-        assert each.share == pytest.approx(0.028 / whole[each.where], rel=1e-9)
+        assert_has(each, two=0.028, share=pytest.approx(0.028 / whole[each.where], rel=1e-9))
     assert armature[0].where == "gripper"  # the lightest: it weighs most
     assert result.found.posed.distance < 1e-12
     assert result.found.mass[0] == pytest.approx(float(raw.body_mass.sum()), rel=1e-15)
@@ -331,8 +330,7 @@ def test_joints_that_may_be_one_are_suggested(pair: Pair) -> None:
     assert any("--map roll=wrist_roll takes them for one" in note for note in result.found.notes)
     assert {d.subject for d in _differ(result)} >= {"structure"}
     (found,) = _differ(compare(one, two, rename={"roll": "wrist_roll"}))
-    assert (found.subject, found.figure) == ("places", "axis")
-    assert found.size == pytest.approx(math.pi / 2)
+    assert_has(found, subject="places", figure="axis", size=pytest.approx(math.pi / 2))
 
 
 def test_the_order_of_the_two_is_only_an_order(pair: Pair) -> None:
@@ -402,8 +400,7 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
     texts |= {f"{name}.urdf": text.format(name) for name in ("cube", "big", "gone")}
     written_all(tmp_path, texts)
     found = {d.figure: d for d in _differ(compare(tmp_path / "cube.urdf", tmp_path / "big.urdf"))}
-    assert found["volume"].one == pytest.approx(1e-3)
-    assert found["volume"].two == pytest.approx(1.331e-3)
+    assert_has(found["volume"], one=pytest.approx(1e-3), two=pytest.approx(1.331e-3))
     assert found["ends at +x"].size == pytest.approx(0.005)
     assert compare(tmp_path / "cube.urdf", tmp_path / "cube.urdf").equal
     gone = compare(tmp_path / "cube.urdf", tmp_path / "gone.urdf")
@@ -643,8 +640,7 @@ def test_what_a_difference_does_is_a_closed_form(
 def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
     limited = 'kp="50" kv="1" forcerange="-4 4" gear="2"'
     found = {d.figure: d for d in _pendula(tmp_path, gains=limited)}
-    assert found["forcerange"].two == (-4.0, 4.0)
-    assert found["forcerange"].effect == "at most unlimited / at most 8 N·m"
+    assert_has(found["forcerange"], two=(-4.0, 4.0), effect="at most unlimited / at most 8 N·m")
     assert found["gear"].size == 1.0
 
 

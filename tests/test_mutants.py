@@ -22,7 +22,7 @@ from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
 from statemachine.report.grading import mutants_page
 
-from .conftest import ROOT, Cli, opened, refused, shown, written_all
+from .conftest import ROOT, Cli, assert_has, opened, refused, shown, written_all
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -70,8 +70,7 @@ def test_the_solution_passes_and_catches_every_mutant(backend: str) -> None:
     assert list(caught) == list(MUTANTS)
     for name, test in WRITTEN_AGAINST.items():
         assert test in caught[name], name
-    assert found.idle == ()
-    assert found.holds
+    assert_has(found, idle=(), holds=True)
 
 
 def test_the_model_does_not_give_its_faults_away(
@@ -147,10 +146,8 @@ def test_pytest_alone_runs_the_exercise(plugin: tuple[str, ...]) -> None:
 
 def test_the_exercise_begins_with_survivors_and_an_idle_test() -> None:
     found = examine(EXERCISE, only=("xyzw", "degrees", "no-forward"))
-    assert found.failures == ()
+    assert_has(found, failures=(), idle=("test_the_clock",), caught=2, holds=False)
     assert [mutant.name for mutant in found.survivors] == ["xyzw"]
-    assert found.idle == ("test_the_clock",)
-    assert (found.caught, found.holds) == (2, False)
 
 
 HANGS_OR_FALLS = """

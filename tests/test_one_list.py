@@ -12,7 +12,7 @@ from statemachine.compare.matching import match_models
 from statemachine.compare.models import Difference, compare
 from statemachine.compare.why.causes import differences_of
 
-from .conftest import Cli, written_all
+from .conftest import Cli, assert_has, written_all
 from .explained import ALONE, ARM, Case, changed
 
 
@@ -78,8 +78,7 @@ def test_a_file_that_does_not_compile_has_its_description(tmp_path):
     right = changed(ARM, ALONE["damping"]).replace("<worldbody>", gone)
     right = right.replace('<site name="tip"', '<geom type="mesh" mesh="gone"/><site name="tip"')
     rows = {row.subject: row for row in _listed(tmp_path, right)}
-    assert rows["damping"].causes == ()
-    assert (rows["damping"].one, rows["damping"].two) == (0.1, 0.2)
+    assert_has(rows["damping"], causes=(), one=0.1, two=0.2)
 
 
 _CYLINDER = '<geom name="lower_shape" type="capsule" size="0.02"'
@@ -122,8 +121,13 @@ def test_what_is_carried_by_another_part_cannot_be_brought_over(tmp_path):
     left = (ARM[:start] + ball + ARM[end:]).replace("0.6 0 0.2 1 0 0 0", "0")
     right = left.replace(ball, "").replace('<site name="tip"', f'{ball}<site name="tip"')
     (row,) = [row for row in _listed(tmp_path, right, left) if row.figure == "hangs on"]
-    assert (row.one, row.two, row.causes) == ("world", "lower", ("parent of ball",))
-    assert row.refused
+    assert_has(
+        row,
+        one="world",
+        two="lower",
+        causes=("parent of ball",),
+        refused="it hangs on another part",
+    )
 
 
 def test_a_part_that_is_cut_otherwise_tells_each_figure(tmp_path):

@@ -17,7 +17,7 @@ from statemachine.report.steps import one_step as page
 from statemachine.runs.rerun import Rerun
 from statemachine.runs.scenarios import scenario
 
-from .conftest import assert_in, refused
+from .conftest import assert_has, assert_in, refused
 from .small_models import LINKS_AND_BALL, model_of
 
 CHANGES = {
@@ -86,8 +86,7 @@ def test_a_contact_shows_from_the_moment_at_which_it_begins(tmp_path: Path) -> N
     found = stepped(tmp_path, LINKS_AND_BALL.replace(old, new))
     # The ball falls 0.15 m.
     assert found.first.first == pytest.approx((2 * 0.15 / 9.81) ** 0.5, abs=0.01)
-    assert found.spikes[0].stage == "contact force"
-    assert found.spikes[0].where == "ball on floor"
+    assert_has(found.spikes[0], stage="contact force", where="ball on floor")
 
 
 def test_a_later_stage_leads_where_no_earlier_one_differs(tmp_path: Path) -> None:
@@ -135,8 +134,7 @@ def test_what_does_not_count_is_relative_to_the_scale(tmp_path: Path) -> None:
 
 def test_moments_are_spread_over_the_run(tmp_path: Path) -> None:
     found = stepped(tmp_path, LINKS_AND_BALL, moments=20)
-    assert (found.moments, found.every) == (20, 5)
-    assert found.until == pytest.approx(0.475)
+    assert_has(found, moments=20, every=5, until=pytest.approx(0.475))
     refused(
         (BadInputError, "one moment", lambda: stepped(tmp_path, LINKS_AND_BALL, moments=0)),
     )
@@ -182,8 +180,8 @@ def test_an_engine_that_does_not_tell_a_stage_is_not_guessed_at() -> None:
     fresh = sm.load(fall.model, backend="pybullet", defaults="engine")
     two = rerun_of(fall, fresh, seconds=0.2).model
     found = {gap.stage: gap for gap in one_step(one, two, moments=10).stages}
-    assert not found["passive"].told
     assert found["passive"].reason
+    assert not found["passive"].told
     # It has no rotors, which the model's motors have.
     assert found["mass matrix"].beyond == 10
     assert found["kinematics"].beyond == 0

@@ -51,7 +51,7 @@ from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
-from .conftest import ROOT, assert_in, refused, soon
+from .conftest import ROOT, assert_has, assert_in, refused, soon
 from .test_drawing import area_of
 
 LIMIT = 2_000_000  # bytes
@@ -390,8 +390,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     late = one["contact_row"] >= 360  # the last tenth of 401 rows
     mean = float(one["contact_force"][late, 0].sum()) / 41
     assert touch.pair == "gripper on floor"
-    assert touch.one.force == pytest.approx(mean)
-    assert touch.one.deepest == -float(one["contact_dist"].min())
+    assert_has(touch.one, force=pytest.approx(mean), deepest=-float(one["contact_dist"].min()))
     whole = total_forces(one)["gripper on floor"][360:]
     assert touch.one.total == pytest.approx(whole.mean())
     assert whole.mean() > mean

@@ -20,6 +20,7 @@ from statemachine.report import markdown as md
 from statemachine.report import robot_pictures, site, terminal
 from statemachine.report.quiz import Reader
 
+from .conftest import assert_has
 from .rendering import rendering_environment
 
 
@@ -121,6 +122,5 @@ def test_it_is_small_and_the_same_each_time(name: str, pillow: Any) -> None:
     assert len(content) < 150_000
     assert content == robot_pictures.webp(PICTURES[name])
     with pillow.open(io.BytesIO(content)) as opened:
-        assert opened.size == (480, 360)
-        assert opened.n_frames == len(PICTURES[name].poses()[0])
+        assert_has(opened, size=(480, 360), n_frames=len(PICTURES[name].poses()[0]))
         assert np.asarray(opened.convert("RGB")).std() > 20

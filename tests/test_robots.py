@@ -39,6 +39,7 @@ from statemachine.runs.scenarios import scenario
 from .conftest import (
     ROOT,
     Cli,
+    assert_has,
     assert_in,
     need_engine,
     processes_with,
@@ -187,8 +188,7 @@ def test_a_gap_of_rounding_is_no_gap_of_engines(tmp_path: Path) -> None:
     for data in raw:
         mujoco.mj_step(model.raw, data, gaps.STEPS)
     assert np.abs(raw[0].qpos - raw[1].qpos).max() > 1e-3  # MuJoCo alone
-    assert gap.is_rounding
-    assert gap.shrinks is None
+    assert_has(gap, is_rounding=True, shrinks=None)
     assert not BackendRow(without_contacts=gap).unexplained
     # One link is calm, and what is more than rounding stays a gap.
     calm = load(written(tmp_path / "calm.xml", chaos(1)))
@@ -223,10 +223,8 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
     good = rows["good.xml"]
     assert (good.nq, good.nv, good.nu) == (2, 2, 1)
     mujoco, pybullet = good.backends["mujoco"], good.backends["pybullet"]
-    assert mujoco.equals_engine
-    assert mujoco.restores
-    assert pybullet.restores
-    assert pybullet.equals_engine is None
+    assert_has(mujoco, equals_engine=True, restores=True)
+    assert_has(pybullet, restores=True, equals_engine=None)
     gap = pybullet.without_contacts
     assert gap.moved > 0.1
     assert gap.hinge < 1e-9

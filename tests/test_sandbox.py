@@ -13,7 +13,7 @@ import pytest
 
 from statemachine.processes import sandbox
 
-from .conftest import lives, processes_with, refused
+from .conftest import assert_has, lives, processes_with, refused
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="limits and sessions are POSIX")
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
@@ -39,8 +39,7 @@ def test_nothing_is_read_from_us() -> None:
 
 def test_a_loop_is_ended() -> None:
     done = _python("print('on', flush=True)\nwhile True: pass", cpu=1.0)
-    assert done.end == "cpu"
-    assert done.stdout == "on\n"
+    assert_has(done, end="cpu", stdout="on\n")
     if os.name == "posix":
         assert 0.5 < done.cpu < 3  # as the system counts: by ticks
 
@@ -179,9 +178,8 @@ def test_shut_in_it_reaches_no_process_and_no_network(folder: Path) -> None:
         "print(kill(-1, 0), flush=True)\n"
         "socket.create_connection(('127.0.0.1', 9))",
     )
-    assert done.stdout == "-1\n-1\n"
+    assert_has(done, stdout="-1\n-1\n", end="code", code=1)
     assert "Network is unreachable" in done.stderr
-    assert (done.end, done.code) == ("code", 1)
 
 
 def test_shut_in_nothing_escapes(folder: Path) -> None:

@@ -15,7 +15,7 @@ from statemachine import errors, rotations
 from statemachine.interface.options import as_vector
 from statemachine.report.as_json import dumps
 
-from .conftest import opened, refused
+from .conftest import assert_has, opened, refused
 
 angles = st.floats(-3.0, 3.0)
 quats = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
@@ -79,9 +79,8 @@ def test_a_state_reads_as_what_it_holds(backend: str) -> None:
         data.qpos[1] = 0.5
         data.time = 3.0
         state = sm.get_state(model, data)
-    assert state.time == 3.0
+    assert_has(state, time=3.0, backend=backend)
     assert state["qpos"].tolist() == [0, 0.5, 0, 0, 0, 0]
-    assert state.backend == backend
     refused(
         (errors.UnknownNameError, "qpos", lambda: state["qpo"]),
         (AttributeError, "", lambda: setattr(state, "blob", b"")),

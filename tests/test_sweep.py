@@ -40,13 +40,7 @@ from statemachine.sweep.folder import locked, settle_manifest
 from statemachine.sweep.rows import KEY, RowWriter, counted, remove_failed
 from statemachine.sweep.worker import differing, run_batch
 
-from .conftest import (
-    ROOT,
-    in_its_own_python,
-    refused,
-    soon,
-    written,
-)
+from .conftest import ROOT, assert_has, in_its_own_python, refused, soon, written
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("joblib")
@@ -152,8 +146,7 @@ def start(tmp_path: Path) -> Start:
 def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
     options = ("timestep", "damping", "contacts", "integrator")
     (vary,) = with_kinds(parse_vary([word]), options, ("gain",))
-    assert (vary.values, vary.times, vary.bounds) == (values, times, None)
-    assert vary.numeric == isinstance(values[0], float)
+    assert_has(vary, values=values, times=times, bounds=None, numeric=isinstance(values[0], float))
 
 
 @pytest.mark.parametrize(
@@ -256,10 +249,14 @@ def test_a_cell_is_the_run_of_a_trace(scene: sm.Model, backend: str) -> None:
     options = {"timestep": 0.004, "damping": 0.5 * scene.dof_damping}
     trace = record_scenario(scenario("hold"), scene, seconds=0.4, options=options)
     assert row["status"] == "done", row
-    assert (row["steps"], row["time"]) == (100, trace.time[-1])
-    assert row["qpos"] == trace.qpos[-1].tolist()
-    assert row["qvel"] == trace.qvel[-1].tolist()
-    assert row["max_qvel"] == np.abs(trace.qvel[1:]).max()
+    assert_has(
+        row,
+        steps=100,
+        time=trace.time[-1],
+        qpos=trace.qpos[-1].tolist(),
+        qvel=trace.qvel[-1].tolist(),
+        max_qvel=np.abs(trace.qvel[1:]).max(),
+    )
     rows = np.searchsorted(trace.time, np.array(row["sample_time"]) - 1e-9)
     assert row["sample_qpos"] == trace.qpos[rows].tolist()
     site = scene.site_id("gripperframe")
@@ -466,8 +463,7 @@ def test_a_file_says_what_it_is_without_the_manifest(dataset: Path) -> None:
     assert facts["vary.timestep"] == {b"unit": b"s", b"meaning": b"timestep of the model"}
     assert facts["max_qvel"][b"unit"] == b"rad/s or m/s"
     told = json.loads(schema.metadata[KEY])
-    assert told["design"]["vary"] == ["damping=0.5x,1x", "timestep=0.005"]
-    assert told["design"]["seeds"] == 1
+    assert_has(told["design"], vary=["damping=0.5x,1x", "timestep=0.005"], seeds=1)
     assert told["request"]["what"] == "hold"
     assert told["files"]
 

@@ -6,6 +6,7 @@ import dataclasses
 import json
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -30,7 +31,7 @@ from statemachine.sweep.folder import design_of, read_manifest
 from statemachine.sweep.request import MANIFEST_VERSION
 from statemachine.sweep.rows import DONE, FAILED, RowWriter, read_cells, schema_of
 
-from .conftest import assert_in, refused, shown
+from .conftest import assert_has, assert_in, refused, shown
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
@@ -134,8 +135,7 @@ def test_sobol_indices_are_those_of_the_ishigami_function(tmp_path: Path) -> Non
     factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
     design = Design(factors, samples=1024, indices=True, seed=1)
     found = of(made_up(tmp_path / "s", design, nowhere, ishigami))
-    assert the(found.sensitivity).method == "sobol"
-    assert the(found.sensitivity).samples == 1024
+    assert_has(the(found.sensitivity), method="sobol", samples=1024)
     assert shares(found).keys() == ISHIGAMI.keys()
     for each in the(found.sensitivity).indices:
         first, total = ISHIGAMI[each.label]
@@ -187,8 +187,7 @@ def test_a_factorial_with_holes_keeps_the_rest(tmp_path: Path) -> None:
         fails=lambda _b, v, _s: v[1] == 1,
     )  # fmt: skip
     found = of(folder)
-    assert shares(found)["x"] == pytest.approx((1, 1))
-    assert shares(found)["y"] == pytest.approx((0, 0))
+    assert_has(shares(found), x=pytest.approx((1, 1)), y=pytest.approx((0, 0)))
     assert "y = 1.0" in the(found.sensitivity).notes[0]
     assert found.failed == {"DivergedError": 6}
 
@@ -210,8 +209,7 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
     assert found.quantity.counts == {"agrees": 2, "some seeds": 2, "differs": 5, "no runs": 1}
     assert found.agreed == 2
     by = {each.values: each for each in found.settings}
-    assert by[2.0, 1.0].median == pytest.approx(3e-3)
-    assert by[2.0, 1.0].worst == pytest.approx(4e-3)
+    assert_has(by[2.0, 1.0], median=pytest.approx(3e-3), worst=pytest.approx(4e-3))
     assert by[3.0, 0.0].median is None
     gap = {
         (x, y): the(found.map).gap[r][c]
@@ -240,8 +238,8 @@ def test_a_sweep_that_failed_everywhere_has_no_report(tmp_path: Path) -> None:
             tmp_path / name, design, nowhere, nowhere,
             fails=lambda backend, _values, _seed, failed=failed: backend in failed,
         )  # fmt: skip
-        with pytest.raises(BadInputError, match=r"no setting .* both mujoco and pybullet"):
-            of(folder)
+        says = r"no setting .* both mujoco and pybullet"
+        refused((BadInputError, says, partial(of, folder)))
 
 
 def data_of(folder: Path) -> SweepData:
@@ -274,8 +272,9 @@ def fitted(
 def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
     (found,) = fitted(tmp_path / "s", best=0.61, least=0.1e-3).together
     assert found.varied == "both"  # a parameter of a function is no side's own
-    assert the(found.fit).value == pytest.approx(0.61, abs=1e-3)
-    assert the(found.fit).gap == pytest.approx(0.1e-3, rel=1e-3)
+    assert_has(
+        the(found.fit), value=pytest.approx(0.61, abs=1e-3), gap=pytest.approx(0.1e-3, rel=1e-3)
+    )
     assert the(found.fit).error == pytest.approx(0.0, abs=1e-3)  # the seeds are alike
     assert found.verdict == "together"
     reach = np.sqrt(0.2**2 - 0.1**2) / 5  # where hypot(5 mm · reach, 0.1 mm) is 0.2 mm
@@ -293,8 +292,11 @@ def test_its_error_is_that_of_the_seeds(tmp_path: Path) -> None:
     # The gap is a parabola here, so that the value is the mean of 16 that are evenly spread;
     # the curves of a seed at 2 values of y are the same, and count once.
     deviation = spread * np.sqrt((seeds**2 - 1) / 12)
-    assert the(found.fit).error == pytest.approx(deviation / np.sqrt(seeds), rel=0.15)
-    assert the(found.fit).of == "16 seeds drawn again"
+    assert_has(
+        the(found.fit),
+        error=pytest.approx(deviation / np.sqrt(seeds), rel=0.15),
+        of="16 seeds drawn again",
+    )
     assert found.verdict == "closer"
 
 
@@ -462,11 +464,14 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
     runner: Any = _Runs(nowhere, right)
     found = brought_together(data_of(folder), vary, "tip", 0.2e-3, varied="both", runner=runner)
     assert the(found.measured) > 5e-3
-    assert found.value == pytest.approx(0.625)
+    assert_has(
+        found,
+        value=pytest.approx(0.625),
+        error=pytest.approx(0.25 / (REFINED - 1)),
+        verdict="closer",
+        cells=2 * (1 + REFINED),
+    )
     assert found.after == min(the(found.tried)[1]) == pytest.approx(5.1e-3)
-    assert found.error == pytest.approx(0.25 / (REFINED - 1))
-    assert found.verdict == "closer"
-    assert found.cells == 2 * (1 + REFINED)
     said = " ".join(shown(page(dataclasses.replace(report, together=(found,)))).split())
     assert_in(
         said,
@@ -496,10 +501,9 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
     assert (the(found.floor).cells, the(found.floor).settings) == (4, 2)
     assert 0 < max(each.floor or 0 for each in found.settings) < 1e-6
     (fit,) = found.together
-    assert (fit.label, fit.varied, fit.own) == ("damping", "right", 1.0)
+    assert_has(fit, label="damping", varied="right", own=1.0, pairs=2)
     assert own.any()
     # Both engines have the same model: its own damping, or one near it, is the best.
     assert the(fit.fit).value == pytest.approx(1.0, abs=0.15)
-    assert fit.pairs == 2
     assert the(fit.measured) < np.interp(0.6, *the(fit.fit).scan)
     assert found.ran == the(found.floor).cells + fit.cells

@@ -41,13 +41,7 @@ from statemachine.runs import (
 )
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import (
-    ROOT,
-    Cli,
-    opened,
-    refused,
-    runs_in_silence,
-)
+from .conftest import ROOT, Cli, assert_has, opened, refused, runs_in_silence
 from .small_models import ROTOR_PENDULUM, mjcf, model_of
 
 INPUTS = ("time", "qpos", "qvel", "ctrl")
@@ -193,15 +187,15 @@ def test_a_controller_sees_time_and_data_and_gives_ctrl(mujoco_arm: sm.Model) ->
     ],
 )
 def test_what_is_no_ctrl_is_said_with_the_time(mujoco_arm: sm.Model, gives: Any, says: str) -> None:
-    with pytest.raises(BadInputError, match=says) as caught:
-        record(mujoco_arm, lambda time, _data: gives if time > 0.02 else None, 0.1)
-    assert "0.025 s" in str(caught.value)
+    late = partial(record, mujoco_arm, lambda time, _data: gives if time > 0.02 else None, 0.1)
+    assert "0.025 s" in str(refused((BadInputError, says, late)))
 
 
 def test_a_nan_in_an_array_of_the_right_shape_is_found(arm: sm.Model) -> None:
+    """In the last row, after the last step."""
     bad = np.full(6, np.nan)
-    with pytest.raises(BadInputError, match="ctrl"):  # in the last row, after the last step
-        record(arm, lambda time, _data: bad if time > 0.096 else None, 0.1)
+    late = partial(record, arm, lambda time, _data: bad if time > 0.096 else None, 0.1)
+    refused((BadInputError, "ctrl", late))
 
 
 def test_a_controller_that_kicks_is_repeated_exactly(scene: sm.Model) -> None:
@@ -299,8 +293,7 @@ def test_a_file_holds_every_bit(name: str, suffix: str, tmp_path: Path) -> None:
     again = read(path)
     assert set(again.columns) == set(trace.columns) == {*COLUMNS, *CONTACTS}
     for column in trace.columns:
-        assert again[column].dtype == trace[column].dtype
-        assert again[column].shape == trace[column].shape
+        assert_has(again[column], dtype=trace[column].dtype, shape=trace[column].shape)
     assert same(trace, again)
     assert again.header.recorded
     assert dataclasses.replace(again.header, recorded=False) == trace.header
@@ -417,8 +410,7 @@ def test_each_scenario_was_recorded_with_both_defaults() -> None:
     expected = {f"{name}.pybullet{end}" for name in SCENARIOS for end in ("", ".engine")}
     assert set(shipped_names()) == {*expected, f"hold.{OLDER}"}
     trace = shipped("hold", "pybullet", "engine")
-    assert trace.header.recorded
-    assert trace.header.defaults == "engine"
+    assert_has(trace.header, recorded=True, defaults="engine")
     refused((UnknownNameError, "recorded trace", lambda: shipped("hold", "mujoco")))
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 from unittest.mock import Mock
 
@@ -20,16 +21,17 @@ from statemachine.errors import (
     ClosedDataError,
     DivergedError,
     EngineError,
-    ReadOnlyError,
 )
 from statemachine.interface import DERIVED
 
 from .conftest import (
     ROOT,
+    bits,
     interrupted_at,
     opened,
     raised_in_a_thread,
     refused,
+    registered,
     runs_in_silence,
 )
 from .small_models import crowded
@@ -162,35 +164,90 @@ def test_two_data_in_two_threads_equal_serial(model: sm.Model) -> None:
         sys.setswitchinterval(interval)
 
 
-@pytest.mark.parametrize("verb", ["step", "reset", "set_state", "forward", "get_state"])
-def test_an_interrupted_verb_completes_or_undoes_or_refuses(verb: str) -> None:
+@pytest.fixture
+def mid_contact(request: pytest.FixtureRequest) -> Iterator[tuple[sm.Model, sm.Data]]:
+    """The held box on a backend, whose name may have " as it comes" behind it."""
+    name, _, engine = request.param.partition(" as it comes")
+    defaults: Any = "engine" if engine else "model"
     with (
-        opened(sm.load("so101/scene_box"), 0, nstep=20) as (model, data),
-        sm.make_data(model) as twin,
+        registered("hidden", "tests.hidden_world:load"),
+        opened(sm.load("so101/scene_box", name, defaults=defaults), 0, nstep=20) as opened_data,
     ):
-        base = sm.get_state(model, data)
-        sm.step(model, data, 20)
-        calls: dict[str, Use] = {
-            "step": sm.step,
-            "reset": lambda m, d: sm.reset(m, d, 0),
-            "set_state": lambda m, d: sm.set_state(m, d, base),
-            "forward": sm.forward,
-            "get_state": sm.get_state,
-        }
-        start = sm.get_state(model, data)
-        sm.set_state(model, twin, start)
-        calls[verb](model, twin)
-        allowed = {start.blob, sm.get_state(model, twin).blob}
-        at = 0
-        while interrupted_at(at := at + 1, lambda: calls[verb](model, data), "statemachine"):
-            if data._trouble:
-                assert "interrupted" in data._trouble
-                with pytest.raises(DivergedError, match="interrupted"):
-                    sm.step(model, data)
-            else:
-                assert sm.get_state(model, data).blob in allowed, at
-            sm.set_state(model, data, start)
-        assert at > 5
+        yield opened_data
+
+
+INTERRUPTED: dict[str, Use] = {
+    "step": lambda model, data: sm.step(model, data, 2),
+    "reset": lambda model, data: sm.reset(model, data, 0),
+    "set_state": USES["set_state"],
+    "forward": USES["forward"],
+    "get_state": USES["get_state"],
+    "read": lambda model, data: (sm.forward(model, data), data.qacc),
+}
+
+
+@pytest.mark.filterwarnings("ignore:Exception ignored in. <finalize")  # of a Data before
+@pytest.mark.parametrize("verb", INTERRUPTED)
+@pytest.mark.parametrize(
+    "mid_contact", ["mujoco", "pybullet", "pybullet as it comes", "hidden"], indirect=True
+)
+def test_an_interrupted_verb_completes_or_undoes_or_refuses(
+    mid_contact: tuple[sm.Model, sm.Data], verb: str
+) -> None:
+    """Before each line in turn; the future is that of a Data that nobody interrupted."""
+    model, data = mid_contact
+    call = INTERRUPTED[verb] if verb != "set_state" else lambda *of: sm.set_state(*of, base)
+    base, futures = sm.get_state(model, data), {}
+    sm.step(model, data, 20)
+    start = sm.get_state(model, data)
+    with sm.make_data(model) as twin:
+        for use in (lambda *_: None, call):
+            sm.set_state(model, twin, start)
+            use(model, twin)
+            now = sm.get_state(model, twin)
+            sm.step(model, twin, 5)
+            futures[now] = sm.get_state(model, twin)
+    at, stride = 0, 25 if verb == "read" else 1  # which goes through thousands of lines
+    sm.set_state(model, data, start)
+    while interrupted_at(at := at + stride, lambda: call(model, data), "statemachine"):
+        if data._trouble:
+            uses = sm.step, sm.forward, sm.get_state, lambda _, data: data.contacts
+            refused(*((DivergedError, "interrupted", partial(use, model, data)) for use in uses))
+            call(model, data)
+        now = sm.get_state(model, data)
+        assert now in futures, at
+        sm.step(model, data, 5)
+        assert sm.get_state(model, data) == futures[now], at
+        sm.set_state(model, data, start)
+    assert at > 5
+
+
+@pytest.mark.parametrize(
+    "mid_contact",
+    [
+        *("mujoco", "hidden"),
+        pytest.param(
+            "pybullet",
+            marks=pytest.mark.xfail(
+                strict=True, reason="what was not read before the interrupt comes from the mirror"
+            ),
+        ),
+    ],
+    indirect=True,
+)
+def test_an_interrupted_step_leaves_what_is_derived(
+    mid_contact: tuple[sm.Model, sm.Data],
+) -> None:
+    model, derived = mid_contact[0], list[list[bytes]]()
+    for at in range(0, 90, 3):
+        with opened(model, 0, nstep=40) as (_, data):
+            before = sm.get_state(model, data)
+            if at:
+                interrupted_at(at, lambda data=data: sm.step(model, data, 3), "statemachine")
+            if sm.get_state(model, data) == before:
+                derived.append(bits(data))
+    assert len(derived) > 2
+    assert derived == derived[:1] * len(derived)
 
 
 def test_a_state_that_is_refused_leaves_the_data_as_it_was() -> None:
@@ -201,22 +258,6 @@ def test_a_state_that_is_refused_leaves_the_data_as_it_was() -> None:
             patch.setattr(MujocoData, "_set_state", Mock(side_effect=BadInputError("no")))
             refused((BadInputError, "", lambda: sm.set_state(model, data, before)))
         assert sm.get_state(model, data) == before
-
-
-def test_inputs_that_were_made_read_only_are_found_before_anything_moves(backend: str) -> None:
-    with opened(sm.load("so101/scene", backend=backend)) as (model, data):
-        state = sm.get_state(model, data)
-        for name in ("qpos", "qvel", "ctrl"):
-            getattr(data, name).setflags(write=False)
-            says = rf"{name}.*setflags"
-            refused(
-                (ReadOnlyError, says, lambda: sm.reset(model, data)),
-                (ReadOnlyError, says, lambda: sm.set_state(model, data, state)),
-                (ReadOnlyError, says, lambda: setattr(data, "ctrl", np.zeros(model.nu))),
-            )
-            getattr(data, name).setflags(write=True)
-            assert sm.get_state(model, data) == state
-        sm.step(model, data)
 
 
 def test_an_engine_that_gives_up_in_forward_is_an_error_of_ours(tmp_path: Any) -> None:

@@ -34,7 +34,7 @@ from statemachine.view.session import (
 )
 from statemachine.view.viser_front import readout, warning
 
-from .conftest import ROOT, assert_in, in_its_own_python, one_line, opened, refused
+from .conftest import ROOT, assert_has, assert_in, in_its_own_python, one_line, opened, refused
 from .small_models import ODD_DRIVES, model_of
 
 SCENE = "so101/scene_box"
@@ -91,15 +91,13 @@ def test_a_frame_is_a_copy(session: LiveSession) -> None:
 
 def test_commands_do_what_they_say(session: LiveSession) -> None:
     start = session.frame()
-    assert not start.running
+    assert_has(start, running=False, time=6)
     assert session.places == ("held", "pickup")
-    assert start.time == 6
     session.play()
     assert session.frame().running
     session.step(7)
     frame = session.frame()
-    assert (frame.running, frame.steps) == (False, 7)
-    assert frame.time == pytest.approx(6 + 7 * session.timestep)
+    assert_has(frame, running=False, steps=7, time=pytest.approx(6 + 7 * session.timestep))
     session.play()
     session.pause()
     assert not session.running
@@ -167,10 +165,9 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
         session.set_ctrl(2, 1e150)
         session.advance(5)
         bad = session.frame()
-        assert not bad.running
+        assert_has(bad, running=False, steps=good.steps)
         assert bad.trouble.startswith("mujoco: ")
         assert bad.time == good.time  # the last moment that was good
-        assert bad.steps == good.steps
         np.testing.assert_array_equal(bad.poses[0].xpos, good.poses[0].xpos)
         session.play()
         assert not session.running
@@ -179,8 +176,7 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
         session.reset()
         session.advance(3)
         again = session.frame()
-        assert again.trouble == ""
-        assert again.steps == 3
+        assert_has(again, trouble="", steps=3)
         np.testing.assert_array_equal(again.poses[0].xpos, good.poses[0].xpos)
 
 
@@ -225,8 +221,7 @@ def test_sliders_speak_degrees_where_an_angle_is_asked_for(odd: sm.Model) -> Non
     assert arm[1].scale * 180 == pytest.approx(math.pi)
     aim, push, wild, free = controls_of(odd)
     assert (aim.low, aim.high, aim.unit) == (pytest.approx(-90), pytest.approx(90), "°")
-    assert (push.low, push.high, push.unit) == (pytest.approx(-200), pytest.approx(300), "mm")
-    assert push.name == "actuator 1"
+    assert_has(push, low=pytest.approx(-200), high=pytest.approx(300), unit="mm", name="actuator 1")
     assert (wild.high, wild.unit, wild.scale) == (1e150, "", 1)
     assert (free.low, free.high, free.unit) == (-1, 1, "")
 
@@ -314,8 +309,7 @@ def test_time_follows_the_clock(speed: float) -> None:
         loop.run(seconds=2.0)
         frame, pace, _ = hand.shown[-1]
         assert frame.time == pytest.approx(speed * (clock.now - began), abs=0.06 * max(1, speed))
-        assert pace.reached == pytest.approx(speed, rel=0.05)
-        assert not pace.late
+        assert_has(pace, reached=pytest.approx(speed, rel=0.05), late=False)
         assert 30 <= len(hand.shown) / 2 <= 60  # frames a second
         assert session.running
 
@@ -332,8 +326,7 @@ def test_an_engine_that_is_too_slow_is_said_and_does_not_lag_ever_more() -> None
         session.cost = 0.0
         loop.run(seconds=3.0)
         _, pace, _ = hand.shown[-1]
-        assert pace.reached == pytest.approx(1.0, abs=0.02)
-        assert not pace.late
+        assert_has(pace, reached=pytest.approx(1.0, abs=0.02), late=False)
         # What it lost is not made up for in a rush: a quarter of a second at most.
         assert np.diff([shown[0].time for shown in hand.shown])[len(gaps) :].sum() < 3.0 + 0.26
 

@@ -24,7 +24,18 @@ from statemachine.report.as_json import dumps
 from statemachine.runs import record_scenario
 from statemachine.runs.scenarios import Scenario, scenario
 
-from .conftest import ROOT, Cli, need_engine, one_line, opened, refused, registered, shown, written
+from .conftest import (
+    ROOT,
+    Cli,
+    assert_has,
+    need_engine,
+    one_line,
+    opened,
+    refused,
+    registered,
+    shown,
+    written,
+)
 
 HOLD = replace(scenario("hold"), seconds=0.6)  # long enough to touch the floor
 FALL = replace(scenario("fall"), seconds=5.0)  # and to meet a limit
@@ -141,8 +152,7 @@ def test_substeps_and_timestep_are_one_cause(arm: Model) -> None:
 def test_another_quantity(arm: Model) -> None:
     two = arm.replace(armature=0.04)
     result = explain(arm, two, HOLD, quantity="gripperframe", uncertain=None)
-    assert (result.quantity, result.unit) == ("gripperframe", "m")
-    assert result.gap == result.first["gripperframe"].worst
+    assert_has(result, quantity="gripperframe", unit="m", gap=result.first["gripperframe"].worst)
     refused(
         (UnknownNameError, "gripperframe", lambda: explain(arm, two, HOLD, quantity="gripperfram"))
     )
@@ -161,8 +171,11 @@ def test_what_is_held_is_what_it_is_about(mujoco_box: sm.Model) -> None:
     apart = np.linalg.norm(seen[0] - seen[1], axis=1)
     assert result.gap == pytest.approx(apart.max(), rel=1e-9)
     gap = result.first["box relative to gripperframe"]
-    assert gap.rms == pytest.approx(np.sqrt((apart**2).mean()))
-    assert gap.at == traces[0].time[apart.argmax()] - traces[0].time[0]
+    assert_has(
+        gap,
+        rms=pytest.approx(np.sqrt((apart**2).mean())),
+        at=traces[0].time[apart.argmax()] - traces[0].time[0],
+    )
 
 
 def test_a_run_that_diverges_is_said_with_what_would_let_it_stand(arm: Model) -> None:

@@ -96,6 +96,23 @@ def check_derived_is_read_only(lab: Lab, model: Model, data: Data) -> None:
     require_raises(ReadOnlyError, *(partial(setattr, *fact) for fact in facts))
 
 
+@check(on="scene")
+def check_inputs_made_read_only_are_found(lab: Lab, model: Model, data: Data) -> None:
+    """An input that was made read-only is named before anything is reset, restored or copied."""
+    state = get_state(model, data)
+    for name in INPUTS:
+        getattr(data, name).setflags(write=False)
+        for call in (
+            lambda: reset(model, data),
+            lambda: set_state(model, data, state),
+            lambda: setattr(data, "ctrl", np.zeros(model.nu)),
+        ):
+            error = require_raises(ReadOnlyError, call, unchanged=data)
+            require(name in str(error) and "setflags" in str(error), f"no way back in: {error}")
+        getattr(data, name).setflags(write=True)
+    step(model, data)
+
+
 @check(on="arm")
 def check_nstep_is_a_positive_whole_number(lab: Lab, model: Model, data: Data) -> None:
     """0, -1, 1.5, True, None and text are refused, and no time passes."""
