@@ -196,7 +196,7 @@ def test_an_interrupted_verb_completes_or_undoes_or_refuses(
 ) -> None:
     """Before each line in turn; the future is that of a Data that nobody interrupted."""
     model, data = mid_contact
-    call = INTERRUPTED[verb] if verb != "set_state" else lambda *of: sm.set_state(*of, base)
+    call = INTERRUPTED[verb] if verb != "set_state" else lambda m, d: sm.set_state(m, d, base)
     base, futures = sm.get_state(model, data), {}
     sm.step(model, data, 20)
     start = sm.get_state(model, data)
