@@ -30,9 +30,9 @@ from statemachine.errors import (
     UnknownNameError,
     UnsupportedError,
 )
-from statemachine.interface.worlds import WRITABLE
 
 from .conftest import SHARED, opened, refused, runs_in_silence, shared, started
+from .lives import equal, live
 from .small_models import RICH, loaded, model_of
 
 N = 4
@@ -55,68 +55,15 @@ def worlds(box: sm.Model) -> Iterator[many.Worlds]:
         yield worlds
 
 
-def equal(worlds: many.Worlds, data: list[sm.Data], ids: Any = None) -> None:
-    """Assert that each world is what its Data is."""
-    for i in range(worlds.n) if ids is None else ids:
-        for name in (*WRITABLE, *worlds.derived):
-            ours, single = getattr(worlds, name)[i], np.asarray(getattr(data[i], name))
-            assert ours.shape == single.shape
-            assert np.array_equal(ours, single, equal_nan=True), (i, name)
-
-
 def commands(model: sm.Model, *shape: int) -> np.ndarray:
     return np.random.default_rng(1).uniform(-0.8, 0.8, (*shape, model.nu))
-
-
-def follow(model: sm.Model, worlds: many.Worlds, rounds: int = 12) -> None:
-    """Drive worlds and as many single Data through the same life, and compare all along."""
-    data = [sm.make_data(model) for _ in range(worlds.n)]
-    equal(worlds, data)
-    if model.keyframes:
-        many.reset(worlds, keyframe=0)
-        for each in data:
-            sm.reset(model, each, 0)
-        equal(worlds, data)
-    for k, ctrl in enumerate(commands(model, rounds, worlds.n)):
-        worlds.ctrl = ctrl
-        for i, each in enumerate(data):
-            each.ctrl = ctrl[i]
-            sm.step(model, each, 3)
-            if k:
-                sm.step(model, each, k)
-        if k % 2:
-            many.step(worlds, 3 + k)
-        else:  # some, out of order, and the others; in two pieces
-            mask = np.arange(worlds.n) % 2 == 0
-            many.step(worlds, 3, ids=np.flatnonzero(~mask)[::-1])
-            many.step(worlds, 3, ids=mask)
-            if k:
-                many.step(worlds, k)
-        equal(worlds, data)
-    many.forward(worlds, ids=[0, 2])
-    for each in data[0:3:2]:
-        sm.forward(model, each)
-    equal(worlds, data)
-    # A write reaches one world, with the next step that is for it.
-    worlds.qpos[1, 0] = data[1].qpos[0] = 0.25
-    worlds.qvel[2, 0] = data[2].qvel[0] = -0.0
-    worlds.time[0] = data[0].time = 2.0
-    equal(worlds, data)
-    many.step(worlds, 2)
-    for each in data:
-        sm.step(model, each, 2)
-    equal(worlds, data)
-    many.reset(worlds, ids=[1])
-    sm.reset(model, data[1])
-    equal(worlds, data)
-    for each in data:
-        each.close()
 
 
 def test_a_world_is_what_one_data_is(model: sm.Model) -> None:
     with worlds_of(model) as worlds:
         assert not worlds.xpos.any()
-        follow(model, worlds)
+        live(worlds, [model] * N, 28)
+        many.step(worlds)
         many.reset(worlds, ids=[1])
         assert not worlds.xpos[1].any()
         assert worlds.xpos[2].any()
@@ -458,7 +405,7 @@ def test_worlds_belong_to_the_process_that_made_them(worlds: many.Worlds) -> Non
 def test_what_a_file_may_have(tmp_path: Path, substeps: int) -> None:
     model = model_of(tmp_path, RICH, substeps=substeps)
     with worlds_of(model, 5, workers=3) as worlds:
-        follow(model, worlds)
+        live(worlds, [model] * 5, 28)
         with started(model) as data:
             data.raw.mocap_pos[0] = [0.2, 0.1, 0.9]
             many.set_state(worlds, 4, sm.get_state(model, data))
@@ -482,7 +429,7 @@ ROBOTS = {
 def test_robots_of_others(name: str) -> None:
     path = shared(SHARED / "robots" / "models" / ROBOTS[name])
     with worlds_of(sm.load(path), 3) as worlds:
-        follow(worlds.model, worlds, 4)
+        live(worlds, [worlds.model] * 3, 14)
 
 
 def test_where_the_engine_resets_by_itself() -> None:
@@ -500,7 +447,7 @@ def test_sleep_is_run_or_refused(tmp_path: Path) -> None:
     flag = '<option timestep="0.002"><flag sleep="enable"/></option>'
     model = model_of(tmp_path, RICH.replace('<option timestep="0.002"/>', flag))
     with worlds_of(model, 3) as worlds:
-        follow(model, worlds)
+        live(worlds, [model] * 3, 28)
 
 
 def test_a_python_callback_is_refused() -> None:

@@ -40,7 +40,7 @@ from statemachine.worlds import (
 
 from . import faulty_world as faulty
 from .conftest import ROOT, lives, opened, refused, registered, soon
-from .test_worlds import follow
+from .lives import live
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
 N = 5
@@ -83,7 +83,7 @@ def bits(array: Any) -> bytes:
 def test_the_bits_are_those_of_single_data(model: sm.Model, workers: int) -> None:
     with make_worlds(model, N, workers=workers) as worlds:
         assert worlds.workers == min(workers, N)
-        follow(model, worlds)
+        live(worlds, [model] * N, 28)
 
 
 @pytest.mark.usefixtures("bullet")

@@ -16,6 +16,7 @@ from statemachine.interface import worlds as interface_worlds
 from statemachine.worlds import LogUniform, Uniform, draw, make_worlds
 
 from .conftest import ROOT, assert_in, need_engine, opened, refused
+from .lives import live
 from .small_models import SLEEPY, loaded, model_of
 
 FIELDS = ("qpos", "qvel", "ctrl", "time")
@@ -144,47 +145,10 @@ def test_worlds_of_any_latency_live_as_data_of_replaced_models(
         model = model.replace(latency=0.02)
         options |= {"timestep": [0.004, 0.002, 0.003], "substeps": [2] * 3}
     models = [model.replace(**{k: v[i] for k, v in options.items()}) for i in range(3)]
-    kept: dict[int, Any] = {}
     with make_worlds(model, 3, workers=2, **options) as many:
-        data = [sm.make_data(each) for each in models]
-        for _ in range(300):
-            if rng.random() < 0.3:
-                many.ctrl[:] = rng.uniform(-0.5, 0.5, many.ctrl.shape)
-                for each, row in zip(data, many.ctrl, strict=True):
-                    each.ctrl[:] = row
-            world = int(rng.integers(3))
-            interrupt(many, models[world], data[world], world, rng, kept)
-            nstep, ids = int(rng.integers(1, 4)), np.flatnonzero(rng.random(3) < 0.8)
-            worlds.step(many, nstep, ids=ids)
-            for i in ids:
-                sm.step(models[i], data[i], nstep)
-            for i, each in enumerate(data):
-                for field in (*FIELDS, *many.derived):
-                    ours, single = getattr(many, field)[i], getattr(each, field)
-                    np.testing.assert_array_equal(ours, single, err_msg=f"{field}[{i}]")
+        live(many, models, 300, seed, 0.5)
         for i, each in enumerate(models):
             assert many.model_of(i).raw.nhistory == each.raw.nhistory
-
-
-def interrupt(
-    many: Any, model: Any, data: Any, world: int, rng: np.random.Generator, kept: dict[int, Any]
-) -> None:
-    """Now and then a reset, a State that is kept or taken back, or a time that is set."""
-    what = rng.random()
-    if what < 0.04:
-        key = 0 if model.keyframes and rng.random() < 0.5 else None
-        worlds.reset(many, ids=[world], keyframe=key)
-        sm.reset(model, data, key)
-    elif what < 0.09 and world not in kept:
-        kept[world] = worlds.get_state(many, world), sm.get_state(model, data)
-        assert kept[world][0] == kept[world][1]
-    elif what < 0.14 and world in kept:
-        ours, single = kept.pop(world)  # either is the other's
-        worlds.set_state(many, world, single)
-        sm.set_state(model, data, ours)
-    elif what < 0.2:
-        many.time[world] += rng.choice([-1.0, -0.05, -0.013, 0.02])
-        data.time = many.time[world]
 
 
 def test_a_latency_that_memory_cannot_hold_is_refused(arm: sm.Model) -> None:
