@@ -84,14 +84,13 @@ def python_of(name: str) -> Path:
         MissingEngineError: It is not here.
         BadInputError: As `version_of`.
     """
-    version_of(name)
     if not is_here(name):
         raise MissingEngineError(_ADD.format(name, name), engine=name)
     return _python_in(folder() / name)
 
 
 def backends_of(versions: str) -> list[str]:
-    """The backends of releases, and the one that is installed as the last.
+    """The backends of releases, and of the one that is installed, from the oldest on.
 
     Args:
         versions: With commas between: "3.1.6,3.3.7".
@@ -100,17 +99,24 @@ def backends_of(versions: str) -> list[str]:
         BadInputError: As `version_of`.
         MissingEngineError: Some are not here; with the command that adds all of them.
     """
-    names = [f"{DEFAULT}=={word.strip()}" for word in versions.split(",")]
-    others = [name for name in names if version_of(name) != engine_version(DEFAULT)]
-    refuse((not others, f"{versions} is installed: name an older release to compare it with"))
-    missing = [name for name in others if not is_here(name)]
+    installed = engine_version(DEFAULT)
+    words = {word.strip() for word in f"{versions},{installed}".split(",")}
+    ordered = sorted(words, key=lambda word: [*map(int, re.findall(r"\d+", word))])
+    names = [DEFAULT if word == installed else f"{DEFAULT}=={word}" for word in ordered]
+    refuse((len(names) == 1, f"{versions} is installed: name another release to compare it with"))
+    missing = [name for name in names if is_release(name) and not is_here(name)]
     if missing:
         raise MissingEngineError(_ADD.format(" and ".join(missing), " ".join(missing)))
-    return [*others, DEFAULT]
+    return names
 
 
 def is_here(name: str) -> bool:
-    """Whether a release has an environment."""
+    """Whether a release has an environment.
+
+    Raises:
+        BadInputError: As `version_of`.
+    """
+    version_of(name)
     return _python_in(folder() / name).exists()
 
 
@@ -132,14 +138,10 @@ def published(since: str) -> list[str]:
         reason = done.stderr.strip().rpartition("\n")[2] or "pip does not say"
         raise EngineError(f"the releases of {DEFAULT} cannot be listed: {reason}")
     installed = engine_version(DEFAULT)
-    versions = line[1].replace(" ", "").split(",")[::-1]
-    if since not in versions or since == installed:
-        raise BadInputError(f"the package index has no {DEFAULT}=={since} before {installed}")
-    end = versions.index(installed) if installed in versions else None
-    return [
-        *(f"{DEFAULT}=={version}" for version in versions[versions.index(since) : end]),
-        DEFAULT,
-    ]
+    # The newest is the first; the index may not have the one that is installed.
+    older = f", {line[1]}".rpartition(f", {installed}, ")[2].strip(", ").split(", ")
+    refuse((since not in older, f"the package index has no {DEFAULT}=={since} before {installed}"))
+    return [*(f"{DEFAULT}=={version}" for version in older[older.index(since) :: -1]), DEFAULT]
 
 
 def _python_in(place: Path) -> Path:
@@ -152,8 +154,10 @@ def releases() -> Iterator[Release]:
         settings = place / "pyvenv.cfg"
         text = settings.read_text(encoding="utf-8") if settings.exists() else ""
         python = re.search(r"^version(?:_info)? *= *(\S+)", text, re.MULTILINE)
-        files = (file for file in place.rglob("*") if not file.is_symlink() and file.is_file())
-        yield Release(place.name, python[1] if python else "", sum(f.stat().st_size for f in files))
+        files = (file for file in place.rglob("*") if not file.is_dir())
+        yield Release(
+            place.name, python[1] if python else "", sum(file.lstat().st_size for file in files)
+        )
 
 
 def add(name: str, python: str = sys.executable, say: Callable[[str], object] = print) -> None:
@@ -172,8 +176,7 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
     if is_here(name):
         say(f"{name} is here already")
         return
-    if shutil.which(python) is None:
-        raise BadInputError(f"there is no Python {python!r} to make it with")
+    refuse((shutil.which(python) is None, f"there is no Python {python!r} to make it with"))
     home.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=home) as made:
         place = Path(made, "it")
@@ -246,12 +249,11 @@ def around_a_change(
 def _run(name: str, *command: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)  # noqa: PLW1510
     if done.returncode:
-        lines = (done.stderr or done.stdout).strip().splitlines()
-        errors = [line for line in lines if line.lower().startswith("error")] or lines[-1:]
-        reason = errors[-1] if errors else f"exit code {done.returncode}"
+        lines = (done.stderr or done.stdout).strip().splitlines() or [f"code {done.returncode}"]
+        errors = [line for line in lines if line.lower().startswith("error")] or lines
         free = shutil.disk_usage(folder()).free
         room = f"; {folder()} has room for {free / 1e6:.0f} MB" if free < _LARGE else ""
-        raise EngineError(f"{name} cannot be installed: {reason}{room}")
+        raise EngineError(f"{name} cannot be installed: {errors[-1]}{room}")
 
 
 def remove(name: str) -> None:
@@ -263,6 +265,5 @@ def remove(name: str) -> None:
     version_of(name)
     if not os.path.lexists(folder() / name):  # one whose Python is gone can be removed, too
         raise MissingEngineError(_ADD.format(name, name), engine=name)
-    gone = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=folder()))
-    (folder() / name).rename(gone / "it")  # at once: nobody finds a part of it
-    shutil.rmtree(gone)
+    with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=folder()) as gone:
+        (folder() / name).rename(Path(gone, "it"))  # at once: nobody finds a part of it

@@ -21,20 +21,20 @@ def load(file, text, names):
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(text) if text else mujoco.MjModel.from_xml_path(file)
-    memory = [("warmstart", model.nv)]
-    said = {"version": f"made up on {mujoco.__version__}", "memory": memory, "untold": UNTOLD}
     known = [name for name in names if hasattr(*place_of(model, name))]
-    return model, said, {name: getattr(*place_of(model, name)) for name in known}
+    return (
+        model,
+        {"version": f"made up on {mujoco.__version__}"},
+        {name: np.asarray(getattr(*place_of(model, name))) for name in known},
+    )
 
 
 def edit(model, edits, flags):
-    """Another model with other numbers; it has no flags."""
-    model = model.__copy__()
+    """Other numbers; it has no flags."""
     for name, values in edits.items():
         place, field = place_of(model, name)
         now = getattr(place, field)
         setattr(place, field, np.reshape(values, np.shape(now)).astype(np.asarray(now).dtype))
-    return model
 
 
 def place_of(model, name):
@@ -46,10 +46,13 @@ def place_of(model, name):
 class Simulation:
     """One simulation."""
 
+    keeps_memory, untold = True, UNTOLD
+
     def __init__(self, model):
         import mujoco
 
         self.engine, self.model, self.data = mujoco, model, mujoco.MjData(model)
+        self.memory = [("warmstart", model.nv)]
 
     def place(self, vector):
         data, nq, nv = self.data, self.model.nq, self.model.nv

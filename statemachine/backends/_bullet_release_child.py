@@ -6,7 +6,6 @@ drives it, is the same for every release.
 
 from __future__ import annotations
 
-import functools
 import pickle
 import sys
 from importlib.metadata import version
@@ -23,25 +22,29 @@ class SentWorld:
     """A world that was sent."""
 
     def __init__(self, model) -> None:
-        self.world = model.pop()
-        self.memory = [length for _, length in self.world.memory_layout]
+        self.world = world = model()
+        self.memory, self.untold = world.memory_layout, world.untold
+        self.keeps_memory = world.keeps_memory
 
     def _moment(self, vector):
-        nq = len(self.world.qpos0)
-        nv = len(vector) - nq - sum(self.memory)
-        qpos, qvel, *memory = np.split(vector, np.cumsum([nq, nv, *self.memory])[:-1])
+        nq, lengths = len(self.world.qpos0), [length for _, length in self.memory]
+        nv = len(vector) - nq - sum(lengths)
+        qpos, qvel, *memory = np.split(vector, np.cumsum([nq, nv, *lengths])[:-1])
         return Moment(qpos, qvel, self.ctrl, memory)
 
     def place(self, vector) -> None:
         """Take a state, in a world without traces of another."""
         self.ctrl = np.zeros(0)  # it comes
-        self.start = start = self._moment(vector)
+        self.now, self.start = vector, self._moment(vector)
+        start = self.start
         self.world = self.world.renewed()
         self.world.place(start.qpos, start.qvel, start.memory)
 
     def state(self):
-        """The state, in a row."""
-        return np.concatenate([*self.world.read(), *self.world.memory])
+        """The state, in a row; as it was placed until a step is taken, since reading rounds."""
+        if self.now is None:
+            self.now = np.concatenate([*self.world.read(), *self.world.memory])
+        return self.now
 
     def command(self, ctrl) -> None:
         """Take a command."""
@@ -52,6 +55,7 @@ class SentWorld:
         """Take engine steps; the last one of a call is taken by itself."""
         if steps == 1:
             self.start = self._moment(self.state())
+        self.now = None
         return self.world.advance(steps, fastest)
 
     def forward(self) -> None:
@@ -63,19 +67,18 @@ class SentWorld:
         """All that the engine tells, by name."""
         values = derived_by(self.world, self.start)
         contacts = vars(values.pop("contacts"))
-        return {name: values[name] for name in values.keys() - self.world.untold} | contacts
+        return {name: values[name] for name in values.keys() - self.untold} | contacts
 
 
 Simulation = SentWorld
 
 
 def load(file, text, names):
-    """The world that a Model's opener makes, which is sent in the place of a text."""
-    world = _opener(text)()
-    said = {"version": version("pybullet"), "memory": world.memory_layout}
-    return [world], {**said, "untold": sorted(world.untold)}, {}
-
-
-@functools.lru_cache(8)
-def _opener(text):
-    return pickle.loads(text)
+    """What opens the worlds of a Model, in the place of a text; `file` is MuJoCo's release."""
+    here, there = version("pybullet"), version("mujoco")
+    if there != file:
+        raise ImportError(
+            f"its environment has MuJoCo {there}, not {file}: "
+            f"statemachine engines remove pybullet=={here}, then add"
+        )
+    return pickle.loads(text), {"version": here}, {}

@@ -4,29 +4,34 @@ It is run by the interpreter of the engine's environment, on Python 3.9 or later
 only, and imports nothing of this package. Its argument is a file that knows the engine, and has
 
 - `load(file, text, names)`: a model of a file, or of its text where that is not empty; what is
-  said of it, and numeric fields of those names, if the engine has such. What is said:
-  "version" of the engine; "memory", name and length of each array that the engine remembers
-  from step to step beside qpos and qvel; "untold", names of derived arrays that it does not tell,
-  which may be left out;
-- `Simulation(model)`: a world. `place(vector)` takes qpos, qvel and the memory in a row, so that
-  nothing of before is left; `state()` gives the same vector; `command(ctrl)` takes a command.
-  `advance(steps, fastest)` takes engine steps, up to one after which a position is beyond 1e10 or
-  a velocity beyond `fastest`, and returns how many. `forward()` derives of the present. `derived()`
-  gives what is derived, of the moment that the last step started from or of the present after
-  `forward`, by name, and of the contacts geom, dist, pos, frame, force and torque;
-- `edit(model, edits, flags)`, if it can change a model: another one, with other values in fields.
+  said of it, "version" of the engine at least; and numeric fields of those names, if the engine has
+  such;
+- `Simulation(model)`: a world; those of a model share it. `memory` is name and length of each
+  array that the engine remembers from step to step beside qpos and qvel, `keeps_memory` whether
+  a write into qpos or qvel leaves them as they are, `untold` names of derived arrays that it does
+  not tell.
+  `place(vector)` takes qpos, qvel and the memory in a row, so that nothing of before is left;
+  `state()` gives the same vector; `command(ctrl)` takes a command. `advance(steps, fastest)` takes
+  engine steps, up to one after which a position is beyond 1e10 or a velocity beyond `fastest`, and
+  returns how many. `forward()` derives of the present. `derived()` gives what is derived, of the
+  moment that the last step started from or of the present after `forward`, by name, and of the
+  contacts geom, dist, pos, frame, force and torque;
+- `edit(model, edits, flags)`, if it can change a model: other values in fields, and these flags.
 
 A message and its answer are pickled: what is said, and arrays as shapes and bytes, since an older
-NumPy cannot read the arrays of a later one. The process ends with its input.
+NumPy cannot read the arrays of a later one. The process ends with its input, in the midst of a
+step, too; on Windows after the step.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import pickle
 import runpy
 import select
 import sys
+import threading
 import time
 from types import SimpleNamespace
 
@@ -50,8 +55,7 @@ def await_message(pipe):
 
 def send(pipe, said, arrays) -> None:
     """Send a message: what is said, and arrays of numbers by name."""
-    numbers = {name: np.asarray(array, float) for name, array in arrays.items()}
-    packed = {name: (array.shape, array.tobytes()) for name, array in numbers.items()}
+    packed = {name: (a.shape, a.dtype.str, a.tobytes()) for name, a in arrays.items()}
     pickle.dump((said, packed), pipe, _PROTOCOL)
     pipe.flush()
 
@@ -61,7 +65,8 @@ def receive(pipe):
     await_message(pipe)
     said, packed = pickle.load(pipe)
     return said, {
-        name: np.frombuffer(b).reshape(shape).copy() for name, (shape, b) in packed.items()
+        name: np.frombuffer(buffer, kind).reshape(shape).copy()
+        for name, (shape, kind, buffer) in packed.items()
     }
 
 
@@ -77,19 +82,22 @@ class Answerer:
         self.things[self.number] = thing
         return self.number
 
-    def load(self, job, _):
-        """Compile a file; numeric fields of the compiled model that were asked for."""
-        model, said, fields = self.engine.load(job["file"], job["text"], job["fields"])
-        return {"model": self.keep(model), **said}, fields
-
-    def edit(self, job, arrays):
-        """A copy of a model with other values in some fields."""
-        model = self.engine.edit(self.things[job["model"]], arrays, job["flags"])
-        return {"model": self.keep(model)}, {}
+    def load(self, job, edits):
+        """Compile a file, and edit fields; the fields that were asked for, as the file has them."""
+        model, said, fields = self.engine.load(job["file"], job["text"], job.get("fields", ()))
+        read = (array.tobytes() for array in fields.values())
+        digest = hashlib.sha256(b"".join([repr(said).encode(), *read])).hexdigest()
+        if job.get("digest", digest) != digest:
+            raise ValueError(job["file"] + " is another file than when it was loaded")
+        if edits or job.get("flags"):
+            self.engine.edit(model, edits, job["flags"])
+        return {"model": self.keep(model), "digest": digest, **said}, fields
 
     def make(self, job, _):
         """A world of a model."""
-        return {"world": self.keep(self.engine.Simulation(self.things[job["model"]]))}, {}
+        world = self.engine.Simulation(self.things[job["model"]])
+        said = {name: getattr(world, name) for name in ("memory", "keeps_memory", "untold")}
+        return {"world": self.keep(world), **said}, {}
 
     def run(self, job, arrays):
         """Place a state if one is given, take a command and steps, and one more if it is asked."""
@@ -97,7 +105,7 @@ class Answerer:
         if "state" in arrays:
             world.place(arrays["state"])
         world.command(arrays["ctrl"])
-        taken = world.advance(job["steps"], job["fastest"])
+        taken = world.advance(job["steps"], job["fastest"]) if job["steps"] else 0
         states = {"before": world.state()}
         if taken == job["steps"] and job["ahead"]:
             world.advance(1, np.inf)
@@ -114,10 +122,20 @@ class Answerer:
         return {}, world.derived()
 
 
+def end_with(pipe) -> None:
+    """End when nobody is left at the other side of a pipe."""
+    end = select.poll()
+    end.register(pipe, 0)  # its end is told unasked
+    end.poll()
+    os._exit(0)
+
+
 def main() -> None:
     """Answer until there is nobody to ask."""
     source, out = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what an engine prints is no answer
+    if hasattr(select, "poll"):
+        threading.Thread(target=end_with, args=(source,), daemon=True).start()
     server = Answerer(SimpleNamespace(**runpy.run_path(sys.argv[1])))
     while True:
         try:

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, DivergedError, EngineError
+from ..errors import DivergedError, EngineError
 from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Ints, Model, State
-from ..interface.options import HUGE, check_entries, check_writable, unsupported
+from ..interface.options import HUGE, check_entries, check_writable, engine_steps, unsupported
 from ._hidden_world import HiddenWorld, LookAhead, Memory, Moment, bounded
 
 
@@ -65,7 +65,6 @@ class Machine:
         self._bounds = np.full(model.nq, HUGE), np.minimum(model.max_qvel, HUGE)
         self._fastest = float(self._bounds[1].min(initial=HUGE))
         self.world = model._open_world()
-        self._no_memory = tuple(np.zeros(size) for _, size in self.world.memory_layout)
         self.qpos, self.qvel = np.zeros(model.nq), np.zeros(model.nv)
         self.ctrl = np.zeros(model.nu)
         self._delay_steps = np.rint(model.actuator_delay / self.world.timestep).astype(np.int64)
@@ -77,10 +76,11 @@ class Machine:
         """Be in the default state, or in a keyframe's."""
         if key is None:
             still, silent = np.zeros(len(self.qvel)), np.zeros(len(self.ctrl))
-            self.restart(0.0, Moment(self.world.qpos0, still, silent, self._no_memory))
+            start = Moment(self.world.qpos0, still, silent, self.world.memory_at(None))
+            self.restart(0.0, start)
         else:
             frame = self._model.keyframes[key]
-            start = Moment(frame.qpos, frame.qvel, frame.ctrl, self._no_memory)
+            start = Moment(frame.qpos, frame.qvel, frame.ctrl, self.world.memory_at(key))
             silent = np.zeros((self._longest_delay, len(self.ctrl)))
             self.restart(frame.time, start, None if self._model._holds_start else silent)
 
@@ -126,9 +126,7 @@ class Machine:
 
     def run(self, _model: None, _data: None, nstep: int = 1) -> None:
         """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
-        steps = nstep * self._substeps
-        if steps >= 2**31:
-            raise BadInputError(f"nstep {nstep} × {self._substeps} substeps is too large")
+        steps = engine_steps(nstep, self._substeps)
         check_writable(self.qpos, "qpos")
         check_writable(self.qvel, "qvel")
         world = self.world
@@ -136,13 +134,13 @@ class Machine:
             acting = self._model._acting("ctrl", self.ctrl)
             check_entries(acting, "ctrl", self._model._coordinate_name)
             self._command()
-        if self._written:
+        written = self._written
+        if written:
             check_entries(self.qpos, "qpos", self._model._coordinate_name)
             check_entries(self.qvel, "qvel", self._model._coordinate_name)
             self._model._check_quaternions(self.qpos)
-            self._place(self._no_memory)
-        elif self._world_is_elsewhere:
-            self._place(self._memory)
+        if written or self._world_is_elsewhere:
+            self._place(self._remembered(written))
         self._used, start = True, world.memory
         derived_before = self.moment, self.derived
         try:
@@ -213,12 +211,15 @@ class Machine:
         """Whether qpos or qvel is no longer what it was left at."""
         return self._last_state[2:] != (self.qpos.tobytes(), self.qvel.tobytes())
 
+    def _remembered(self, written: bool) -> Memory:
+        """What the world is to know, at the present, of the step before."""
+        if written and not self.world.keeps_memory:  # it belongs to another state
+            return self.world.memory_at(None)
+        return self._memory if self._world_is_elsewhere else self.world.memory
+
     def present(self) -> Moment:
         """All that decides the next engine step, with the command that acts in it."""
-        if self._written:  # what the world remembers belongs to another state
-            memory = self._no_memory
-        else:
-            memory = self._memory if self._world_is_elsewhere else self.world.memory
+        memory = self._remembered(self._written)
         ctrl = self._model._acting("ctrl", acting(self.ctrl, self.given, self._delay_steps))
         return Moment(self.qpos.copy(), self.qvel.copy(), ctrl, memory)
 

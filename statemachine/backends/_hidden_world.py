@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..interface import DERIVED, POSES, Array
 from ..interface.options import HUGE
 
@@ -47,6 +49,8 @@ class HiddenWorld(ABC):
         errors: What the engine raises when it gives up.
         untold: Names of `records.DERIVED`, and "contacts", that this engine does not tell.
         memory_layout: Name and length of each array of `memory`, which a State then has.
+        keeps_memory: Whether a write into qpos or qvel leaves that as it is; else it is then
+            that of the default state.
         timestep: Simulated time of one engine step [s].
         qpos0: (nq,) positions of the default state.
         raw: The engine's own object, which `Data.raw` gives.
@@ -56,6 +60,7 @@ class HiddenWorld(ABC):
     errors: tuple[type[Exception], ...] = ()
     untold: frozenset[str] = frozenset()
     memory_layout: tuple[tuple[str, int], ...] = ()
+    keeps_memory = False
     timestep: float
     qpos0: Array
     raw: Any
@@ -71,7 +76,7 @@ class HiddenWorld(ABC):
         Args:
             qpos: (nq,) [rad or m], MuJoCo's conventions; finite, no quaternion is zero.
             qvel: (nv,) [rad/s or m/s].
-            memory: Of the step before that state; zeros where there was none.
+            memory: Of the step before that state, or that of `memory_at` where there was none.
         """
 
     @abstractmethod
@@ -152,6 +157,10 @@ class HiddenWorld(ABC):
         Then this one is closed.
         """
         return self
+
+    def memory_at(self, key: int | None) -> Memory:
+        """The memory that the default state has (None), or a keyframe: zeros by default."""
+        return tuple(np.zeros(length) for _, length in self.memory_layout)
 
     @property
     def memory(self) -> Memory:

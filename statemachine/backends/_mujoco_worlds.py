@@ -15,9 +15,8 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from ..errors import BadInputError
 from ..interface import Array, Ints, Model, State
-from ..interface.options import check_vector, unsupported
+from ..interface.options import check_vector, engine_steps, unsupported
 from ..interface.worlds import WRITABLE, Worlds, check_memory
 from ._delays import hold, places_of, with_room_of
 from ._mujoco_alarms import (
@@ -127,7 +126,7 @@ class MujocoWorlds(Worlds):
             setattr(self, name, None)
 
     def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
-        count = self._engine_steps(nstep)
+        count = engine_steps(nstep, self._base.substeps)
         errors: dict[int, Exception] = {}
         if self.model._quaternions:
             qpos = self.qpos if len(ids) == self.n else self.qpos[ids]
@@ -140,14 +139,6 @@ class MujocoWorlds(Worlds):
     def _forward(self, ids: Ints) -> Mapping[int, Exception]:
         self._before[:] = self._changing
         return self._call(ids, 0, self._batch.forward)
-
-    def _engine_steps(self, nstep: int) -> int:
-        count = nstep * self._base.substeps
-        if count >= 2**31:  # the engine counts in a C int
-            raise BadInputError(
-                f"nstep {nstep} × {self._base.substeps} substeps is too large for one call"
-            )
-        return count
 
     def _call(
         self, ids: Ints, count: int, call: Callable[[Ints | None], object]
@@ -257,7 +248,7 @@ class MujocoWorlds(Worlds):
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
     ) -> Mapping[int, Exception]:
         errors: dict[int, Exception] = {}
-        if self._engine_steps(every) == 1 and len(ids):
+        if engine_steps(every, self._base.substeps) == 1 and len(ids):
             ids = self._roll_out(ids, nstep, arrays, ctrl)
         for k in range(nstep // every if len(ids) else 0):
             if ctrl is not None:

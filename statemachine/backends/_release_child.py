@@ -15,6 +15,11 @@ HUGE = 1e10
 POSES = ("xpos", "xquat", "site_xpos", "site_xmat")
 FORCES = ("qacc", "qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
 _KINDS = mujoco.mjtConstraint
+# What a state is, by prefix and name.
+STATE = (
+    *(("", "qpos"), ("", "qvel"), ("qacc_", "warmstart")),
+    *(("", "act"), ("", "mocap_pos"), ("", "mocap_quat")),
+)
 KINDS = {"disable": mujoco.mjtDisableBit, "enable": mujoco.mjtEnableBit}
 SPLIT = {"mjDSBL_PASSIVE": ("mjDSBL_SPRING", "mjDSBL_DAMPER")}  # flags that became two later
 _ALL = mujoco.mjtWarning
@@ -34,21 +39,24 @@ PARTS = {
 class Simulation:
     """One MjData, and how its State is put and read."""
 
+    keeps_memory, untold = True, ()
+
     def __init__(self, model) -> None:
         self.model, self.data = model, mujoco.MjData(model)
-        self.sizes = [model.nq, model.nv, model.nv, model.na]
+        parts = {name: getattr(self.data, f"{prefix}{name}").ravel() for prefix, name in STATE}
+        self.parts = [part for part in parts.values() if len(part)]  # of its own memory
+        self.cuts = np.cumsum([len(part) for part in self.parts])[:-1]
+        self.memory = [(name, len(parts[name])) for _, name in STATE[2:] if len(parts[name])]
 
     def place(self, vector) -> None:
-        """Take qpos, qvel, the warm start and act, so that nothing of before is left."""
+        """Take qpos, qvel and the memory, so that nothing of before is left."""
         mujoco.mj_resetData(self.model, self.data)
-        parts = np.split(vector, np.cumsum(self.sizes)[:-1])
-        for name, part in zip(("qpos", "qvel", "qacc_warmstart", "act"), parts):  # noqa: B905
-            getattr(self.data, name)[:] = part
+        for part, values in zip(self.parts, np.split(vector, self.cuts)):  # noqa: B905
+            part[:] = values
 
     def state(self):
-        """The same four, in a row."""
-        data = self.data
-        return np.concatenate([data.qpos, data.qvel, data.qacc_warmstart, data.act])
+        """The same, in a row."""
+        return np.concatenate(self.parts)
 
     def command(self, ctrl) -> None:
         """Take a command."""
@@ -131,18 +139,15 @@ def load(file, text, names):
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     fields = {}
     for name in names:
-        holder, field = held(model, name)
-        value = getattr(holder, field, None)
+        value = getattr(*held(model, name), None)
         if isinstance(value, (np.ndarray, int, float)):
             fields[name] = np.asarray(value, float)
-    memory = [("warmstart", model.nv)] + [("act", model.na)] * bool(model.na)
     flags = {f"opt.{kind}flags": flags_of(model, kind) for kind in KINDS}
-    return model, {"version": mujoco.__version__, "memory": memory, "flags": flags}, fields
+    return model, {"version": mujoco.__version__, "flags": flags}, fields
 
 
 def edit(model, edits, flags):
-    """A copy of a model with other values in some fields, and these flags."""
-    model = copy.copy(model)
+    """Write other values into some fields of a model, and these flags."""
     for name, value in edits.items():
         holder, field = held(model, name)
         now = getattr(holder, field)
@@ -150,6 +155,10 @@ def edit(model, edits, flags):
             now[...] = value.reshape(now.shape)
         else:
             setattr(holder, field, type(now)(value))
+    if "dof_M0" in edits:  # constants follow; the mean, which 3.3 scales with, stays in 4.0
+        other = copy.copy(model)
+        mujoco.mj_setConst(other, mujoco.MjData(other))
+        model.stat.meaninertia = other.stat.meaninertia
     for name, wanted in flags.items():
         holder, field = held(model, name)
         kinds = KINDS[field[: -len("flags")]].__members__
@@ -158,7 +167,6 @@ def edit(model, edits, flags):
         if unknown:
             raise ValueError("it has no flag " + ", ".join(unknown))
         setattr(holder, field, sum(int(kinds[f]) for f in kinds if f in merged.union(wanted)))
-    return model
 
 
 def flags_of(model, kind):

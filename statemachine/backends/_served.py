@@ -7,13 +7,14 @@ import pickle
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ..errors import EngineError
+from ..installed import DEFAULT, engine_version
 from ..interface import DERIVED, Array, Contacts
 from ..interface.options import HUGE
 from ..processes.pipes import PipedChild
@@ -39,6 +40,11 @@ class ServedEngine(NamedTuple):
     child: str
     title: str
 
+    @property
+    def anew(self) -> str:
+        """What to type to make the environment of a release anew."""
+        return f"statemachine engines remove {self.name}, then add"
+
 
 class LostError(Exception):
     """The process of an engine has ended."""
@@ -58,6 +64,7 @@ class Server:
         command = [engine.python, "-I", "-u", _FILE, engine.child]
         self._engine, self._turn, self.lives = engine, threading.RLock(), True
         self.forgotten = deque[int]()  # models and worlds that it is to forget at the next call
+        self._models = weakref.WeakKeyDictionary[Callable[..., Any], int]()
         self._process = PipedChild(command, {**os.environ, "MUJOCO_GL": "disable"})
         self.pid = self._process.pid
 
@@ -97,21 +104,39 @@ class Server:
         return answer, values
 
     def load(
-        self, text: str | bytes, file: str = "", fields: Sequence[str] = ()
+        self,
+        text: str | bytes,
+        file: str,
+        edits: Mapping[str, Array] = MappingProxyType({}),
+        **job: Any,
     ) -> tuple[dict[str, Any], dict[str, Array]]:
         """Let it load a model; its number and what is said of it, and numeric fields by name.
+
+        Args:
+            text: Of the file, or "".
+            file: Its path.
+            edits: Numeric fields that are then another than in the file, by name.
+            **job: "fields", names of those that are told; "digest" of what was read before; and
+                "flags", by the names of their sets.
 
         Raises:
             LostError, AnswerError: As `ask`.
             EngineError: The environment of a release has another one.
         """
-        said, values = self.ask("load", file=file, text=text, fields=fields)
+        said, values = self.ask("load", edits, file=file, text=text, **job)
         name, version = self._engine.name, said["version"]
         if is_release(name) and version != version_of(name):
             self.forgotten.append(said["model"])
-            again = f"statemachine engines remove {name}, then add"
-            raise EngineError(f"the environment of {name} has {version}: {again}")
+            raise EngineError(f"the environment of {name} has {version}: {self._engine.anew}")
         return said, values
+
+    def number(self, opened: Callable[[Server], int]) -> int:
+        """The number of a model there: all worlds that are opened alike share it."""
+        with self._turn:
+            if opened not in self._models:
+                self._models[opened] = opened(self)
+                weakref.finalize(opened, self.forgotten.append, self._models[opened])
+            return self._models[opened]
 
 
 class ServedWorld(HiddenWorld):
@@ -122,28 +147,25 @@ class ServedWorld(HiddenWorld):
     def __init__(
         self,
         engine: ServedEngine,
-        opened: Callable[[Server], tuple[int, dict[str, Any]]],
-        qpos0: Array,
-        sizes: tuple[int, int],
-        timestep: float,
-        ahead: bool,
+        opened: Callable[[Server], int],
+        compiled: Any,
     ) -> None:
         """Open it.
 
         Args:
             engine: Whose process it is in.
-            opened: Loads the model there; its number, and what is said of it.
-            qpos0: (nq,) positions of the default state.
-            sizes: nv and nu.
-            timestep: Of an engine step [s].
-            ahead: Whether the steps of a call have one command, so that one exchange takes all.
+            opened: Loads the model there; its number. All worlds of a Model have the same one.
+            compiled: The mjModel, in the terms of the installed release.
         """
-        self.engine, self._engine, self._opened, self._ahead = engine.title, engine, opened, ahead
-        self.timestep, self.qpos0 = timestep, qpos0
-        self._ctrl, self._fastest = np.zeros(sizes[1]), HUGE
+        self.engine, self._engine, self._opened = engine.title, engine, opened
+        self._compiled, self.timestep = compiled, float(compiled.opt.timestep)
+        self.qpos0 = compiled.qpos0
+        # Steps of a call that have one command take one exchange.
+        self._ahead = not compiled.actuator_delay.any()
+        self._ctrl = np.zeros(compiled.nu)
         self._derived: dict[str, Array] | None = None
         self._begin()
-        lengths = [len(qpos0), sizes[0], *(length for _, length in self.memory_layout)]
+        lengths = [compiled.nq, compiled.nv, *(length for _, length in self.memory_layout)]
         self._cuts = np.cumsum(lengths)[:-1]
         self._state, self._reserve = np.zeros(sum(lengths)), None
 
@@ -151,17 +173,15 @@ class ServedWorld(HiddenWorld):
         """Be in the process of the engine, which begins anew where it has ended."""
         self._placed = True
         try:
-            self._server = Server.of(self._engine)
-            model, said = self._opened(self._server)
-            numbers = [model]
-            # No call: it may be collected in the midst of another.
-            self._end = weakref.finalize(self, self._server.forgotten.extend, numbers)
-            self._world = self._server.ask("make", model=model)[0]["world"]
-            numbers.append(self._world)
+            self._server = server = Server.of(self._engine)
+            said, _ = server.ask("make", model=server.number(self._opened))
         except (LostError, AnswerError, OSError) as error:
             raise EngineError(f"{self.engine} cannot make a world: {error}") from error
+        self._world = said["world"]
+        # No call: it may be collected in the midst of another.
+        self._end = weakref.finalize(self, server.forgotten.append, self._world)
         self.memory_layout = tuple((name, int(length)) for name, length in said["memory"])
-        self.untold = frozenset(said.get("untold", ()))
+        self.keeps_memory, self.untold = said["keeps_memory"], frozenset(said["untold"])
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
@@ -172,7 +192,7 @@ class ServedWorld(HiddenWorld):
         if self._reserve is not None:  # it was taken under another command
             self._placed, self._reserve = True, None
 
-    def _run(self, steps: int) -> int:
+    def advance(self, steps: int, fastest: float) -> int:
         if not self._server.lives:
             self._begin()
         placed = {"state": self._state} if self._placed else {}
@@ -181,25 +201,34 @@ class ServedWorld(HiddenWorld):
             {"ctrl": self._ctrl, **placed},
             world=self._world,
             steps=steps,
-            fastest=self._fastest,
+            fastest=fastest,
             ahead=self._ahead or not steps,
         )
         self._placed, self._derived, self._state = False, None, states["before"]
         self._reserve = states.get("after")
         return answer["taken"]
 
-    def advance(self, steps: int, fastest: float) -> int:
-        self._fastest = fastest
-        return self._run(steps)
-
     def step(self) -> None:
         if self._reserve is None:
-            self._run(0)
+            self.advance(0, HUGE)
         self._state, self._reserve = cast("Array", self._reserve), None
 
     def read(self) -> tuple[Array, Array]:
         qpos, qvel, *_ = np.split(self._state, self._cuts)
         return qpos.copy(), qvel.copy()
+
+    def memory_at(self, key: int | None) -> Memory:
+        compiled = self._compiled
+        mocap = compiled.body_mocapid >= 0
+        start = {"mocap_pos": compiled.body_pos[mocap], "mocap_quat": compiled.body_quat[mocap]}
+        if key is not None:
+            start = {
+                "act": compiled.key_act[key],
+                "mocap_pos": compiled.key_mpos[key],
+                "mocap_quat": compiled.key_mquat[key],
+            }
+        zeros = zip(self.memory_layout, super().memory_at(key), strict=True)
+        return tuple(np.ravel(start.get(name, zero)) for (name, _), zero in zeros)
 
     @property
     def memory(self) -> Memory:
@@ -208,26 +237,23 @@ class ServedWorld(HiddenWorld):
     def look(self, moment: Moment) -> None:
         if not self._server.lives:
             self._begin()
-        state = np.concatenate([moment.qpos, moment.qvel, *moment.memory])
-        given = {"ctrl": moment.ctrl, "state": state}
+        self.place(moment.qpos, moment.qvel, moment.memory)
+        given = {"ctrl": moment.ctrl, "state": self._state}
         _, self._derived = self._server.ask("look", given, world=self._world)
-        self._placed = True
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
         if self._derived is None:
             _, self._derived = self._server.ask("look", world=self._world)
-        arrays = dict(self._derived)
-        values: dict[str, Any] = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
+        arrays: dict[str, Any] = dict(self._derived)
+        values = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
         if "contacts" not in self.untold:
-            geom = arrays.pop("geom").astype(np.int64)
-            values["contacts"] = Contacts(geom=geom, **arrays)
+            values["contacts"] = Contacts(**arrays)
         return values
 
     def close(self) -> None:
         self._end()
 
 
-def sent(opener: bytes, server: Server) -> tuple[int, dict[str, Any]]:
-    """A pickled opener of worlds, told to a process that has this package."""
-    said, _ = server.load(opener)
-    return said["model"], said
+def sent(opener: bytes, server: Server) -> int:
+    """The number that a pickled opener of worlds gets in a process that has this package."""
+    return server.load(opener, engine_version(DEFAULT))[0]["model"]

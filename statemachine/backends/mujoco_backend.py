@@ -30,7 +30,7 @@ from ..interface import (
     Model,
     State,
 )
-from ..interface.options import HUGE, TINY, check_vector, unsupported
+from ..interface.options import HUGE, TINY, check_vector, engine_steps, unsupported
 from ._delays import hold, saved
 from ._edits import CONSTANTS_FOLLOW, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
@@ -337,9 +337,7 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     mj_step, substeps = mujoco.mj_step, model.substeps
 
     def finer(engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1) -> None:
-        if nstep * substeps >= 2**31:  # the engine counts in a C int
-            raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
-        mj_step(engine_model, engine_data, nstep * substeps)
+        mj_step(engine_model, engine_data, engine_steps(nstep, substeps))
 
     advance = mj_step if substeps == 1 else finer
     qpos, low, high = memoryview(raw.qpos), -TINY, TINY

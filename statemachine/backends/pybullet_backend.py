@@ -225,10 +225,7 @@ class PybulletModel(HiddenModel):
         about = facts(raw)
         opener: Callable[[], HiddenWorld] = partial(DrivenWorld, plan, kind, acts)
         if there:
-            sizes, ahead = (int(raw.nv), int(raw.nu)), not about["actuator_delay"].any()
-            load_there = partial(sent, pickle.dumps(opener))
-            timestep = float(raw.opt.timestep)
-            opener = partial(ServedWorld, there, load_there, raw.qpos0, sizes, timestep, ahead)
+            opener = partial(ServedWorld, there, partial(sent, pickle.dumps(opener)), raw)
         super().__init__(
             opener,
             backend=there.name if there else "pybullet",

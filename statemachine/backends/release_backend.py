@@ -8,19 +8,20 @@ engine there makes of the file, and edits reach it by the names of fields.
 from __future__ import annotations
 
 import copy
-import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, Literal, NamedTuple
 
 import mujoco
 import numpy as np
 
-from ..errors import EngineError, ModelError, UnsupportedError
+from ..errors import EngineError, ModelError, refuse
 from ..installed import DEFAULT, require
 from ..interface import Array, Capabilities
+from ..interface.options import unsupported
 from ..releases import engine_of, is_release, python_of, version_of
 from . import _release_child as child
 from ._edits import put
@@ -31,13 +32,19 @@ from .compiled import check_numbers, facts, fastest, spec_with_packages
 from .mujoco_backend import MujocoModel
 from .mujoco_backend import load as load_installed
 
-# Arrays that no motion depends on, and those that each release lays out in a way of its own.
+# Arrays that no motion depends on, and what each release computes of the others in its own way.
 _OWN = (
-    *("bvh", "cam", "flex", "hfield", "light", "mat_", "mesh", "name", "oct", "sensor", "skin"),
-    *("tex", "paths", "efm", "B_", "D_", "M_", "mapM", "mapD", "flg_", "ten_J"),
-    *("dof_length", "actuator_history", "sensor_history"),
+    *("bvh", "cam", "hfield_path", "light", "mat_", "mesh_path", "name", "sensor", "skin", "tex"),
+    *("paths", "efm", "B_", "D_", "M_", "mapM", "mapD", "flg_", "ten_J", "dof_length"),
+    *("actuator_history", "sensor_history"),
 )
-_SAME = ("nq", "nv", "nu", "na", "nbody", "njnt", "ngeom", "nsite", "ntendon", "neq", "nkey")
+# What is large and laid out in each release's own way: nobody sends it to another.
+_UNSENT = ("flex", "mesh", "oct")
+_SAME = (
+    *("nq", "nv", "nu", "na", "nbody", "njnt", "ngeom", "nsite", "ntendon", "neq", "nkey"),
+    "nmocap",
+)
+_NO_EDITS = MappingProxyType[str, Any]({})
 _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mjtEnableBit}
 
 
@@ -62,8 +69,9 @@ def load(
     require("pybullet")
     from .pybullet_backend import load as load_bullet
 
-    file = str(Path(__file__).with_name("_bullet_release_child.py"))
-    return load_bullet(path, defaults, there=ServedEngine(release, python, file, release))
+    file = Path(__file__).with_name("_bullet_release_child.py")
+    there = ServedEngine(release, python, str(file), f"PyBullet {version}")
+    return load_bullet(path, defaults, there=there)
 
 
 def served(
@@ -79,14 +87,22 @@ def served(
     def load_there(
         path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model"
     ) -> ServedModel:
-        if is_binary(os.fspath(path)):
-            raise ModelError(
-                f"{path} was compiled by one release of MuJoCo; {engine.title} wants its XML"
-            )
+        refuse(
+            (
+                is_binary(os.fspath(path)),
+                f"{path} was compiled by one release of MuJoCo; {engine.title} wants its XML",
+            ),
+            error=ModelError,
+        )
         installed = load_installed(path, defaults)
-        return ServedModel(_compiled(engine, Path(path), installed), capabilities)
+        return ServedModel(_compiled(engine, installed), capabilities)
 
     return load_there
+
+
+def _opened(reading: FileReading, edits: Mapping[str, Any], server: Server) -> int:
+    """The number that the model of a file with some fields edited has there."""
+    return _loaded(server, reading.model, edits, digest=reading.digest)[0]["model"]
 
 
 class FileReading(NamedTuple):
@@ -107,22 +123,21 @@ class FileReading(NamedTuple):
     digest: str
 
 
-def _compiled(engine: ServedEngine, path: Path, installed: MujocoModel) -> FileReading:
+def _compiled(engine: ServedEngine, installed: MujocoModel) -> FileReading:
     """What an engine makes of a file that the installed release has compiled.
 
     Raises:
         ModelError: It cannot read the file, or finds other parts in it.
     """
-    raw, title = copy.copy(installed.raw), engine.title
+    raw, path, title = copy.copy(installed.raw), installed.path, engine.title
     try:
         server = Server.of(engine)
-        answer, fields, digest = _loaded(server, path, raw)
+        answer, fields = _loaded(server, installed)
     except AnswerError as error:
         raise ModelError(f"{title} cannot read {path}: {error}") from error
     except (LostError, OSError) as error:
-        anew = f"; to make it anew: statemachine engines remove {engine.name}, then add"
-        advice = anew if is_release(engine.name) else ""
-        raise EngineError(f"{title} cannot be run: {error}{advice}") from error
+        anew = f"; to make it anew: {engine.anew}" if is_release(engine.name) else ""
+        raise EngineError(f"{title} cannot be run: {error}{anew}") from error
     server.forgotten.append(answer["model"])
     for name in _SAME:
         if name in fields and int(fields[name]) != getattr(raw, name):
@@ -148,51 +163,42 @@ def _compiled(engine: ServedEngine, path: Path, installed: MujocoModel) -> FileR
         answer["version"],
         MujocoModel(raw, path, installed.substeps),
         frozenset(shared),
-        digest,
+        answer["digest"],
     )
 
 
 def _loaded(
-    server: Server, path: Path, raw: mujoco.MjModel
-) -> tuple[dict[str, Any], dict[str, Array], str]:
-    """The number of a model and what is said of it, its fields, and a digest of both."""
-    spec = spec_with_packages(path)
-    text, names = spec.to_xml() if spec else "", [*_SAME, *_fields(raw)]
-    answer, fields = server.load(text, str(path.absolute()), names)
-    said = repr([answer.get("flags"), answer["memory"], answer["version"]]).encode()
-    read = b"".join([said, *(array.tobytes() for array in fields.values())])
-    return answer, fields, hashlib.sha256(read).hexdigest()
+    server: Server, model: MujocoModel, edits: Mapping[str, Any] = _NO_EDITS, **digest: str
+) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Let an engine read the file of a model: as `Server.load`.
+
+    Args:
+        server: Its process.
+        model: What the installed release makes of the file.
+        edits: Numeric fields that are then another than in the file; flags by their names.
+        **digest: Of what was read in the file before.
+    """
+    spec = spec_with_packages(model.path)
+    return server.load(
+        spec.to_xml() if spec else "",
+        str(model.path.absolute()),
+        {name: value for name, value in edits.items() if name not in _FLAGS},
+        fields=[*_SAME, *_fields(model.raw)],
+        **digest,
+        flags={name: value for name, value in edits.items() if name in _FLAGS},
+    )
 
 
-def _opened(
-    reading: FileReading, edits: Mapping[str, Any], server: Server
-) -> tuple[int, dict[str, Any]]:
-    """A file with some fields edited: the number of its model there, and what is said of it."""
-    path = reading.model.path
-    said, _, digest = _loaded(server, path, reading.model.raw)
-    number = said["model"]
-    if digest != reading.digest:
-        server.forgotten.append(number)
-        raise AnswerError(f"{path} is another file than when it was loaded")
-    if edits:
-        arrays = {name: value for name, value in edits.items() if name not in _FLAGS}
-        flags = {name: value for name, value in edits.items() if name in _FLAGS}
-        try:
-            answer, _ = server.ask("edit", arrays, model=number, flags=flags)
-        finally:
-            server.forgotten.append(number)
-        number = answer["model"]
-    return number, said
-
-
-def _fields(raw: mujoco.MjModel) -> Iterator[str]:
+def _fields(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator[str]:
     """Names of the numeric fields of a compiled model that releases may have in common."""
     for name in dir(raw):
-        if not name.startswith(("_", *_OWN)) and isinstance(getattr(raw, name), np.ndarray):
+        if name.startswith(("_", *_OWN, *without)):
+            continue
+        if isinstance(getattr(raw, name), np.ndarray):
             yield name
-    for name in dir(raw.opt):
-        if not name.startswith("_") and f"opt.{name}" not in _FLAGS:
-            yield f"opt.{name}"
+    for holder in ("opt", "stat"):
+        names = [f"{holder}.{name}" for name in dir(getattr(raw, holder)) if name[0] != "_"]
+        yield from (name for name in names if name not in _FLAGS)
 
 
 def _field(raw: mujoco.MjModel, name: str) -> Any:
@@ -205,14 +211,14 @@ def _edits(reading: FileReading, raw: mujoco.MjModel) -> dict[str, Any]:
     Raises:
         UnsupportedError: The engine has no such field.
     """
-    edits, base, backend = dict[str, Any](), reading.model.raw, reading.engine.name
-    for name in (*_fields(raw), *_FLAGS):
+    edits, base = dict[str, Any](), reading.model.raw
+    for name in (*_fields(raw, ()), *_FLAGS):
         if np.array_equal(_field(raw, name), _field(base, name)):
             continue
         if name not in reading.shared:
-            reason = "it has no such field"
-            text = f"{backend} cannot be given another {name}: {reason}"
-            raise UnsupportedError(text, backend=backend, feature=name, reason=reason)
+            reason = "it has no such field, or lays it out in a way of its own"
+            about = SimpleNamespace(backend=reading.engine.name, capabilities=None)
+            raise unsupported(about, name, reason)
         kind = name.removeprefix("opt.").removesuffix("flags")
         edits[name] = child.flags_of(raw, kind) if name in _FLAGS else np.array(_field(raw, name))
     return edits
@@ -235,15 +241,7 @@ class ServedModel(HiddenModel):
         engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner
         edits = _edits(reading, engine.raw)
         super().__init__(
-            partial(
-                ServedWorld,
-                reading.engine,
-                partial(_opened, reading, edits),
-                inner.raw.qpos0.copy(),
-                (inner.nv, inner.nu),
-                float(inner.raw.opt.timestep),
-                not inner.actuator_delay.any(),
-            ),
+            partial(ServedWorld, reading.engine, partial(_opened, reading, edits), inner.raw),
             backend=reading.engine.name,
             engine_version=reading.version,
             raw=inner.raw,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import asdict
 from platform import python_version
 
 from ._common import PROGRAM, add_table, json_of
@@ -16,10 +15,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         "Other releases of MuJoCo, each in an environment of its own. Where an engine is named, "
         f"so can be a release: {PROGRAM} compare hold so101@mujoco==3.3.7 so101"
     )
-    parser.set_defaults(json=False)
+    add_table(parser, json_of())
     verbs = parser.add_subparsers(metavar="verb")
     listing = verbs.add_parser("list", help="those that are here, and their size")
-    add_table(listing, json_of())
+    add_table(listing, (*json_of(), {"default": argparse.SUPPRESS}))  # else it undoes the one above
     adding = verbs.add_parser("add", help="install a release")
     adding.add_argument("names", metavar="NAME", nargs="+", help="as mujoco==3.3.7")
     python = "the Python that it is to run on (default: this one)"
@@ -41,12 +40,12 @@ def run(options: argparse.Namespace) -> int:
 
     here = list(releases())
     if options.json:
-        print(dumps([asdict(release) for release in here]))
+        print(dumps(here))
         return 0
     own = [(f"{name}=={engine_version(name)}", python_version(), NONE) for name in available()[0]]
     rows = [(r.name, r.python, f"{r.size / 1e6:.0f} MB") for r in here]
-    hint = Text(f"To add one: {PROGRAM} engines add mujoco==3.3.7")
     table = Table(("release", "python", "size"), [*rows, *own])
+    hint = Text(f"To add one: {PROGRAM} engines add mujoco==3.3.7")
     origin = f"those with a size are in {folder()}, the others beside this program"
     terminal.show(Page("Releases of engines", origin, [table, hint]))
     return 0

@@ -79,13 +79,14 @@ def _simulate(options: argparse.Namespace, port: int) -> int:
     """A session on one engine or two."""
     from ..backends import load
     from ..drawing import drawing_of
+    from ..releases import engine_of
     from ..view.session import LiveSession
 
     name = options.model or _MODEL
-    backends = [options.backend, *([options.ghost] if options.ghost else [])]
+    backends = [name for name in (options.backend, options.ghost) if name]
     models = [load(name, backend=backend, menagerie=options.menagerie) for backend in backends]
     keyframe = _keyframe(options.keyframe, models[0])
-    engines = " and ".join(f"{model.backend} {model.engine_version}" for model in models)
+    engines = " and ".join(f"{engine_of(model.backend)} {model.engine_version}" for model in models)
     with LiveSession(models, keyframe, options.site) as session:
         _serve(options, session, drawing_of(models[0]), keyframe, port, f"{name} on {engines}")
     return 0

@@ -125,7 +125,8 @@ class Model(ABC):
 
     def __repr__(self) -> str:
         return (
-            f"<Model {self.path.stem} on {self.backend} {self.engine_version.partition(' ')[0]}: "
+            f"<Model {self.path.stem} on {self.backend.partition('==')[0]} "
+            f"{self.engine_version.partition(' ')[0]}: "
             f"nq={self.nq} nv={self.nv} nu={self.nu}, {self.timestep:g} s a step>"
         )
 

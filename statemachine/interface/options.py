@@ -39,6 +39,13 @@ def as_count(value: Any, name: str) -> int:
     return number
 
 
+def engine_steps(nstep: int, substeps: int) -> int:
+    """The steps that an engine takes in a call, or BadInputError."""
+    if nstep * substeps >= 2**31:
+        raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
+    return nstep * substeps
+
+
 def whole_number(value: Any) -> int | None:
     """`value` as an int if it is a whole number by type (True is not), else None."""
     if isinstance(value, (bool, np.bool_)):

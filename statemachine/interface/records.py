@@ -192,7 +192,10 @@ class State:
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{name} {size}" for name, size in self.layout)
-        return f"<State of {self.backend} {self.engine_version} at {self.time:g} s: {parts}>"
+        return (
+            f"<State of {self.backend.partition('==')[0]} {self.engine_version} "
+            f"at {self.time:g} s: {parts}>"
+        )
 
     @property
     def vector(self) -> Array:

@@ -31,6 +31,7 @@ from ..interface import Array
 from ..measures import largest
 from ..measures.text import apart, milliseconds, short_time
 from ..page import Block, Heading, Items, Page, Question, Table, Text, Verdict
+from ..releases import engine_of
 
 _CONDITION = re.compile(r"<!-- (?:if (?P<no>not )?(?P<name>\w+)|(?P<other>else)|end) -->")
 _PARTS = re.compile(r"^(?:[a-h]\)|>|-) ", re.MULTILINE)  # choices, a reason, items of a list
@@ -138,7 +139,7 @@ def origin(results: Mapping[str, Any]) -> str:
     """What a page was computed with: model and engine versions."""
     first = next(iter(results.values())).provenance
     engines = ", ".join(
-        f"{name} {result.provenance.versions[result.provenance.backend]}"
+        f"{engine_of(name)} {result.provenance.versions[result.provenance.backend]}"
         for name, result in results.items()
     )
     return f"{first.model_file} on {engines}, {milliseconds(first.timestep)} a step"

@@ -13,6 +13,7 @@ from ..errors import check_name
 from ..interface import Array, Contacts, JointType, Model
 from ..measures import ContactNames, Gap
 from ..measures.text import TINY
+from ..releases import engine_of
 from ..rotations import angle_between, matrix_from_quat
 
 WIDTH = 80
@@ -77,7 +78,7 @@ class Freshness:
         return next(row for row in self.rows if row.name == name)
 
     def __str__(self) -> str:
-        title = f"Derived values of {self.model} on {self.backend} {self.engine_version}"
+        title = f"Derived values of {self.model} on {engine_of(self.backend)} {self.engine_version}"
         cells = [(row.name, row.of, gaps_text(row.gaps) or "–") for row in self.rows]
         lines = table(("array", "of", "how far off"), cells)
         notes = (line for note in self.notes for line in textwrap.wrap(note, WIDTH))

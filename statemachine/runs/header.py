@@ -13,6 +13,7 @@ from typing import Any
 from ..errors import TraceError, refuse
 from ..interface import OPTIONS, JointType
 from ..interface.options import HUGE
+from ..releases import engine_of
 from .provenance import Provenance
 
 SCHEMA = 1
@@ -115,7 +116,7 @@ class Header:
     def label(self) -> str:
         """The backend and its version, and what is unusual about them."""
         version = self.provenance.versions.get(self.backend, "")
-        text = self.backend if self.backend.endswith(version) else f"{self.backend} {version}"
+        text = f"{engine_of(self.backend)} {version}".strip()
         if self.defaults == "engine":
             text += ", engine defaults"
         return text + (", recorded" if self.recorded else "")

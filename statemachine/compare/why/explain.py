@@ -11,6 +11,7 @@ import numpy as np
 from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import JointType, Model
 from ...measures import Deviation
+from ...releases import engine_of
 from ...runs import Trace
 from ...runs.drive import Progress, silent
 from ...runs.provenance import Provenance, provenance
@@ -414,7 +415,7 @@ def _still(listed: tuple[Cause, ...], model: Model, trace: Trace) -> tuple[str, 
 def _labels(one: Model, two: Model) -> Sequence[str]:
     """File and engine of both, with the folders by which two files of one name differ."""
     return [
-        f"{file} on {model.backend} {model.engine_version}"
+        f"{file} on {engine_of(model.backend)} {model.engine_version}"
         + ", engine defaults" * (getattr(model, "defaults", "model") == "engine")
         for file, model in zip(files_apart(one.path.parts, two.path.parts), (one, two), strict=True)
     ]
