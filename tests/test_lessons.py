@@ -588,38 +588,54 @@ def _at_a_terminal(
     return re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", seen)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
-def test_a_prediction_is_asked_for_before_the_answer() -> None:
-    seen = _at_a_terminal("lesson", "state", typed=[("Your prediction", "c\n")])
-    question, prompt = seen.index("How many has qvel?"), seen.index("Your prediction")
-    assert question < prompt < seen.index("13 12 6")
-    assert seen.index("You predicted it") > seen.index("13 12 6")
-    assert "You predicted a; it is c" in _at_a_terminal(
-        "lesson", "state", typed=[("Your prediction", "x\n"), ("Your prediction", "a\n")]
-    )
-    assert "You predicted" not in _at_a_terminal(
-        "lesson", "state", typed=[("Your prediction", "\n")]
-    )  # passed
-    assert "Your prediction" not in _at_a_terminal("lesson", "state", "--no-questions", typed=[])
+_ASKED = "Your prediction"
+_LATER = "Go on later with: statemachine lesson --from "
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
-def test_the_path_waits_for_its_reader() -> None:
-    typed = [
-        ("Your prediction", "b\n"),
-        ("Enter for lesson 2", "\n"),
-        ("Your prediction", "\n"),
-        ("Enter for lesson 3", "q\n"),
-    ]
-    seen = _at_a_terminal("lesson", typed=typed)
-    assert_in(seen, "1 of 10, objects: ", "2 of 10, state: ")
-    assert "3 of 10" not in seen
-    assert "Go on later with: statemachine lesson --from write" in seen
-    seen = _at_a_terminal("lesson", "--from", "9", typed=[("Your prediction", "q\n")])
-    assert_in(seen, "9 of 10", "Go on later with: statemachine lesson --from time")
-    seen = _at_a_terminal("lesson", "2", typed=[("Your prediction", "\x03")])
-    assert "13 12 6" not in seen
+@pytest.mark.parametrize(
+    ("words", "typed", "options", "shown", "absent"),
+    [
+        (
+            "state",
+            [(_ASKED, "c\n")],
+            {},
+            "How many has qvel.*Your pred.*13 12 6.*You predicted it",
+            "",
+        ),
+        ("state", [(_ASKED, "x\n"), (_ASKED, "a\n")], {}, "You predicted a; it is c", ""),
+        ("state", [(_ASKED, "\n")], {}, "", "You predicted"),  # passed
+        ("state --no-questions", [], {}, "", _ASKED),
+        ("state --no-questions", [], {"lines": 9}, "", _MORE),
+        ("2", [(_ASKED, "\x03")], {}, "", "13 12 6"),
+        # All but the verdict has room.
+        (
+            *("state", [(_ASKED, "a\n")], {"lines": 200}),
+            *(f"You predicted a; it is c((?!Next:).)*{_MORE}.*Next:", f"{_MORE}.*{_MORE}"),
+        ),
+        ("state", [(_ASKED, "a\n"), (_MORE, "q\n")], {"more": False}, "", "Next:"),
+        (
+            *("--from state", [(_ASKED, "a\n"), (_MORE, "q\n")], {"more": False}),
+            *(f"{_LATER}state", "3 of 10"),
+        ),
+        ("--from 9", [(_ASKED, "q\n")], {}, f"9 of 10.*{_LATER}time", "10 of 10"),
+        (
+            "",
+            [
+                *((_ASKED, "b\n"), ("Enter for lesson 2", "\n")),
+                *((_ASKED, "\n"), ("Enter for lesson 3", "q\n")),
+            ],
+            *({}, f"1 of 10, objects: .*2 of 10, state: .*{_LATER}write", "3 of 10"),
+        ),
+    ],
+)
+def test_what_a_reader_at_a_terminal_is_asked_and_shown(
+    words: str, typed: list[tuple[str, str]], options: dict[str, Any], shown: str, absent: str
+) -> None:
+    """A prediction is asked for before the answer, and each page waits for its reader."""
+    seen = _at_a_terminal("lesson", *words.split(), typed=typed, **options)
+    assert re.search(shown, seen, re.S)
+    assert not absent or not re.search(absent, seen, re.S)
 
 
 def _screens(seen: str, columns: int) -> list[int]:
@@ -652,25 +668,6 @@ def test_nothing_scrolls_away_unread(lesson: str, columns: int, lines: int) -> N
     seen = _at_a_terminal("lesson", lesson, typed=typed, columns=columns, lines=lines)
     assert max(_screens(seen, columns)) <= lines
     assert re.search(r"You\s+predicted", seen)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
-def test_it_waits_at_the_verdict_on_a_prediction() -> None:
-    seen = _at_a_terminal("lesson", "state", typed=[("Your prediction", "a\n")], lines=200)
-    assert seen.count(_MORE) == 1  # all the rest has room
-    verdict, _, rest = seen.partition(_MORE)
-    assert "You predicted a; it is c" in verdict
-    assert "Next:" not in verdict
-    assert "Next:" in rest
-    assert _MORE not in _at_a_terminal("lesson", "state", "--no-questions", typed=[], lines=9)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
-def test_q_ends_a_lesson_between_two_screens() -> None:
-    typed = [("Your prediction", "a\n"), (_MORE, "q\n")]
-    assert "Next:" not in _at_a_terminal("lesson", "state", typed=typed, more=False)
-    seen = _at_a_terminal("lesson", "--from", "state", typed=typed, more=False)
-    assert "Go on later with: statemachine lesson --from state" in seen
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")

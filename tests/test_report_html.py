@@ -53,6 +53,8 @@ from statemachine.runs.scenarios import SCENARIOS
 from .browser import Tab, browser
 from .conftest import ROOT, assert_has, assert_in, refused, soon
 from .test_drawing import area_of
+from .test_strange_traces import added, cut
+from .test_strange_traces import changed as edited
 
 LIMIT = 2_000_000  # bytes
 Made = tuple[Comparison, Trace, Trace, Look]
@@ -69,21 +71,27 @@ def page_of(made: Made, **more: Any) -> str:
     return report(compared(comparison, one, two, **more), looks)
 
 
-def rows(trace: Trace, count: int) -> Trace:
-    """The first rows of a trace."""
-    columns = {}
-    few = trace["contact_row"] < count
-    for name, array in trace.columns.items():
-        columns[name] = array[few] if name.startswith("contact") else array[:count]
-    return Trace(trace.header, columns)
+def recorded(name: str, kind: Any = "model") -> Made:
+    """MuJoCo against the recorded run of PyBullet: no second engine is needed."""
+    scenario = SCENARIOS[name]
+    one = record_scenario(scenario, sm.load(scenario.model, defaults=kind), defaults=kind)
+    return of(one, shipped(name, "pybullet", kind))
 
 
 @pytest.fixture(scope="module")
 def hold() -> Made:
-    """MuJoCo against the recorded run of PyBullet: no second engine is needed."""
-    return of(
-        record_scenario(SCENARIOS["hold"], sm.load("so101/scene")), shipped("hold", "pybullet")
-    )
+    return recorded("hold")
+
+
+@pytest.fixture(scope="module")
+def uneven() -> Made:
+    """Each with the timestep of its engine."""
+    return recorded("hold", "engine")
+
+
+def data_of(text: str) -> Any:
+    """What the script of a page reads."""
+    return json.loads(re.findall(r'id="data">(.*?)</script>', text, re.S)[0])
 
 
 @pytest.fixture(scope="module")
@@ -201,10 +209,8 @@ def test_names_that_are_markup_do_nothing(hold: Made, seen: Seen) -> None:
         )  # fmt: skip
         texts = {name: hostile(name) for name in ("experiment", "says", "command", "keyframe")}
         options = {hostile("o"): hostile("p")}
-        found = dataclasses.replace(
-            header, provenance=prov, ended=hostile("end"), options=options, **names, **texts
-        )
-        return Trace(found, trace.columns)
+        more = {"provenance": prov, "ended": hostile("end"), "options": options}
+        return edited(trace, {**more, **names, **texts})
 
     _, one, two, look = hold
     made = of_look(spoiled(one), spoiled(two), look)
@@ -221,11 +227,7 @@ def of_look(one: Trace, two: Trace, look: Look) -> Made:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["hold", "gravity", "box", "hold.engine"])
 def test_it_is_small(name: str, tmp_path: Path) -> None:
-    experiment, _, engine = name.partition(".")
-    scenario = SCENARIOS[experiment]
-    kind: Any = "engine" if engine else "model"
-    one = record_scenario(scenario, sm.load(scenario.model, defaults=kind), defaults=kind)
-    text = page_of(of(one, shipped(experiment, "pybullet", kind)))
+    text = page_of(recorded(*name.split(".")))
     assert len(text.encode()) <= LIMIT
     with looking(write_report(tmp_path / "x.html", text)) as tab:
         assert tab.locator("#scene").is_visible()
@@ -233,9 +235,7 @@ def test_it_is_small(name: str, tmp_path: Path) -> None:
 
 def test_a_long_run_is_small_too_and_keeps_the_moments_that_count() -> None:
     one = record_scenario(SCENARIOS["hold"], sm.load("so101/scene"), seconds=20.0)
-    qpos = one.qpos.copy()
-    qpos[1234, 2] += 0.1
-    two = Trace(one.header, {**one.columns, "qpos": qpos})
+    two = edited(one, qpos=added(one.qpos, (1234, 2), 0.1))
     made = of(one, two)
     assert len(page_of(made).encode()) <= LIMIT
     at = made[0].agreements[2].at
@@ -250,12 +250,18 @@ def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
     _, one, two, look = hold
     count = 60
     n = len(one) * count
-    columns = dict(one.columns)
-    columns["contact_row"] = np.repeat(np.arange(len(one)), count)
-    columns["contact_geom"] = np.tile([0, 34], (n, 1))
-    for name, width in (("dist", ()), ("pos", (3,)), ("frame", (9,)), ("force", (3,))):
-        columns[f"contact_{name}"] = np.random.default_rng(0).normal(size=(n, *width))
-    text = page_of(of_look(Trace(one.header, columns), two, look))
+    columns = {
+        f"contact_{name}": np.random.default_rng(0).normal(size=(n, *width))
+        for name, width in {"dist": (), "pos": (3,), "frame": (9,), "force": (3,)}.items()
+    }
+    many = edited(
+        one,
+        None,
+        contact_row=np.repeat(np.arange(len(one)), count),
+        contact_geom=np.tile([0, 34], (n, 1)),
+        **columns,
+    )
+    text = page_of(of_look(many, two, look))
     assert len(text.encode()) <= LIMIT
     assert "strongest are drawn" in text
 
@@ -281,9 +287,7 @@ def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
     said = [float(x) for x in re.findall(r"([\d.]+)°", finding.end)]
     assert said == pytest.approx([tail.mean(), tail[-1]], rel=0.005)
     assert "still changing" in finding.end
-    qpos = one.qpos.copy()
-    qpos[100:, 3] += 0.05
-    still = Trace(one.header, {**one.columns, "qpos": qpos})
+    still = edited(one, qpos=added(one.qpos, np.s_[100:, 3], 0.05))
     assert "changing" not in headline(compare(one, still), [], None, series(one, still)).end
 
 
@@ -395,11 +399,9 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert touch.one.total == pytest.approx(whole.mean())
     assert whole.mean() > mean
     # A side that never touches.
-    none = {
-        name: array[:0] if name.startswith("contact") else array
-        for name, array in two.columns.items()
-    }
-    bare = Trace(two.header, none)
+    bare = edited(
+        two, None, **{n: a[:0] for n, a in two.columns.items() if n.startswith("contact")}
+    )
     assert touches(one, bare)[0].two.first is None
     assert "never touches" in page_of(of_look(one, bare, hold[3]))
 
@@ -412,21 +414,19 @@ def test_what_was_commanded(hold: Made) -> None:
         assert row[1] == row[2] == ("0°" if value == 0 else f"{np.degrees(value):.1f}°")
         assert row[3] == far
     assert table.rows[0][0] in page_of(hold)
-    still = [
-        Trace(dataclasses.replace(t.header, options={"actuation": False}), t.columns)
-        for t in hold[1:3]
-    ]
+    still = [edited(trace, {"options": {"actuation": False}}) for trace in hold[1:3]]
     assert "nothing is commanded" in page_of(of_look(still[0], still[1], hold[3]))
 
 
 def test_a_link_only_to_what_is_there(hold: Made) -> None:
     models = Page("models", "", [Verdict("1 figure differs", False)])
-    for header in (hold[2].header, dataclasses.replace(hold[2].header, defaults="engine")):
-        text = page_of(of_look(hold[1], Trace(header, hold[2].columns), hold[3]), models=models)
+    for kind in ("model", "engine"):
+        other = edited(hold[2], {"defaults": kind})
+        text = page_of(of_look(hold[1], other, hold[3]), models=models)
         targets = set(re.findall(r'id="([^"]+)"', text))
         links = set(re.findall(r'href="#([^"]+)"', text))
         assert links <= targets
-        assert ("emulated" in links) == (header.defaults == "model")
+        assert ("emulated" in links) == (kind == "model")
 
 
 def test_charts_show_what_was_compared_and_are_few(hold: Made) -> None:
@@ -453,13 +453,10 @@ def test_charts_show_what_was_compared_and_are_few(hold: Made) -> None:
     assert "wrist_flex 0" in {chart.title for chart in some}
 
 
-def test_between_compared_moments_the_figures_are_of_the_last_one() -> None:
-    scenario = SCENARIOS["hold"]
-    one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
-    text = page_of(of(one, shipped("hold", "pybullet", "engine")))
+def test_between_compared_moments_the_figures_are_of_the_last_one(uneven: Made) -> None:
+    text = page_of(uneven)
     assert_in(text, "at the first common moment already, 0.025\u00a0s", "meet every 25\u00a0ms")
-    data = re.search(r'id="data">(.*?)</script>', text, re.S)
-    data = json.loads(data[1])
+    data = data_of(text)
     shown, compared = (np.frombuffer(base64.b64decode(data[name])) for name in ("time", "compared"))
     assert compared == pytest.approx(0.025 * np.floor(shown / 0.025 + 1e-6), abs=1e-9)
 
@@ -482,16 +479,13 @@ def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
 
 
 def test_it_opens_near_the_tool_where_the_gap_is_small(hold: Made, tmp_path: Path) -> None:
-    def begins_near(made: Made) -> bool:
-        data = re.search(r'id="data">(.*?)</script>', page_of(made), re.S)
-        return json.loads(data[1])["scene"]["begin_near"]
-
-    assert begins_near(hold)  # 7 mm
-    far = hold[2]["site_xpos"] + 0.2
-    assert not begins_near(
-        of_look(hold[1], Trace(hold[2].header, {**hold[2].columns, "site_xpos": far}), hold[3])
-    )
-    assert not begins_near(of_look(hold[1], hold[1], hold[3]))
+    _, one, two, look = hold  # 7 mm apart
+    far = edited(two, site_xpos=two["site_xpos"] + 0.2)
+    near = [
+        data_of(page_of(of_look(one, other, look)))["scene"]["begin_near"]
+        for other in (two, far, one)
+    ]
+    assert near == [True, False, False]
 
 
 def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, bare: Tab) -> None:
@@ -563,8 +557,7 @@ def test_the_sides_are_drawn_where_they_are(hold: Made, seen: Seen) -> None:
     half = np.sqrt(0.5)
     w, x, y, z = np.moveaxis(one["xquat"], -1, 0)
     turned = np.stack([w - z, x - y, y + x, z + w], axis=-1) * half
-    two = Trace(one.header, {**one.columns, "xpos": xpos, "xquat": turned})
-    with seen(of_look(one, two, look)) as tab:
+    with seen(of_look(one, edited(one, xpos=xpos, xquat=turned), look)) as tab:
         for name in ("marks", "trails"):
             tab.locator(f"#{name}").uncheck()
         both = picture(tab)
@@ -678,8 +671,7 @@ def test_nothing_is_wider_than_the_screen(page: Path, width: int) -> None:
             summary.click()
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
         box = tab.locator("#scene").bounding_box()
-        assert box["x"] >= 0
-        assert box["x"] + box["width"] <= width
+        assert 0 <= box["x"] <= width - box["width"]
 
 
 @pytest.mark.slow
@@ -830,59 +822,42 @@ def test_it_does_not_move_by_itself_nor_smoothly_where_that_is_not_wanted(page: 
 # Whatever the traces are.
 
 
-def ended(made: Made) -> Made:
-    _, one, two, look = made
-    early = rows(two, 150)
-    header = dataclasses.replace(early.header, ended="it diverged at 0.745 s")
-    return of_look(one, Trace(header, early.columns), look)
-
-
-def single(made: Made) -> Made:
-    _, one, two, look = made
-    return of_look(rows(one, 1), rows(two, 1), look)
-
-
-def same(made: Made) -> Made:
-    return of_look(made[1], made[1], made[3])
-
-
-def not_finite(made: Made) -> Made:
-    _, one, two, look = made
-    xpos = two["xpos"].copy()
-    xpos[100:] = np.nan
-    xpos[90] = 1e12
-    return of_look(one, Trace(two.header, {**two.columns, "xpos": xpos}), look)
+OTHERS: dict[str, Callable[[Trace, Trace], tuple[Trace, Trace]]] = {
+    "ended": lambda one, two: (one, cut(two, 150, ended="it diverged at 0.745 s")),
+    "single": lambda one, two: (cut(one, 1), cut(two, 1)),
+    "same": lambda one, _: (one, one),
+    "not finite": lambda one, two: (
+        one,
+        edited(two, xpos=added(added(two["xpos"], np.s_[100:], np.nan), 90, 1e12)),
+    ),
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [ended, single, same, not_finite])
-def test_other_traces(hold: Made, kind: Callable[[Made], Made], seen: Seen) -> None:
-    made = kind(hold)
+@pytest.mark.parametrize("kind", OTHERS)
+def test_other_traces(hold: Made, kind: str, seen: Seen) -> None:
+    made = of_look(*OTHERS[kind](*hold[1:3]), hold[3])
     with seen(made) as tab:
         assert tab.locator("#scene").is_visible()
         last = int(tab.locator("#slider").get_attribute("max"))
         go(tab, last)
         assert tab.locator("#clock").inner_text() == f"{made[0].until:.3f} s"
         text = tab.locator("body").inner_text()
-        if kind is ended:
-            assert "it diverged at 0.745 s" in text
-        if kind is same:
-            assert "The two runs are the same in every figure" in text
+        assert ("it diverged at 0.745 s" in text) == (kind == "ended")
+        assert ("The two runs are the same in every figure" in text) == (kind == "same")
         assert "NaN" not in text
-        assert tab.locator("#play").is_visible() == (kind is not single)
+        assert tab.locator("#play").is_visible() == (kind != "single")
 
 
 @pytest.mark.slow
-def test_timesteps_that_differ_are_drawn_between_and_it_is_said(seen: Seen) -> None:
-    scenario = SCENARIOS["hold"]
-    one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
-    two = shipped("hold", "pybullet", "engine")
+def test_timesteps_that_differ_are_drawn_between_and_it_is_said(uneven: Made, seen: Seen) -> None:
+    comparison, one, two, _ = uneven
     assert one.header.timestep != two.header.timestep
     times, _ = moments_of(one, two)
-    assert len(times) > 4 * compare(one, two).moments
+    assert len(times) > 4 * comparison.moments
     assert not rows_at(one, times)[1].any()
     assert rows_at(two, times)[1].any()
-    with seen(of(one, two)) as tab:
+    with seen(uneven) as tab:
         go(tab, 7)
         assert tab.locator("#now").inner_text() == "0.035 s (figures of 0.025 s)"
         cell = tab.locator("#readout tr", has_text="elbow_flex").locator("td").last.inner_text()

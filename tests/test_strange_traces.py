@@ -48,7 +48,7 @@ def named(found: Comparison) -> dict[str, Agreement]:
     return {each.name: each for each in found.agreements}
 
 
-def added(array: Any, row: int, by: float) -> Any:
+def added(array: Any, row: Any, by: float) -> Any:
     copy = np.array(array)
     copy[row] += by
     return copy
