@@ -77,5 +77,5 @@ class Simulation:
     def forward(self):
         self.engine.mj_forward(self.model, self.data)
 
-    def derived(self):
+    def derived(self, _vector):
         return {name: getattr(self.data, name) for name in TOLD}

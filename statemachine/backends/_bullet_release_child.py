@@ -35,16 +35,13 @@ class SentWorld:
     def place(self, vector) -> None:
         """Take a state, in a world without traces of another."""
         self.ctrl = np.zeros(0)  # it comes
-        self.now, self.start = vector, self._moment(vector)
-        start = self.start
+        self.placed = placed = self._moment(vector)
         self.world = self.world.renewed()
-        self.world.place(start.qpos, start.qvel, start.memory)
+        self.world.place(placed.qpos, placed.qvel, placed.memory)
 
     def state(self):
-        """The state, in a row; as it was placed until a step is taken, since reading rounds."""
-        if self.now is None:
-            self.now = np.concatenate([*self.world.read(), *self.world.memory])
-        return self.now
+        """The state, in a row."""
+        return np.concatenate([*self.world.read(), *self.world.memory])
 
     def command(self, ctrl) -> None:
         """Take a command."""
@@ -53,19 +50,16 @@ class SentWorld:
 
     def advance(self, steps: int, fastest: float) -> int:
         """Take engine steps; the last one of a call is taken by itself."""
-        if steps == 1:
-            self.start = self._moment(self.state())
-        self.now = None
         return self.world.advance(steps, fastest)
 
     def forward(self) -> None:
         """Derive of the present."""
-        self.start.ctrl = self.ctrl
-        self.world.look(self.start)
+        self.placed.ctrl = self.ctrl
+        self.world.look(self.placed)
 
-    def derived(self):
-        """All that the engine tells, by name."""
-        values = derived_by(self.world, self.start)
+    def derived(self, vector):
+        """All that the engine tells of a moment, by name."""
+        values = derived_by(self.world, self._moment(vector))
         contacts = vars(values.pop("contacts"))
         return {name: values[name] for name in values.keys() - self.untold} | contacts
 

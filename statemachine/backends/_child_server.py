@@ -13,9 +13,9 @@ only, and imports nothing of this package. Its argument is a file that knows the
   `place(vector)` takes qpos, qvel and the memory in a row, so that nothing of before is left;
   `state()` gives the same vector; `command(ctrl)` takes a command. `advance(steps, fastest)` takes
   engine steps, up to one after which a position is beyond 1e10 or a velocity beyond `fastest`, and
-  returns how many. `forward()` derives of the present. `derived()` gives what is derived, of the
-  moment that the last step started from or of the present after `forward`, by name, and of the
-  contacts geom, dist, pos, frame, force and torque;
+  returns how many. `forward()` derives of the present. `derived(vector)` gives what is derived,
+  of the moment that the last step started from or of the present after `forward`, which it is told
+  again, by name, and of the contacts geom, dist, pos, frame, force and torque;
 - `edit(model, edits, flags)`, if it can change a model: other values in fields, and these flags.
 
 A message and its answer are pickled: what is said, and arrays as shapes and bytes, since an older
@@ -38,19 +38,9 @@ from types import SimpleNamespace
 import numpy as np
 
 _PROTOCOL = 4  # of Python 3.9, and earlier
-SPIN = 50e-6  # [s]
-
-
-def await_message(pipe):
-    """Look for a message for a short time; then it is waited for, asleep.
-
-    A process that sleeps takes longer to wake than most calls take.
-    """
-    if os.name == "nt":  # where no pipe can be looked at so
-        return
-    until = time.perf_counter() + SPIN
-    while time.perf_counter() < until and not select.select([pipe], [], [], 0)[0]:
-        os.sched_yield()
+# How long a message is looked for [s]: at least; in a row of calls at most; how much longer after
+# one that came later, and with how much to make up for where that is no good.
+SPIN, LONGEST, MORE, PAUSE = 50e-6, 1e-3, 10e-6, -500e-6
 
 
 def send(pipe, said, arrays) -> None:
@@ -60,27 +50,46 @@ def send(pipe, said, arrays) -> None:
     pipe.flush()
 
 
-def receive(pipe):
-    """The next message; EOFError where there is none any more."""
-    await_message(pipe)
+def receive(pipe, patience):
+    """The next message, and the patience for the one after it; EOFError where there is none.
+
+    A process that sleeps takes longer to wake than most calls take. So a message is looked for,
+    and waited for asleep where it does not come soon, or somebody else wants the processor: then
+    a look takes long.
+
+    Args:
+        pipe: Where it comes. On Windows no pipe can be looked at.
+        patience: How long to look for it [s].
+    """
+    began = now = time.perf_counter()
+    calm, until = True, began + max(patience, SPIN)
+    while os.name != "nt" and calm and now < until and not select.select([pipe], [], [], 0)[0]:
+        os.sched_yield()
+        before, now = now, time.perf_counter()
+        calm = now - before < SPIN
     said, packed = pickle.load(pipe)
-    return said, {
+    waited = time.perf_counter() - began
+    if not calm or waited > LONGEST:
+        patience = PAUSE
+    elif waited > patience:
+        patience += MORE
+    arrays = {
         name: np.frombuffer(buffer, kind).reshape(shape).copy()
         for name, (shape, kind, buffer) in packed.items()
     }
+    return said, arrays, patience
 
 
 class Answerer:
     """The models and worlds of this process, by number, and what can be asked of them."""
 
     def __init__(self, engine) -> None:
-        self.engine, self.things, self.number = engine, {}, 0
+        self.engine, self.things = engine, {}
 
     def keep(self, thing):
         """Its number."""
-        self.number += 1
-        self.things[self.number] = thing
-        return self.number
+        self.things[id(thing)] = thing
+        return id(thing)
 
     def load(self, job, edits):
         """Compile a file, and edit fields; the fields that were asked for, as the file has them."""
@@ -105,7 +114,7 @@ class Answerer:
         if "state" in arrays:
             world.place(arrays["state"])
         world.command(arrays["ctrl"])
-        taken = world.advance(job["steps"], job["fastest"]) if job["steps"] else 0
+        taken = world.advance(job["steps"], job["fastest"])
         states = {"before": world.state()}
         if taken == job["steps"] and job["ahead"]:
             world.advance(1, np.inf)
@@ -113,13 +122,13 @@ class Answerer:
         return {"taken": taken}, states
 
     def look(self, job, arrays):
-        """What is derived: of a state and a command if they are given, else of the last step."""
+        """What is derived: of a state and a command, or of where the last step started."""
         world = self.things[job["world"]]
-        if arrays:
+        if "ctrl" in arrays:
             world.place(arrays["state"])
             world.command(arrays["ctrl"])
             world.forward()
-        return {}, world.derived()
+        return {}, world.derived(arrays["state"])
 
 
 def end_with(pipe) -> None:
@@ -137,9 +146,10 @@ def main() -> None:
     if hasattr(select, "poll"):
         threading.Thread(target=end_with, args=(source,), daemon=True).start()
     server = Answerer(SimpleNamespace(**runpy.run_path(sys.argv[1])))
+    patience = SPIN
     while True:
         try:
-            job, arrays = receive(source)
+            job, arrays, patience = receive(source, patience)
         except EOFError:
             return
         for number in job["free"]:  # models and worlds that nobody needs any more

@@ -23,7 +23,7 @@ STATE = (
 KINDS = {"disable": mujoco.mjtDisableBit, "enable": mujoco.mjtEnableBit}
 SPLIT = {"mjDSBL_PASSIVE": ("mjDSBL_SPRING", "mjDSBL_DAMPER")}  # flags that became two later
 _ALL = mujoco.mjtWarning
-ALARMS = (_ALL.mjWARN_BADQPOS, _ALL.mjWARN_BADQVEL, _ALL.mjWARN_BADQACC)
+ALARMS = [int(kind) for kind in (_ALL.mjWARN_BADQPOS, _ALL.mjWARN_BADQVEL, _ALL.mjWARN_BADQACC)]
 PARTS = {
     "qfrc_contact": (
         _KINDS.mjCNSTR_CONTACT_FRICTIONLESS,
@@ -46,6 +46,7 @@ class Simulation:
         parts = {name: getattr(self.data, f"{prefix}{name}").ravel() for prefix, name in STATE}
         self.parts = [part for part in parts.values() if len(part)]  # of its own memory
         self.cuts = np.cumsum([len(part) for part in self.parts])[:-1]
+        self.alarms = memoryview(self.data.warning.number)[ALARMS[0] : ALARMS[-1] + 1]
         self.memory = [(name, len(parts[name])) for _, name in STATE[2:] if len(parts[name])]
 
     def place(self, vector) -> None:
@@ -90,13 +91,13 @@ class Simulation:
 
     def warned(self) -> bool:
         """Whether the engine has found a number bad since a state was placed."""
-        return any(self.data.warning[int(kind)].number for kind in ALARMS)
+        return any(self.alarms)
 
     def forward(self) -> None:
         """Derive of the present."""
         mujoco.mj_forward(self.model, self.data)
 
-    def derived(self):
+    def derived(self, _vector):
         """Every derived array, by name, then those of the contacts."""
         model, data = self.model, self.data
         arrays = {name: getattr(data, name) for name in POSES + FORCES}

@@ -63,6 +63,7 @@ class Server:
     def __init__(self, engine: ServedEngine) -> None:
         command = [engine.python, "-I", "-u", _FILE, engine.child]
         self._engine, self._turn, self.lives = engine, threading.RLock(), True
+        self._patience = _child_server.SPIN  # with which an answer is looked for [s]
         self.forgotten = deque[int]()  # models and worlds that it is to forget at the next call
         self._models = weakref.WeakKeyDictionary[Callable[..., Any], int]()
         self._process = PipedChild(command, {**os.environ, "MUJOCO_GL": "disable"})
@@ -90,7 +91,9 @@ class Server:
             with self._turn:
                 free = [self.forgotten.popleft() for _ in range(len(self.forgotten))]
                 _child_server.send(self._process.to, {"verb": verb, "free": free, **job}, arrays)
-                answer, values = _child_server.receive(self._process.out)
+                answer, values, self._patience = _child_server.receive(
+                    self._process.out, self._patience
+                )
         except (OSError, ValueError, EOFError, pickle.UnpicklingError) as error:
             self.lives, ended = False, self._process.how_it_ended()
             self._process.kill()  # one that lives is asked nothing more
@@ -166,7 +169,7 @@ class ServedWorld(HiddenWorld):
         self._derived: dict[str, Array] | None = None
         self._begin()
         lengths = [compiled.nq, compiled.nv, *(length for _, length in self.memory_layout)]
-        self._cuts = np.cumsum(lengths)[:-1]
+        self._places = np.split(np.arange(sum(lengths)), np.cumsum(lengths)[:-1])
         self._state, self._reserve = np.zeros(sum(lengths)), None
 
     def _begin(self) -> None:
@@ -214,8 +217,8 @@ class ServedWorld(HiddenWorld):
         self._state, self._reserve = cast("Array", self._reserve), None
 
     def read(self) -> tuple[Array, Array]:
-        qpos, qvel, *_ = np.split(self._state, self._cuts)
-        return qpos.copy(), qvel.copy()
+        qpos, qvel, *_ = self._places
+        return self._state[qpos], self._state[qvel]
 
     def memory_at(self, key: int | None) -> Memory:
         compiled = self._compiled
@@ -232,7 +235,7 @@ class ServedWorld(HiddenWorld):
 
     @property
     def memory(self) -> Memory:
-        return tuple(part.copy() for part in np.split(self._state, self._cuts)[2:])
+        return tuple(self._state[places] for places in self._places[2:])
 
     def look(self, moment: Moment) -> None:
         if not self._server.lives:
@@ -243,7 +246,8 @@ class ServedWorld(HiddenWorld):
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
         if self._derived is None:
-            _, self._derived = self._server.ask("look", world=self._world)
+            state = np.concatenate([moment.qpos, moment.qvel, *moment.memory])
+            _, self._derived = self._server.ask("look", {"state": state}, world=self._world)
         arrays: dict[str, Any] = dict(self._derived)
         values = {n: arrays.pop(n) for n in DERIVED if n not in self.untold}
         if "contacts" not in self.untold:

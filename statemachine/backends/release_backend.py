@@ -192,13 +192,12 @@ def _loaded(
 def _fields(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator[str]:
     """Names of the numeric fields of a compiled model that releases may have in common."""
     for name in dir(raw):
-        if name.startswith(("_", *_OWN, *without)):
-            continue
-        if isinstance(getattr(raw, name), np.ndarray):
+        sent = not name.startswith(("_", *_OWN, *without))
+        if sent and isinstance(getattr(raw, name), np.ndarray):
             yield name
     for holder in ("opt", "stat"):
-        names = [f"{holder}.{name}" for name in dir(getattr(raw, holder)) if name[0] != "_"]
-        yield from (name for name in names if name not in _FLAGS)
+        names = {f"{holder}.{name}" for name in dir(getattr(raw, holder)) if name[0] != "_"}
+        yield from sorted(names - _FLAGS.keys())
 
 
 def _field(raw: mujoco.MjModel, name: str) -> Any:
