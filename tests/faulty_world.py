@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 import time
 import warnings
+import weakref
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from statemachine.backends import HiddenModel, mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoModel
@@ -18,7 +18,7 @@ from statemachine.errors import EngineError, EngineWarning
 from .hidden_world import ExampleModel, ExampleWorld
 
 RAISE, CRASH, NOISE, SLOW, STUCK, DIVERGE = (0.101, 0.102, 0.103, 0.104, 0.105, 0.106)
-MOST = 6  # worlds that a process can hold: two Data of a Model of their own each, with a look-ahead
+MOST = 16  # worlds that a process can hold: those of Data, and of each Model one with a look-ahead
 
 
 class FaultyError(Exception):
@@ -33,12 +33,12 @@ class FaultyWorld(ExampleWorld):
 
     engine = "Faulty"
     errors = (FaultyError,)
-    alive = 0
+    alive: ClassVar = weakref.WeakSet[Any]()
 
     def __init__(self, model: MujocoModel) -> None:
-        if FaultyWorld.alive >= MOST:
+        if len(FaultyWorld.alive) >= MOST:
             raise EngineError(f"{MOST} worlds at most")
-        FaultyWorld.alive += 1
+        FaultyWorld.alive.add(self)
         super().__init__(model)
 
     def step(self) -> None:
@@ -54,14 +54,14 @@ class FaultyWorld(ExampleWorld):
         elif what == SLOW:
             time.sleep(0.001)
         elif what == STUCK:
-            threading.Lock().acquire()
-            threading.Event().wait(60)
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            time.sleep(60)
         elif what == DIVERGE:
             self.raw.qpos[1] = float("nan")
         super().step()
 
     def close(self) -> None:
-        FaultyWorld.alive -= 1
+        FaultyWorld.alive.discard(self)
         super().close()
 
 

@@ -18,7 +18,7 @@ import pytest
 import statemachine as sm
 from statemachine.compare.why import Explanation
 from statemachine.errors import BadInputError
-from statemachine.processes.forks import forks_for, in_forks
+from statemachine.processes.parallel import forks_for, in_forks
 from statemachine.report.as_json import dumps
 
 from .conftest import ROOT, lives, refused, soon
@@ -145,7 +145,7 @@ def test_a_run_whose_process_dies_is_a_set_that_cannot_be_run(tmp_path: Path) ->
 @forks
 def test_what_never_ends_in_a_fork_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """As where code waits for threads that did not come along."""
-    monkeypatch.setattr("statemachine.processes.forks._LEAST", 0.5)
+    monkeypatch.setattr("statemachine.processes.parallel._LEAST", 0.5)
     here = os.getpid()
 
     def waits() -> int:
@@ -173,7 +173,7 @@ def test_a_function_is_run_here_unless_asked(
     monkeypatch.setattr(
         "statemachine.compare.why.trials.in_forks", Mock(side_effect=AssertionError("forked"))
     )
-    monkeypatch.setattr("statemachine.processes.forks._PAYS", 1e-9)
+    monkeypatch.setattr("statemachine.processes.parallel._PAYS", 1e-9)
     found = explained(tmp_path, ARM, _apart(ARM), seconds=0.1, scenario=replace(SWING, own=True))
     assert found.runs > 10
 

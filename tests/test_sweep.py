@@ -499,7 +499,7 @@ def test_a_folder_of_something_else_and_an_extra_that_is_missing(
         (MissingEngineError, r"statemachine-sim\[cluster\]", cluster),
     )
     monkeypatch.setitem(sys.modules, "joblib", None)
-    refused((MissingEngineError, r"statemachine-sim\[sweep\]", partial(run, tmp_path / "new")))
+    refused((MissingEngineError, r"statemachine-sim\[sweep\]", lambda: prepared(small("hold"))))
 
 
 def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> None:

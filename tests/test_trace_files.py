@@ -263,7 +263,7 @@ def test_a_csv_and_its_contacts_are_replaced_together(
 
     before = table.read_bytes()
     monkeypatch.setattr(
-        "statemachine.runs.csv_files._write_contacts",
+        "statemachine.runs.files._write_contacts",
         Mock(side_effect=OSError(28, "No space left on device")),
     )
     refused((OSError, "No space", lambda: export_csv(box, table)))

@@ -30,6 +30,7 @@ from statemachine.errors import (
     UnknownNameError,
     UnsupportedError,
 )
+from statemachine.interface.worlds import WRITABLE
 
 from .conftest import SHARED, opened, refused, runs_in_silence, shared, started
 from .lives import equal, live
@@ -67,6 +68,47 @@ def test_a_world_is_what_one_data_is(model: sm.Model) -> None:
         many.reset(worlds, ids=[1])
         assert not worlds.xpos[1].any()
         assert worlds.xpos[2].any()
+
+
+def test_a_step_with_forward_is_a_step_and_a_forward(model: sm.Model) -> None:
+    with worlds_of(model) as together, worlds_of(model) as apart:
+        together.ctrl = apart.ctrl = commands(model, N)
+        apart.qvel[2, 0] = together.qvel[2, 0] = 1e20  # ends at once
+        for ids in (None, [0, 2], [1, 3]):
+            assert np.array_equal(together.xpos, apart.xpos)  # what is read comes with the next
+            with warnings.catch_warnings(action="ignore"):
+                many.step(together, 2, ids=ids, forward=True)
+                many.step(apart, 2, ids=ids)
+                many.forward(apart, ids=ids)
+            for name in (*WRITABLE, *together.derived):
+                ours, theirs = getattr(together, name), getattr(apart, name)
+                assert np.array_equal(ours[[0, 1, 3]], theirs[[0, 1, 3]])
+        assert list(together.diverged) == list(apart.diverged) == [2]
+
+
+def test_states_of_all_worlds_are_those_of_each(model: sm.Model) -> None:
+    latency = [0.0, 0.02, 0.01, 0.02] if model.backend == "mujoco" else [0.02] * N
+    with worlds_of(model, latency=latency) as worlds, worlds_of(model, latency=latency) as others:
+        worlds.ctrl = commands(model, N)
+        many.step(worlds, 30)
+        states = many.get_states(worlds)
+        assert states == {world: many.get_state(worlds, world) for world in range(N)}
+        assert many.get_states(worlds, [3, 1]) == {1: states[1], 3: states[3]}
+        many.set_states(others, states)
+        assert many.get_states(others) == states
+        for world, state in states.items():
+            many.set_state(worlds, world, state)
+        for each in (worlds, others):
+            assert not each.xpos.any()
+            many.step(each, 5)
+        for name in (*WRITABLE, *worlds.derived):
+            assert np.array_equal(getattr(worlds, name), getattr(others, name))
+        worlds.qvel[1, 0] = 1e20
+        with pytest.warns(DivergedWarning):
+            many.step(worlds, ids=[1])
+        assert list(many.get_states(worlds)) == [0, 2, 3]
+        many.set_states(worlds, {1: states[1]})
+        assert not worlds.diverged
 
 
 def test_states_move_between_worlds_and_data(worlds: many.Worlds) -> None:
@@ -360,10 +402,10 @@ def test_one_thread_at_a_time(worlds: many.Worlds) -> None:
     entered, leave = threading.Event(), threading.Event()
     hook = worlds._step
 
-    def waiting(ids: Any, nstep: int) -> Any:
+    def waiting(*question: Any) -> Any:
         entered.set()
         assert leave.wait(30)
-        return hook(ids, nstep)
+        return hook(*question)
 
     worlds._step = waiting  # type: ignore[method-assign]
     thread = threading.Thread(target=many.step, args=(worlds,))

@@ -31,10 +31,12 @@ from statemachine.interface import worlds as interface_worlds
 from statemachine.worlds import (
     Worlds,
     forward,
+    get_states,
     make_worlds,
     pool,
     record,
     reset,
+    set_states,
     step,
 )
 
@@ -55,7 +57,7 @@ def model() -> Iterator[sm.Model]:
 
 @pytest.fixture
 def worlds(model: sm.Model) -> Iterator[Worlds]:
-    """Five worlds in two processes: 0, 2, 4 and 1, 3."""
+    """Five worlds: 0, 2, 4 in this process, and 1, 3 in another."""
     with make_worlds(model, N, workers=2) as made:
         yield made
 
@@ -127,12 +129,12 @@ def test_a_record_longer_than_the_shared_memory(
 
 def test_more_worlds_than_a_process_can_hold(model: sm.Model) -> None:
     vars(model)["capabilities"] = replace(model.capabilities, data_per_process=faulty.MOST // 2)
-    with make_worlds(model, 8, workers=1) as worlds:
-        assert worlds.workers == len(set(pids(worlds))) == 3
+    with make_worlds(model, 20, workers=1) as worlds:
+        assert worlds.workers == 1 + len(set(pids(worlds))) == 3
         forward(worlds)
         assert worlds.qfrc_bias.any(axis=1).all()
     vars(model)["capabilities"] = replace(model.capabilities, data_per_process=None)
-    refused((EngineError, "6 worlds at most", lambda: make_worlds(model, 8, workers=1)))
+    refused((EngineError, "16 worlds at most", lambda: make_worlds(model, 20, workers=1)))
 
 
 def test_a_world_that_diverges_or_breaks_is_left_out(worlds: Worlds) -> None:
@@ -153,18 +155,18 @@ def test_a_world_that_diverges_or_breaks_is_left_out(worlds: Worlds) -> None:
 def test_a_process_that_is_killed_takes_its_worlds_with_it(worlds: Worlds) -> None:
     step(worlds, 2)
     numbers, qpos = pids(worlds), worlds.qpos.copy()
-    worlds.ctrl[4, 0] = faulty.CRASH
-    error = refused((EngineError, r"3 worlds \(0, 2, 4\) .* SIGKILL", lambda: step(worlds, 3)))
-    assert error.worlds == (0, 2, 4)
+    worlds.ctrl[3, 0] = faulty.CRASH
+    error = refused((EngineError, r"2 worlds \(1, 3\) .* SIGKILL", lambda: step(worlds, 3)))
+    assert error.worlds == (1, 3)
     refused((ClosedDataError, "make others", lambda: reset(worlds)))
-    assert bits(worlds.qpos[4]) == bits(qpos[4])
+    assert bits(worlds.qpos[3]) == bits(qpos[3])
     assert not running(numbers)
 
 
 def test_all_processes_that_are_killed_are_told(worlds: Worlds) -> None:
     for pid in pids(worlds):
         os.kill(pid, signal.SIGKILL)
-    refused((EngineError, "5 worlds", lambda: step(worlds)))
+    refused((EngineError, "2 worlds", lambda: step(worlds)))
 
 
 def interrupted_after(seconds: float, call: Callable[[], Any]) -> float:
@@ -202,7 +204,7 @@ def test_ctrl_c_ends_a_step_at_once_and_each_world_is_whole(
 
 @pytest.mark.slow
 def test_ctrl_c_ends_what_does_not_hear_it(worlds: Worlds) -> None:
-    worlds.ctrl[0, 0] = faulty.STUCK
+    worlds.ctrl[1, 0] = faulty.STUCK
     assert interrupted_after(0.3, lambda: step(worlds)) < 4
     refused((ClosedDataError, "", lambda: step(worlds)))
 
@@ -224,7 +226,7 @@ def test_nothing_is_left_and_closed_is_closed(model: sm.Model) -> None:
 @linux
 def test_worlds_that_are_collected_leave_no_descriptor(model: sm.Model) -> None:
     def collected() -> int:
-        step(make_worlds(model, 1))
+        step(make_worlds(model, 2, workers=2))
         gc.collect()
         return len(os.listdir("/proc/self/fd"))
 
@@ -243,11 +245,76 @@ def test_what_is_derived_is_computed_when_it_is_read(model: sm.Model) -> None:
         assert np.shares_memory(kept, worlds.xpos)
 
 
+def exchanges(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The verbs that processes are asked for from now on."""
+    verbs = []
+    exchange = pool.PoolWorlds._exchange
+
+    def counted(worlds: Any, numbers: Any, verb: str, *arguments: Any) -> Any:
+        verbs.append(verb)
+        return exchange(worlds, numbers, verb, *arguments)
+
+    monkeypatch.setattr(pool.PoolWorlds, "_exchange", counted)
+    return verbs
+
+
+def test_what_is_read_after_each_call_comes_with_it(
+    model: sm.Model, worlds: Worlds, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verbs = exchanges(monkeypatch)
+    with sm.make_data(model) as data:
+        for k in range(4):
+            step(worlds, 2)
+            sm.step(model, data, 2)
+            assert bits(worlds.xpos[3]) == bits(data.xpos)
+            if k:
+                assert bits(worlds.qacc[0]) == bits(data.qacc)
+        step(worlds, ids=[1])
+        sm.step(model, data)
+        assert bits(worlds.xpos[1]) == bits(data.xpos) != bits(worlds.xpos[3])
+        step(worlds)
+        step(worlds)
+    assert verbs == ["step", "derive", "step", "derive", "step", "step", "step", "step", "step"]
+
+
+@pytest.mark.usefixtures("bullet")
+def test_a_control_step_of_environments_is_one_exchange(monkeypatch: pytest.MonkeyPatch) -> None:
+    gymnasium = pytest.importorskip("gymnasium")
+    pytest.importorskip("statemachine.gym")
+    task, options = "statemachine/Reach-v0", {"backend": "pybullet", "workers": 2}
+    envs = gymnasium.make_vec(task, num_envs=4, **options)
+    envs.reset(seed=0)
+    verbs = exchanges(monkeypatch)
+    for _ in range(3):
+        envs.step(np.zeros(envs.action_space.shape, dtype=np.float32))
+    envs.close()
+    assert verbs == 3 * ["step_and_forward"]
+
+
+def test_few_worlds_need_no_process_and_more_have_the_same_bits(model: sm.Model) -> None:
+    with make_worlds(model, 3) as worlds:
+        assert worlds.workers == 1
+        assert not pids(worlds)
+        live(worlds, [model] * 3, 28)
+
+
+def test_states_that_do_not_fit_into_the_shared_memory_at_once(
+    worlds: Worlds, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step(worlds, 3)
+    states = get_states(worlds)
+    monkeypatch.setattr(pool, "_STATES", 2 * len(states[0].blob))
+    assert get_states(worlds) == states
+    step(worlds)
+    set_states(worlds, states)
+    assert get_states(worlds) == states
+
+
 def test_engines_are_silent_and_warn_once(
     model: sm.Model, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with make_worlds(model, N, workers=2) as worlds:
-        worlds.ctrl[:, 0] = faulty.NOISE
+        worlds.ctrl[1::2, 0] = faulty.NOISE  # in the other process
         with pytest.warns(EngineWarning, match="creaks") as told:
             step(worlds, 2)
         assert len(told) == 1
@@ -289,7 +356,7 @@ def test_a_model_that_no_other_process_can_read(model: sm.Model) -> None:
         (
             UnsupportedError,
             "in processes of their own, which cannot read",
-            lambda: make_worlds(model, 2),
+            lambda: make_worlds(model, 2, workers=2),
         )
     )
 
@@ -301,7 +368,7 @@ from statemachine import backends
 from statemachine.worlds import make_worlds, step
 backends.register("faulty", "tests.faulty_world:load")
 model = sm.load("so101", backend="faulty")
-worlds = make_worlds(model, 3, workers=2)
+worlds = make_worlds(model, 3, workers=3)
 print(*[process.pid for process in worlds._processes], flush=True)
 """
 _LONG = """

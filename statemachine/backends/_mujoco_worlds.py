@@ -7,7 +7,7 @@ by running it once more alone, from where the call began.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -125,7 +125,7 @@ class MujocoWorlds(Worlds):
         for name in ("_changing", "_before", "_warned", "_told", "_history", "_batch"):
             setattr(self, name, None)
 
-    def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
+    def _step(self, ids: Ints, nstep: int, forward: bool) -> Mapping[int, Exception]:
         count = engine_steps(nstep, self._base.substeps)
         errors: dict[int, Exception] = {}
         if self.model._quaternions:
@@ -134,7 +134,10 @@ class MujocoWorlds(Worlds):
             if errors:
                 ids = ids[~np.isin(ids, list(errors))]
         self._before[:] = self._changing
-        return errors | self._call(ids, count, lambda some: self._batch.step(some, count))
+        errors |= self._call(ids, count, lambda some: self._batch.step(some, count))
+        if forward:
+            errors |= self._forward(ids[~np.isin(ids, list(errors))] if errors else ids)
+        return errors
 
     def _forward(self, ids: Ints) -> Mapping[int, Exception]:
         self._before[:] = self._changing
@@ -219,15 +222,21 @@ class MujocoWorlds(Worlds):
             self._told[ids] = self._warned[ids]
         listen()
 
-    def _get_state(self, world: int) -> State:
-        fingerprint, layout = self._state_layout(world)
-        row = self._batch.state[world][self._places(world)]
-        check_vector(row, layout, self.model)
-        return State("mujoco", mujoco.__version__, fingerprint, layout, row.tobytes())
+    def _get_states(self, ids: Ints) -> list[State]:
+        states = []
+        for world, row in zip(ids.tolist(), self._batch.state[ids], strict=True):
+            fingerprint, layout = self._state_layout(world)
+            vector = row[self._places(world)]
+            check_vector(vector, layout, self.model)
+            states.append(
+                State("mujoco", mujoco.__version__, fingerprint, layout, vector.tobytes())
+            )
+        return states
 
-    def _set_state(self, world: int, state: State) -> None:
-        self._reset(self._numbers[world : world + 1], None)
-        self._batch.state[world, self._places(world)] = state.vector
+    def _set_states(self, ids: Ints, states: Sequence[State]) -> None:
+        self._reset(ids, None)
+        for world, state in zip(ids.tolist(), states, strict=True):
+            self._batch.state[world, self._places(world)] = state.vector
 
     def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
         nhistory = self._base.raw.nhistory
@@ -253,7 +262,7 @@ class MujocoWorlds(Worlds):
         for k in range(nstep // every if len(ids) else 0):
             if ctrl is not None:
                 self.ctrl[ids] = ctrl[ids, k]
-            errors.update(self._step(ids, every))
+            errors.update(self._step(ids, every, False))
             if errors:
                 ids = ids[~np.isin(ids, list(errors))]
             for name, array in arrays.items():

@@ -16,7 +16,7 @@ import importlib
 import importlib.metadata
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -278,13 +278,20 @@ class RawEngine:
 
     @_needed
     @abstractmethod
-    def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
+    def energies(
+        self,
+        model: Model,
+        qpos: Array,
+        qvel: Array,
+        made: Callable[[Model], AbstractContextManager[Data]],
+    ) -> Array:
         """Kinetic and potential energy (n, 2) [J] of states.
 
         Args:
             model: A model on this engine.
             qpos: (n, nq) positions [rad or m].
             qvel: (n, nv) velocities [rad/s or m/s].
+            made: Gives a Data of it, which is changed.
         """
 
     # Pictures without a screen.

@@ -183,8 +183,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         worlds.ctrl = np.where(going[:, None], ctrl, worlds.ctrl)
         with warnings.catch_warnings():  # `infos` tell of it
             warnings.simplefilter("ignore", DivergedWarning)
-            step(worlds, self.task.frame_skip, ids=going)
-            forward(worlds, ids=going)
+            step(worlds, self.task.frame_skip, ids=going, forward=True)
         seen = self._observed()
         diverged = self.task.outside(seen)
         diverged[list(worlds.diverged)] = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -160,8 +160,11 @@ class Worlds(Closable, ABC):
         """Give back threads, processes and memory; the arrays are copied already."""
 
     @abstractmethod
-    def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
-        """Advance these worlds; by its number the error of each where one Data would raise."""
+    def _step(self, ids: Ints, nstep: int, forward: bool) -> Mapping[int, Exception]:
+        """Advance these worlds; by its number the error of each where one Data would raise.
+
+        With `forward`, recompute what is derived of the others.
+        """
 
     @abstractmethod
     def _forward(self, ids: Ints) -> Mapping[int, Exception]:
@@ -172,12 +175,12 @@ class Worlds(Closable, ABC):
         """Put these worlds to the default state or a keyframe; what is derived becomes zero."""
 
     @abstractmethod
-    def _get_state(self, world: int) -> State:
-        """The State of one world, of checked inputs."""
+    def _get_states(self, ids: Ints) -> list[State]:
+        """The States of these worlds, of checked inputs."""
 
     @abstractmethod
-    def _set_state(self, world: int, state: State) -> None:
-        """Take a State of the right layout; BadInputError only before anything changes."""
+    def _set_states(self, ids: Ints, states: Sequence[State]) -> None:
+        """Take States of the right layout; BadInputError only before anything of it changes."""
 
     @abstractmethod
     def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
@@ -248,10 +251,6 @@ class Worlds(Closable, ABC):
                     errors.setdefault(int(ids[row]), in_world(int(ids[row]), error))
         return errors
 
-    def _check_writable(self) -> None:
-        for name in WRITABLE:
-            check_writable(getattr(self, name), name, "worlds")
-
     def __getattr__(self, name: str) -> Any:  # only for what is not there
         if name in BATCHED and "_trouble" in vars(self):
             self._refuse_if_troubled()
@@ -265,7 +264,8 @@ class Worlds(Closable, ABC):
     def __setattr__(self, name: str, value: Any) -> None:
         if name in WRITABLE:
             self._refuse_if_troubled()
-            self._check_writable()
+            for array in WRITABLE:
+                check_writable(getattr(self, array), array, "worlds")
             target = getattr(self, name)
             numbers = as_numbers(value, name)
             shape = target.shape if numbers.ndim == target.ndim else target.shape[1:]

@@ -79,8 +79,6 @@ def free_memory() -> int | None:
 
 def _left_of_addresses() -> Iterator[int]:
     """Bytes that this process may still map, where it has a limit of its own."""
-    if sys.platform == "win32":
-        return
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
@@ -97,11 +95,10 @@ _VERSIONS = {
 
 def _left_to_groups() -> Iterator[int]:
     """Bytes that each control group with a limit, of those that this process is in, has left."""
-    lines: list[str] = []
-    if sys.platform == "win32":
-        return
-    with suppress(OSError):
+    try:
         lines = Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return
     for line in lines:
         _, controllers, group = line.split(":", 2)
         if controllers not in _VERSIONS:

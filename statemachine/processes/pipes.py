@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import os
+import select
+import signal
 import subprocess
 import tempfile
+import time
 import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any
+from io import BufferedReader, BufferedWriter
+from typing import Any, cast
 
 from .sandbox import signal_name
 
+_SPIN = 50e-6  # [s] in which most calls are answered: to wake up takes longer
 _ENDS_IN = 3.0  # seconds in which a process ends by itself when it is left alone
 
 
@@ -41,9 +46,9 @@ class PipedChild:
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
             **options,
         )
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self.to, self.out, self.pid = self._process.stdin, self._process.stdout, self._process.pid
+        self.to = cast("BufferedWriter", self._process.stdin)
+        self.out = cast("BufferedReader", self._process.stdout)
+        self.pid = self._process.pid
         _LIVING.add(self)
 
     def how_it_ended(self, seconds: float = _ENDS_IN) -> str:
@@ -64,10 +69,13 @@ class PipedChild:
             with suppress(OSError):
                 pipe.close()
 
+    def interrupt(self) -> None:
+        """Send it what Ctrl-C sends, or on Windows Ctrl-Break."""
+        self._process.send_signal(getattr(signal, "CTRL_BREAK_EVENT", signal.SIGINT))
+
     def kill(self) -> None:
         """End it at once."""
-        with suppress(OSError):
-            self._process.kill()
+        self._process.kill()
 
     def close(self) -> None:
         """Wait for its end, which is not to be long. Idempotent."""
@@ -78,6 +86,20 @@ class PipedChild:
             self.kill()
             self._process.wait()
         self._said.close()
+
+
+def await_message(pipe: int) -> None:
+    """Look for a message for a short time, awake; who reads then sleeps until one is there.
+
+    It does not yield the processor: where others wait for that, it would be gone for a whole
+    time slice, which is longer than the calls that this is for.
+
+    Args:
+        pipe: Its descriptor.
+    """
+    until = time.perf_counter() + _SPIN * (os.name != "nt")  # where no pipe can be looked at so
+    while time.perf_counter() < until and not select.select([pipe], [], [], 0)[0]:
+        pass
 
 
 def last_line(said: bytes, code: int) -> str:

@@ -194,8 +194,6 @@ def limit_cpu(seconds: float, trace: IO[str]) -> None:
 
 def _is_of_cpu(number: int, used: float, most: float) -> bool:
     """Whether a signal that ended a process was one of a limit of `most` seconds."""
-    if sys.platform == "win32":
-        return False
     return number in (signal.SIGPROF, signal.SIGXCPU) or (number == signal.SIGKILL and used >= most)
 
 

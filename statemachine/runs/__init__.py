@@ -9,8 +9,7 @@ A recorder stands on the public face of the core; a file is npz, or parquet with
 
 from __future__ import annotations
 
-from .csv_files import export_csv
-from .files import model_file, read, shipped, shipped_names, write
+from .files import export_csv, model_file, read, shipped, shipped_names, write
 from .header import COLUMNS, CONTACTS, Header
 from .recorder import record
 from .rerun import play, record_scenario

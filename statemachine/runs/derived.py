@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from typing import Any, Literal
 
 import numpy as np
@@ -116,6 +117,8 @@ def energies(
     qpos: Array,
     qvel: Array,
     gravity: Any = None,
+    load: Callable[[Model], Model] = on_default,
+    made: Callable[[Model], AbstractContextManager[Data]] = make_data,
 ) -> tuple[Array, str]:
     """Kinetic and potential energy of states.
 
@@ -130,6 +133,8 @@ def energies(
         qpos: (n, nq) positions [rad or m]; qvel: (n, nv) velocities.
         qvel: See qpos.
         gravity: (3,) that `Model.replace` was given for it [m/s²]; None for none.
+        load: Gives the model's file on MuJoCo; made: a Data of a Model there, which is changed.
+        made: See load.
 
     Returns:
         (n, 2) kinetic and potential energy [J], and the engine and version that gave them;
@@ -137,7 +142,7 @@ def energies(
     """
     unknown = np.full((len(qpos), 2), np.nan), ""
     try:
-        yardstick = on_default(model)
+        yardstick = load(model)
         if yardstick is not model:
             if (yardstick.nq, yardstick.nv) != (qpos.shape[1], qvel.shape[1]):
                 return unknown
@@ -147,7 +152,7 @@ def energies(
                 )
             elif gravity is not None:
                 yardstick = yardstick.replace(gravity=gravity)
-        joules = room(DEFAULT).energies(yardstick, qpos, qvel)
+        joules = room(DEFAULT).energies(yardstick, qpos, qvel, made)
     except StateMachineError:
         return unknown
     return joules, f"{DEFAULT} {yardstick.engine_version}"

@@ -99,7 +99,6 @@ def run_sweep(
     """
     began = time.monotonic()
     jobs, folder = checked_jobs(jobs), Path(out)
-    require_extra("joblib", "a sweep", "joblib", "sweep")
     ready = sweep if isinstance(sweep, PreparedSweep) else prepared(sweep)
     check_folder(folder)
     with locked(folder), ExitStack() as stack:
@@ -176,7 +175,6 @@ def run_apart(
 
     `look` is called between any two waits, and may raise.
     """
-    require_extra("joblib", "a sweep", "joblib", "sweep")
     with worker_processes(jobs) as workers:
         here = [partial(submit, _RUN_APART) for submit in workers]
         yield from _results(ready, batches, here, here, look)

@@ -16,6 +16,7 @@ from .. import __version__
 from ..backends import backend_names, check_backend
 from ..compare.perturbed import EXACT, parse_uncertainty
 from ..errors import MissingEngineError, StateMachineError, refuse
+from ..installed import require_extra
 from ..interface import Model, make_data
 from ..interface.options import checked_options
 from ..models import resolve
@@ -45,8 +46,20 @@ def prepared(sweep: Sweep) -> PreparedSweep:
         StateMachineError: A model cannot be loaded on any backend.
     """
     require_parquet()
+    require_extra("joblib", "a sweep", "joblib", "sweep")
     typed = parse_vary(sweep.vary)
-    _check_numbers(sweep)
+    least = {"seeds": 1, "samples": 0, "design-seed": 0, "every": 1, "moments": 1}
+    values = {flag: getattr(sweep, flag.replace("-", "_")) for flag in least}
+    refuse(
+        *(
+            (values[flag] < smallest, f"--{flag} must be at least {smallest}; got {values[flag]}")
+            for flag, smallest in least.items()
+        ),
+        (
+            not 0 < sweep.timeout <= 86400 * 7,
+            f"--timeout must be above 0 s; got {sweep.timeout:g}",
+        ),
+    )
     function = is_function(sweep.what)
     usual = MODEL_OF_A_FUNCTION if function else scenario(sweep.what).model
     varied = [str(value) for vary in typed if vary.label == MODEL for value in vary.values]
@@ -118,21 +131,6 @@ def prepared(sweep: Sweep) -> PreparedSweep:
         EXACT if sweep.spread == "0" else parse_uncertainty(sweep.spread.split(",")),
         {model.backend: _cost(model, asked.seconds) for model in models},
         tuple(said),
-    )
-
-
-def _check_numbers(sweep: Sweep) -> None:
-    least = {"seeds": 1, "samples": 0, "design-seed": 0, "every": 1, "moments": 1}
-    values = {flag: getattr(sweep, flag.replace("-", "_")) for flag in least}
-    refuse(
-        *(
-            (values[flag] < smallest, f"--{flag} must be at least {smallest}; got {values[flag]}")
-            for flag, smallest in least.items()
-        ),
-        (
-            not 0 < sweep.timeout <= 86400 * 7,
-            f"--timeout must be above 0 s; got {sweep.timeout:g}",
-        ),
     )
 
 

@@ -22,9 +22,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .. import __version__
-from ..backends import load
+from ..backends import load, on_default
 from ..compare.perturbed import nudged_controller, nudged_start
 from ..errors import BadInputError, StateMachineError, TimedOutError
+from ..installed import DEFAULT
 from ..interface import Array, Data, Model, forward, make_data, reset
 from ..interface.records import usual_site
 from ..measures import ContactNames
@@ -78,7 +79,6 @@ def _settle() -> None:
 
 def row_of(ready: PreparedSweep, cell: SweepCell, error: BaseException | None = None) -> Row:
     """What every row of a cell has, and of one that failed what happened."""
-    columns = [vary.column for vary in ready.design.factors]
     failed = {} if error is None else {
         "error_class": type(error).__name__,
         "error": " ".join(str(error).split()) or type(error).__name__,
@@ -90,7 +90,7 @@ def row_of(ready: PreparedSweep, cell: SweepCell, error: BaseException | None = 
         "backend": cell.backend,
         "status": FAILED if failed else DONE,
         "library_version": __version__,
-        **dict(zip(columns, cell.values, strict=True)),
+        **{vary.column: v for vary, v in zip(ready.design.factors, cell.values, strict=True)},
         **failed,
     }
 
@@ -157,9 +157,9 @@ def _model(
     sweep, wrong = ready.sweep, "is not the file of the sweep: it changed, or is another here"
     if not _is_same(ready):
         raise BadInputError(f"{function_file(sweep.what).name} {wrong}")
-    seeded = {"seed": cell.seed} if "seed" in ready.parameters else {}
-    chosen = {vary.name: value for vary, value in ready.settings(cell, "parameter")}
-    scenario = sweep.scenario({**seeded, **chosen})
+    chosen: dict[str, Any] = {"seed": cell.seed} if "seed" in ready.parameters else {}
+    chosen |= {vary.name: value for vary, value in ready.settings(cell, "parameter")}
+    scenario = sweep.scenario(chosen)
     name = next((value for _, value in ready.settings(cell, "model")), next(iter(ready.files)))
     varied = [(v, value) for v, value in ready.settings(cell, "option") if value is not None]
     # A switch may be what lets an engine take the file at all: `load` is told.
@@ -180,8 +180,8 @@ def _model(
     scenario = scenario if scenario.own else on_robot
     if not (options := options_at(base, rest)):
         return base, first, scenario
-    typed = repr([(v.label, v.times, value) for v, value in rest])
-    model = _cached(key + typed, lambda: base.replace(**options))
+    key += repr([(v.label, v.times, value) for v, value in rest])
+    model = _cached(key, lambda: base.replace(**options))
     return model, {**first, **options}, scenario
 
 
@@ -206,6 +206,12 @@ def _cached(key: str, make: Callable[[], T]) -> T:
     if isinstance(result, Exception):
         raise result.with_traceback(None)
     return result
+
+
+def _on_default(model: Model) -> Model:
+    """`on_default`, whose file is read for the first cell only."""
+    here = model.backend == DEFAULT
+    return model if here else _cached(f"{model.path} on {DEFAULT}", lambda: on_default(model))
 
 
 _USED: dict[int, Data] = {}  # by the id of its Model, which it keeps
@@ -284,7 +290,9 @@ def _run(
         states = np.array([at_start[0], qpos]), np.array([at_start[1], qvel])
         row["sample_tip"] = tips = _tips(model, data, samples)
         row["tip"] = tips[-1] if tips else None
-    both, _ = energies(model, sweep.defaults, *states, options.get("gravity"))
+    both, _ = energies(
+        model, sweep.defaults, *states, options.get("gravity"), _on_default, _used_before
+    )
     row["energy_start"], row["energy"] = map(known, both.sum(axis=1))
 
 

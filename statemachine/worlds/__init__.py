@@ -11,7 +11,17 @@ from __future__ import annotations
 
 from ..interface.worlds import BATCHED, Worlds
 from .draws import LogUniform, Uniform, draw
-from .verbs import forward, get_state, make_worlds, record, reset, set_state, step
+from .verbs import (
+    forward,
+    get_state,
+    get_states,
+    make_worlds,
+    record,
+    reset,
+    set_state,
+    set_states,
+    step,
+)
 
 __all__ = [
     "BATCHED",
@@ -21,9 +31,11 @@ __all__ = [
     "draw",
     "forward",
     "get_state",
+    "get_states",
     "make_worlds",
     "record",
     "reset",
     "set_state",
+    "set_states",
     "step",
 ]

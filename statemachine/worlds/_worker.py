@@ -1,293 +1,265 @@
-"""A process that holds some of many worlds: `python -m statemachine.worlds._worker BLOCK SIZE`.
+"""A process that holds some of many worlds, seen from both its ends.
 
-It reads commands from its standard input, and ends when that does: when the process that
-started it closes it, or is no more. Ctrl-C is not for it.
+The arrays lie in memory that all of the processes share: a file without a place in any folder,
+which goes with the last process that holds it, however that ends. A process of ours inherits its
+descriptor. (Windows has a mapping by name, which goes with its last holder, too.)
+
+A command and an answer are a few bytes in a pipe, so that each is written and read whole or
+not at all, also where a signal falls in between. All else lies in shared memory: the arrays,
+what belongs to a command (the same for all processes), and a place for each one's answer.
+
+`python -m statemachine.worlds._worker BLOCK SIZE NUMBER` reads commands from its standard input,
+and ends when that does: when the process that started it closes it, or is no more. Ctrl-C is
+not for it: who waits for it writes into the memory which commands are to end, and then signals.
 """
 
 from __future__ import annotations
 
+import mmap
 import os
 import pickle
+import secrets
+import select
 import signal
+import struct
 import sys
-import threading
+import tempfile
 import time
 import traceback
 import warnings
-from _thread import interrupt_main
-from collections.abc import Callable, Sequence
+import weakref
+from collections.abc import Mapping
 from contextlib import suppress
-from queue import SimpleQueue
-from typing import Any
-
-import numpy as np
+from typing import Any, TypeVar
 
 from .. import backends
-from ..interface import INPUTS, Data, Model, forward, get_state, make_data, reset, set_state, step
-from ..processes import resident_memory
-from ._shared import (
-    ANSWER,
-    ANSWER_MOST,
-    COMMAND,
-    VERBS,
-    arrays_in,
-    open_block,
-    packed,
-    portable,
-    portable_error,
-)
+from ..errors import EngineError, shown
+from ..processes import end_with_parent, fresh_python
+from ..processes.pipes import PipedChild, await_message
+from ._holder import Holder, StepStopped, arrays_in
 
-_ENDS_IN = 1.0  # seconds in which Python code may clean up
+T = TypeVar("T")
 
-Command = tuple[int, int, int, int, int]  # as `COMMAND` has it
+# Number of the command, place in `VERBS`, argument, bytes of the payload, whether it is for the
+# worlds of `ids` only, and which derived arrays are read afterwards.
+COMMAND = struct.Struct("<qqqqqq")
+ANSWER = struct.Struct("<qq")  # number of the command, bytes
+ANSWER_MOST = 1 << 22  # bytes of an answer
+# What a process is asked for, by the methods of its `Holder`; to take the Model and begin; and to
+# say that it has ended what was asked before.
+VERBS = (
+    "start", "fill", "step", "forward", "step_and_forward", "reset", "get_states", "set_states",
+    "record", "derive", "stop",
+)  # fmt: skip
+# The value, what was raised, the error of each world that ended, and what was warned of.
+Answer = tuple[Any, Exception | None, dict[int, Exception], list[tuple[type[Warning], str]]]
+NOTHING: Answer = (None, None, {}, [])
+_ENDING = 0.3  # seconds in which one that closed its pipes has ended
 
 
-class StepStopped(BaseException):
-    """The process that asked no longer wants what is being done."""
-
-
-class Inbox:
-    """Reads the commands, in a thread, and interrupts what is being done if need be.
+class SharedBlock:
+    """A block of memory, zero at first. What nobody has written to takes no memory.
 
     Attributes:
-        commands: Those to come; None is the end.
-        number: Of the command that is being done.
-        stoppable: Whether it may be interrupted just now.
+        handle: What `open_block` in another process wants: a descriptor that is to be
+            inherited, or on Windows a name.
+        size: Bytes.
+        inherited: What `subprocess.Popen` is to be told.
     """
 
-    def __init__(self) -> None:
-        self.commands: SimpleQueue[Command | None] = SimpleQueue()
-        self.number = 0
-        self.stoppable = False
-        self._stop = 0  # commands before this one are to end
-        self._ended = False
-        signal.signal(signal.SIGINT, self._interrupted)
-        threading.Thread(target=self._read, daemon=True).start()
+    inherited: dict[str, Any]
 
-    @property
+    def __init__(self, size: int) -> None:
+        self.size = size
+        if sys.platform == "win32":
+            self.handle = f"statemachine-{os.getpid()}-{secrets.token_hex(8)}"
+            self.memory, self.inherited = mmap.mmap(-1, size, tagname=self.handle), {}
+            return
+        if hasattr(os, "memfd_create"):
+            self._file = os.memfd_create("worlds")
+        else:
+            with tempfile.TemporaryFile() as file:
+                self._file = os.dup(file.fileno())
+        # Worlds may be collected without having been closed.
+        self._end = weakref.finalize(self, os.close, self._file)
+        os.ftruncate(self._file, size)
+        self.handle, self.inherited = str(self._file), {"pass_fds": (self._file,)}
+        self.memory = mmap.mmap(self._file, size)
+
+    def close(self) -> None:
+        """Let go of it; who still has an array of it keeps that."""
+        if sys.platform != "win32":
+            self._end()
+        del self.memory
+
+
+def open_block(handle: str, size: int) -> mmap.mmap:
+    """The memory of another process's `SharedBlock`."""
+    if sys.platform == "win32":
+        return mmap.mmap(-1, size, tagname=handle)
+    file = int(handle)
+    memory = mmap.mmap(file, size)
+    os.close(file)
+    return memory
+
+
+class WorldsProcess(PipedChild):
+    """The process, for the one that started it.
+
+    Attributes:
+        worlds: Numbers of the worlds that it holds.
+    """
+
+    def __init__(self, number: int, worlds: range, block: SharedBlock, answers: int) -> None:
+        """Start it.
+
+        Args:
+            number: Its number among those of these worlds.
+            worlds: Numbers of the worlds that it is to hold.
+            block: The memory that it shares with this process.
+            answers: Where in that the answers of all processes are.
+        """
+        self.worlds = worlds
+        self._block, self._place = block, answers + number * ANSWER_MOST
+        command, environment = fresh_python(
+            f"{__package__}._worker", block.handle, str(block.size), str(number)
+        )
+        super().__init__(command, environment, **block.inherited)
+
+    def send(
+        self, number: int, verb: str, argument: int, size: int, of_ids: bool, wanted: int
+    ) -> None:
+        """Tell it something; one that has ended does not hear it."""
+        command = COMMAND.pack(number, VERBS.index(verb), argument, size, of_ids, wanted)
+        with suppress(OSError):
+            os.write(self.to.fileno(), command)
+
+    def receive(self, number: int, deadline: float | None = None) -> Answer:
+        """Wait for the answer to a command.
+
+        Raises:
+            EOFError: The process ends without one.
+            TimeoutError: The deadline (of `time.monotonic`) is over, where that can be known.
+        """
+        while True:
+            if deadline is not None and hasattr(select, "poll"):
+                poll = select.poll()
+                poll.register(self.out.fileno(), select.POLLIN)
+                if not poll.poll(max(0.0, 1000 * (deadline - time.monotonic()))):
+                    raise TimeoutError
+            await_message(self.out.fileno())
+            frame = os.read(self.out.fileno(), ANSWER.size)
+            if len(frame) < ANSWER.size:
+                raise EOFError
+            answered, size = ANSWER.unpack(frame)
+            if answered == number:
+                place = self._place
+                return pickle.loads(self._block.memory[place : place + size]) if size else NOTHING
+
+
+def end_all(processes: list[WorldsProcess], owner: int) -> None:
+    """End processes; in a fork of the process that owns them, nothing is done."""
+    if os.getpid() != owner:
+        return
+    for process in processes:
+        process.leave()
+    for process in processes:
+        process.close()
+
+
+def lost_worlds(processes: list[WorldsProcess]) -> EngineError:
+    """The error that tells which worlds are lost with those of the processes that have ended."""
+    time.sleep(_ENDING)
+    hows = {process: how for process in processes if (how := process.how_it_ended(0.0))}
+    worlds = tuple(sorted(world for process in hows for world in process.worlds))
+    numbers = ", ".join(map(str, worlds[:8])) + (", …" if len(worlds) > 8 else "")
+    named = f"world {numbers} is" if len(worlds) == 1 else f"{len(worlds)} worlds ({numbers}) are"
+    return EngineError(
+        f"{named} lost with the process that held them: {', '.join(dict.fromkeys(hows.values()))}. "
+        "These Worlds are closed: make others with make_worlds",
+        worlds=worlds,
+    )
+
+
+class _Apart(Holder):
+    """The worlds of this process, for another one."""
+
+    def __init__(self, memory: mmap.mmap, number: int) -> None:
+        super().__init__(memory, number, None)  # the Model comes with the first command
+        self._command = 0  # the number of what is being done
+        self._warnings: list[tuple[type[Warning], str]] = []
+        warnings.simplefilter("always")
+        warnings.showwarning = self._warn
+        for name in ("SIGINT", "SIGBREAK"):  # the second on Windows
+            if hasattr(signal, name):
+                signal.signal(getattr(signal, name), self._signalled)
+
     def stopped(self) -> bool:
-        """Whether the command that is being done is to end."""
-        return self._ended or self.number < self._stop
+        return self._command < self._stop.item()
 
-    def _read(self) -> None:
-        while len(frame := os.read(0, COMMAND.size)) == COMMAND.size:
-            command = COMMAND.unpack(frame)
-            if VERBS[command[1]] == "stop":
-                self._stop = command[0]
-                interrupt_main()
-            self.commands.put(command)
-        self._ended = True
-        self.commands.put(None)
-        interrupt_main()  # so that temporary files go
-        time.sleep(_ENDS_IN)
-        os._exit(1)
-
-    def _interrupted(self, _signal: int, _frame: Any) -> None:
-        """Called in the main thread, also for a Ctrl-C, which asks for nothing."""
-        if self._ended:
-            sys.exit()
-        if self.stoppable and self.stopped:
-            self.stoppable = False
+    def _signalled(self, *_: Any) -> None:
+        if self.running and self.stopped():
             raise StepStopped
 
-
-class Holder:
-    """The worlds of one process, and what can be asked of them."""
-
-    def __init__(self, inbox: Inbox, memory: Any, number: int) -> None:
-        self._inbox, self._memory, self._number = inbox, memory, number
-        self._models: list[Model] = []
-        self._variants: dict[bytes, Model] = {}  # by the options that they differ in
-        self._data: list[Data] = []
-        self._warnings: list[tuple[type[Warning], str]] = []
-
-    def answer(self, command: Command) -> dict[str, Any]:
-        """Do what was asked; what came of it, without what is nothing."""
-        _, verb, argument, size, of_ids = command
-        self._errors: dict[int, Exception] = {}
-        answer: dict[str, Any] = {}
-        try:
-            payload = pickle.loads(self._memory[:size]) if size else None
-            places: Sequence[int] = range(len(self._data))
-            if of_ids:
-                places = np.flatnonzero(self._chosen[self._number :: self._stride]).tolist()
-            value = getattr(self, f"_{VERBS[verb]}")(argument, payload, places)
-            if value is not None:
-                answer["value"] = value
-        except StepStopped:
-            pass
-        except Exception as error:
-            answer["error"] = portable_error(error)
-        if self._errors:
-            errors = self._errors.items()
-            answer["errors"] = {self._world(k): portable_error(error) for k, error in errors}
-        if self._warnings:
-            answer["warnings"] = [
-                (portable(kind, UserWarning), text) for kind, text in self._warnings
-            ]
-            self._warnings.clear()
-        return answer
-
-    def warn(self, message: Warning, kind: type[Warning], *_: Any, **__: Any) -> None:
+    def _warn(self, message: Warning, kind: type[Warning], *_: Any, **__: Any) -> None:
         """Keep a warning for the answer; in place of `warnings.showwarning`."""
         self._warnings.append((kind, str(message)))
 
-    def write(self, answer: dict[str, Any]) -> int:
-        """Put an answer where it is looked for; how many bytes it has."""
-        if not answer:
-            return 0
-        blob = packed(answer)
-        self._memory[self._place : self._place + len(blob)] = blob
-        return len(blob)
-
-    def _world(self, place: int) -> int:
-        return self._number + place * self._stride
-
-    def _start(self, place: int, job: dict[str, Any], _: Any) -> dict[str, Any]:
-        """Take the Model, and make the first two Data: what they take tells what all will."""
+    def _start(self, place: int, job: Mapping[str, Any], places: Any) -> dict[str, Any]:
         self._place = place + self._number * ANSWER_MOST
         sys.path[:] = job["path"]
         for name, loader in job["loaders"].items():
             backends.register(name, loader)
-        self._stride, self._n, self._options = job["workers"], job["n"], job["options"]
-        self._model: Model = pickle.loads(job["model"])
-        arrays = arrays_in(self._memory, job["layout"])
-        self._qpos, self._qvel, self._ctrl = (arrays[name] for name in INPUTS)
-        self._time, self._chosen, self._rows = arrays["time"], arrays["ids"], arrays["rows"]
-        self._arrays = arrays
-        self._make(1)
-        first = resident_memory()
-        self._make(2)
-        of_one = resident_memory() - first if len(self._data) == 2 else 0
-        return {"each": of_one, "left": self._all - len(self._data)}
+        self._model = pickle.loads(job["model"])
+        self._stop = arrays_in(self._memory, job["layout"])["stop"]
+        return super()._start(0, job, places)
 
-    @property
-    def _all(self) -> int:
-        """How many worlds this process is to hold."""
-        return len(range(self._number, self._n, self._stride))
+    def obey(self, command: tuple[int, int, int, int, int, int]) -> int:
+        """Do what is asked, and leave the answer where it is looked for; how many bytes it has."""
+        self._command, verb, argument, size, of_ids, wanted = command
+        payload = pickle.loads(self._memory[:size]) if size else None
+        value, raised, errors = self.answer(VERBS[verb], argument, payload, bool(of_ids), wanted)
+        warned = {(_portable(kind, UserWarning), text): None for kind, text in self._warnings}
+        self._warnings.clear()
+        ended = {world: _portable_error(error) for world, error in errors.items()}
+        answer = value, raised and _portable_error(raised), ended, list(warned)
+        if answer == NOTHING:
+            return 0
+        blob = pickle.dumps(answer)
+        if len(blob) > ANSWER_MOST:
+            error = EngineError(f"an answer of {len(blob)} bytes is too large")
+            blob = pickle.dumps((None, error, {}, []))
+        self._memory[self._place : self._place + len(blob)] = blob
+        return len(blob)
 
-    def _fill(self, _argument: int, _payload: Any, _places: Any) -> Any:
-        self._make(self._all)
-        return [data._state_layout() for data in self._data[: None if self._options else 1]]
 
-    def _make(self, most: int) -> None:
-        while len(self._data) < min(most, self._all):
-            world = self._world(len(self._data))
-            options = {name: values[world] for name, values in self._options.items()}
-            key = pickle.dumps(options)
-            if key not in self._variants:
-                self._variants[key] = self._model.replace(**options) if options else self._model
-            model = self._variants[key]
-            self._data.append(make_data(model))
-            self._models.append(model)
-            self._take(len(self._data) - 1)
+def _portable(value: T, otherwise: T) -> T:
+    """A value that another process can read; if it cannot, the other."""
+    try:
+        return pickle.loads(pickle.dumps(value))
+    except Exception:
+        return otherwise
 
-    def _put(self, place: int) -> None:
-        """Copy what the arrays have into a Data, bit by bit: it sees itself what was written."""
-        world, data = self._world(place), self._data[place]
-        data.qpos[:], data.qvel[:] = self._qpos[world], self._qvel[world]
-        data.ctrl[:] = self._ctrl[world]
-        time = self._time.item(world)
-        if time != data.time:
-            data.time = time
 
-    def _take(self, place: int) -> None:
-        """What a Data has, into the arrays."""
-        world, data = self._world(place), self._data[place]
-        self._qpos[world], self._qvel[world] = data.qpos, data.qvel
-        self._ctrl[world], self._time[world] = data.ctrl, data.time
-
-    def _step(self, nstep: int, _: Any, places: Sequence[int]) -> None:
-        self._for_all(places, lambda place: step(self._models[place], self._data[place], nstep))
-
-    def _forward(self, _argument: int, _: Any, places: Sequence[int]) -> None:
-        self._for_all(places, lambda place: forward(self._models[place], self._data[place]))
-
-    def _for_all(self, places: Sequence[int], call: Callable[[int], None]) -> None:
-        """Call something for each world that is meant; what it raises ends this world."""
-        inbox = self._inbox
-        for place in places:
-            if inbox.stopped:
-                return
-            try:
-                self._put(place)
-                self._stoppable(call, place)
-                self._take(place)
-            except Exception as error:
-                self._errors[place] = error
-                with suppress(Exception):
-                    self._take(place)
-
-    def _stoppable(self, call: Callable[[int], None], place: int) -> None:
-        inbox = self._inbox
-        try:
-            inbox.stoppable = True
-            call(place)
-            inbox.stoppable = False
-        except StepStopped:  # the Data is where it was, or where it was to be
-            self._take(place)
-            raise
-        finally:
-            inbox.stoppable = False
-
-    def _reset(self, key: int, _: Any, places: Sequence[int]) -> None:
-        keyframe = None if key < 0 else key
-        for place in places:
-            if self._inbox.stopped:
-                return
-            self._stoppable(
-                lambda place: reset(self._models[place], self._data[place], keyframe), place
-            )
-            self._take(place)
-
-    def _get_state(self, world: int, _payload: Any, _places: Any) -> Any:
-        place = world // self._stride
-        self._put(place)
-        return get_state(self._models[place], self._data[place])
-
-    def _set_state(self, world: int, state: Any, _places: Any) -> None:
-        place = world // self._stride
-        set_state(self._models[place], self._data[place], state)
-        self._take(place)
-
-    def _record(self, every: int, layout: Any, places: Sequence[int]) -> None:
-        arrays = arrays_in(self._memory, layout)
-        commands = arrays.pop("commands", None)
-        rows = next(iter(layout.values()))[1][1]
-
-        def run(place: int) -> None:
-            world, data, model = self._world(place), self._data[place], self._models[place]
-            for row in range(rows):
-                if commands is not None:
-                    data.ctrl[:] = commands[world, row]
-                step(model, data, every)
-                for name, array in arrays.items():
-                    array[world, row] = getattr(data, name)
-                self._rows[world] = row + 1
-
-        self._for_all(places, run)
-
-    def _derive(self, _argument: int, name: str, places: Sequence[int]) -> None:
-        rows = self._arrays[name]
-        for place in places:
-            if self._inbox.stopped:
-                return
-            rows[self._world(place)] = getattr(self._data[place], name)
+def _portable_error(error: Exception) -> Exception:
+    """An error that another process can read: itself, or its text."""
+    return _portable(error, EngineError(f"{type(error).__name__}: {shown(str(error))}"))
 
 
 def main(handle: str, size: str, number: str) -> None:
     """Do what is asked until there is nobody to ask."""
+    end_with_parent()  # also in the midst of a long step
     out, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)  # engines greet there, and warn
-    memory = open_block(handle, int(size))
-    inbox = Inbox()
-    holder = Holder(inbox, memory, int(number))
-    warnings.simplefilter("always")
-    warnings.showwarning = holder.warn
-    while (command := inbox.commands.get()) is not None:
-        inbox.number = command[0]
-        answer = {} if VERBS[command[1]] == "stop" else holder.answer(command)
-        os.write(out, ANSWER.pack(command[0], holder.write(answer)))
+    holder = _Apart(open_block(handle, int(size)), int(number))
+    while True:
+        await_message(0)
+        frame = os.read(0, COMMAND.size)
+        if len(frame) < COMMAND.size:
+            return
+        command = COMMAND.unpack(frame)
+        stop = VERBS[command[1]] == "stop"
+        os.write(out, ANSWER.pack(command[0], 0 if stop else holder.obey(command)))
         if VERBS[command[1]] == "fill":
             os.dup2(nothing, 2)  # until now somebody read what was said there
 

@@ -41,8 +41,8 @@ def make_worlds(
     Args:
         model: The Model.
         n: Number of worlds, at least 1.
-        workers: Threads or processes; by default one for each processor. No result depends
-            on it.
+        workers: Threads, or processes, this one included; by default one for each processor,
+            and no process for less than four worlds. No result depends on it.
         derived: The derived arrays that are kept after each call. Fewer take less memory.
         **options: Of `Model.replace`, each a sequence of n values: world i is a Data of
             `model.replace(name=values[i], ...)`.
@@ -56,10 +56,10 @@ def make_worlds(
     if not isinstance(model, Model):
         raise TypeError(f"make_worlds wants a Model, from statemachine.load; got {kind_of(model)}")
     n = as_count(n, "n")
-    workers = min(checked_jobs(None) if workers is None else as_count(workers, "workers"), n)
+    workers = None if workers is None else min(as_count(workers, "workers"), n)
     names = _names(derived, "derived array", BATCHED)
     checked = _options(model, n, options)
-    worlds = model._make_worlds(n, workers, names, checked)
+    worlds = model._make_worlds(n, workers or min(checked_jobs(None), n), names, checked)
     if worlds is None:
         from .pool import PoolWorlds
 
@@ -67,7 +67,9 @@ def make_worlds(
     return worlds
 
 
-def step(worlds: Worlds, nstep: int = 1, *, ids: ArrayLike | None = None) -> None:
+def step(
+    worlds: Worlds, nstep: int = 1, *, ids: ArrayLike | None = None, forward: bool = False
+) -> None:
     """Advance the worlds by `nstep` timesteps, each under its own ctrl.
 
     A world in which `statemachine.step` would raise is told of by a DivergedWarning and left
@@ -78,6 +80,8 @@ def step(worlds: Worlds, nstep: int = 1, *, ids: ArrayLike | None = None) -> Non
         nstep: Number of timesteps, at least 1.
         ids: Numbers of some worlds, each once, or a mask (n,) of bools; all by default. Those
             that have diverged are left out.
+        forward: Whether to do what `forward` does, too, with those that did not diverge: on an
+            engine whose worlds are in processes both are one exchange.
 
     Raises:
         BadInputError: `nstep` or `ids` is no such value.
@@ -86,7 +90,7 @@ def step(worlds: Worlds, nstep: int = 1, *, ids: ArrayLike | None = None) -> Non
     """
     _admit(worlds)
     nstep = as_count(nstep, "nstep")
-    _run(worlds, worlds._step, _chosen(worlds, ids), nstep)
+    _run(worlds, worlds._step, _chosen(worlds, ids), nstep, bool(forward))
 
 
 def forward(worlds: Worlds, *, ids: ArrayLike | None = None) -> None:
@@ -144,18 +148,35 @@ def get_state(worlds: Worlds, world: int) -> State:
         BusyDataError, ClosedDataError: As in `step`.
     """
     _admit(worlds)
-    return alone(worlds, _get_state, worlds, worlds._world(world))
-
-
-def _get_state(worlds: Worlds, world: int) -> State:
-    if world in worlds._errors:
+    number = worlds._world(world)
+    if number in worlds._errors:
         raise DivergedError(
-            f"world {world} is not usable any more ({worlds._errors[world]}): reset it, or "
+            f"world {number} is not usable any more ({worlds._errors[number]}): reset it, or "
             "set_state",
-            world=world,
+            world=number,
         )
-    worlds._check_inputs(worlds._numbers[world : world + 1])
-    return worlds._get_state(world)
+    return alone(worlds, _get_states, worlds, worlds._numbers[number : number + 1])[0]
+
+
+def get_states(worlds: Worlds, ids: ArrayLike | None = None) -> dict[int, State]:
+    """The States of worlds, by their numbers; those that have diverged are left out.
+
+    Args:
+        worlds: From `make_worlds`.
+        ids: As in `step`.
+
+    Raises:
+        BadInputError: An input is not finite, or `ids` is no such value.
+        BusyDataError, ClosedDataError: As in `step`.
+    """
+    _admit(worlds)
+    numbers = _chosen(worlds, ids)
+    return dict(zip(numbers.tolist(), alone(worlds, _get_states, worlds, numbers), strict=True))
+
+
+def _get_states(worlds: Worlds, ids: Ints) -> list[State]:
+    worlds._check_inputs(ids)
+    return worlds._get_states(ids)
 
 
 def set_state(worlds: Worlds, world: int, state: State) -> None:
@@ -166,15 +187,31 @@ def set_state(worlds: Worlds, world: int, state: State) -> None:
         BadInputError: There is no such world, or the State holds a number that is not finite.
         BusyDataError, ClosedDataError: As in `step`.
     """
+    set_states(worlds, {world: state})
+
+
+def set_states(worlds: Worlds, states: Mapping[int, State]) -> None:
+    """Overwrite worlds with States, as `set_state` does one with one.
+
+    Args:
+        worlds: From `make_worlds`.
+        states: By the number of the world; see `get_states`.
+
+    Raises:
+        ForeignStateError, BadInputError, BusyDataError, ClosedDataError: As in `set_state`.
+    """
     _admit(worlds)
-    number = worlds._world(world)
-    check_state(state, worlds.model, *worlds._state_layout(number))
-    alone(worlds, _set_state, worlds, number, state)
+    checked = {worlds._world(world): state for world, state in states.items()}
+    for world, state in checked.items():
+        check_state(state, worlds.model, *worlds._state_layout(world))
+    numbers = np.array(sorted(checked), dtype=np.int64)
+    alone(worlds, _set_states, worlds, numbers, [checked[world] for world in numbers.tolist()])
 
 
-def _set_state(worlds: Worlds, world: int, state: State) -> None:
-    worlds._set_state(world, state)
-    worlds._errors.pop(world, None)
+def _set_states(worlds: Worlds, ids: Ints, states: Sequence[State]) -> None:
+    worlds._set_states(ids, states)
+    for world in ids.tolist() if worlds._errors else ():
+        worlds._errors.pop(world, None)
 
 
 def record(

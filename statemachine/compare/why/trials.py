@@ -22,7 +22,7 @@ from ...installed import DEFAULT
 from ...interface import Model
 from ...measures import Deviation
 from ...processes import checked_jobs
-from ...processes.forks import forks_for, in_forks
+from ...processes.parallel import forks_for, in_forks
 from ...runs import Trace
 from ...runs.rerun import Rerun, SideStart, beginning_with, commands_of, start_of
 from ...runs.scenarios import Controller, Scenario

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -83,14 +84,21 @@ class MujocoEngine(RawEngine):
         if "qacc" in before:
             data.raw.qacc_warmstart[:] = before["qacc"]
 
-    def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
+    def energies(
+        self,
+        model: Model,
+        qpos: Array,
+        qvel: Array,
+        made: Callable[[Model], AbstractContextManager[Data]],
+    ) -> Array:
         """By mj_energyPos and mj_energyVel."""
-        from ...interface import make_data
+        from ...interface import reset
 
         mujoco = require("mujoco")
         energies = np.empty((len(qpos), 2))
-        with make_data(model) as data:
+        with made(model) as data:
             raw = data.raw
+            reset(model, data)
             for k in range(len(qpos)):
                 data.qpos[:], data.qvel[:] = qpos[k], qvel[k]
                 mujoco.mj_fwdPosition(model.raw, raw)
