@@ -570,8 +570,9 @@ def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs:
         out = tmp_path / name
         summary = run_sweep(sweep, out, jobs=jobs)
         assert (summary.done, dict(summary.failed), summary.missing) == (6, {kind: 2}, 0)
-        table = read_cells(out)
-        failed = [row["vary.gain"] for row in table.to_pylist() if row["status"] == "failed"]
+        failed = [
+            row["vary.gain"] for row in read_cells(out).to_pylist() if row["status"] == "failed"
+        ]
         assert failed == [2.0, 2.0]
 
 
@@ -601,28 +602,6 @@ def _group(leader: int) -> list[str]:
     """The processes of a group."""
     listed = subprocess.run(["ps", "-eo", "pgid,args"], capture_output=True, text=True, check=True)
     return [line for line in listed.stdout.splitlines() if line.split()[0] == str(leader)]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
-def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Start) -> None:
-    words, out = slow_sweep(policy, "--jobs", "2", "--json"), tmp_path / "out"
-    driver = start(*words)
-    assert soon(lambda: list(out.glob("cells/*/part-*.parquet")), 120)
-    os.kill(driver.pid, signal.SIGKILL)
-    driver.communicate()
-    before = dict(counted(out))
-    assert 0 < len(before) < 60
-    assert soon(lambda: not _group(driver.pid), 120)  # its workers end by themselves
-    second = start(*words)
-    told, error = second.communicate()
-    assert second.returncode == 0, error
-    summary = json.loads(told)
-    assert (summary["done"], summary["missing"], summary["ran"]) == (60, 0, 60 - len(before))
-    cells = [cell for cell, _ in counted(out)]
-    assert len(cells) == len(set(cells)) == 60
-    sweep = small(f"{policy}:slow", "gain=1:60:60", seconds=0.1)
-    assert {cell.id for cell in prepared(sweep).cells("mujoco")} == set(cells)
 
 
 STOPPED = "statemachine: stopped; out has what was done. Type the same to go on\n"
@@ -668,25 +647,37 @@ def test_a_sweep_that_is_stopped_keeps_what_was_done(
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no such signals")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_sweep_on_dask_that_is_stopped_goes_on(
-    policy: str, tmp_path: Path, start: Start, number: int, cluster: Any
+@pytest.mark.parametrize(
+    ("kind", "number"), [("jobs", "SIGKILL"), ("dask", "SIGTERM"), ("dask", "SIGINT")]
+)
+def test_a_sweep_that_is_killed_or_stopped_goes_on(
+    request: pytest.FixtureRequest,
+    policy: str,
+    tmp_path: Path,
+    start: Start,
+    kind: str,
+    number: str,
 ) -> None:
-    words = slow_sweep(policy, "--json", "--scheduler", cluster.scheduler_address)
+    on = ("--jobs", "2")
+    if kind == "dask":
+        on = ("--scheduler", request.getfixturevalue("cluster").scheduler_address)
+    words, out = slow_sweep(policy, "--json", *on), tmp_path / "out"
     driver = start(*words)
-    assert soon(lambda: list((tmp_path / "out").glob("cells/*/part-*.parquet")), 120)
-    os.kill(driver.pid, number)
-    told, error = driver.communicate(timeout=20)
-    assert driver.returncode == (130 if number == signal.SIGINT else -number)
-    assert (told, error) == ("", STOPPED if number == signal.SIGINT else "")
-    before = len(dict(counted(tmp_path / "out")))
-    assert 0 < before < 60
-    assert soon(lambda: not _group(driver.pid), 10)
-    second = start(*words)  # on the same workers
+    assert soon(lambda: list(out.glob("cells/*/part-*.parquet")), 120)
+    os.kill(driver.pid, getattr(signal, number))
+    said = driver.communicate(timeout=120)  # its workers end by themselves
+    assert driver.returncode == (130 if number == "SIGINT" else -getattr(signal, number))
+    assert number == "SIGKILL" or said == ("", STOPPED if number == "SIGINT" else "")
+    before = dict(counted(out))
+    assert 0 < len(before) < 60
+    assert soon(lambda: not _group(driver.pid), 120 if kind == "jobs" else 10)
+    second = start(*words)  # on the same workers, if they are Dask's
     told, error = second.communicate(timeout=120)
     assert second.returncode == 0, error
-    summary = json.loads(told)
-    assert (summary["done"], summary["ran"]) == (60, 60 - before)
+    assert_has(json.loads(told), done=60, missing=0, ran=60 - len(before))
+    cells = [cell for cell, _ in counted(out)]
+    sweep = small(f"{policy}:slow", "gain=1:60:60", seconds=0.1)
+    assert sorted(cell.id for cell in prepared(sweep).cells("mujoco")) == sorted(cells)
 
 
 @pytest.mark.slow
