@@ -38,17 +38,30 @@ SHARED = ROOT.parent / "shared"
 REQUIRED = set(filter(None, os.environ.get("STATEMACHINE_REQUIRE", "").split(",")))
 
 
-def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Code that was run in a folder by a Python of its own, which has this checkout."""
-    return subprocess.run(  # from 3.12 on Python itself warns of a fork beside threads
-        [sys.executable, "-W", "ignore:This process:DeprecationWarning", "-c", code],
+def of_python(
+    *words: object, folder: Path = ROOT, code: int | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Python with such words in a process of its own, which has this checkout.
+
+    `code` is the exit code that it must have, if that is all that is asked of it.
+    """
+    done = subprocess.run(
+        [sys.executable, *map(str, words)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,  # of a busy machine
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
         check=False,
     )
+    assert code in (None, done.returncode), done.stdout + done.stderr
+    return done
+
+
+def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Code that was run in a folder by a Python of its own, which has this checkout."""
+    silent = ("-W", "ignore:This process:DeprecationWarning")  # of a fork beside threads, from 3.12
+    return of_python(*silent, "-c", code, folder=folder)
 
 
 def lives(pid: int) -> bool:
@@ -448,22 +461,7 @@ def cli(tmp_path: Path) -> Cli:
     `code` is the exit code that it must have, if that is all that is asked of it.
     """
 
-    def run(
-        *arguments: str, code: int | None = None, **environment: str
-    ) -> subprocess.CompletedProcess[str]:
-        done = subprocess.run(
-            [sys.executable, "-m", "statemachine", *arguments],
-            capture_output=True,
-            text=True,
-            timeout=400,  # of a busy machine
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUTF8": "1", **environment},
-            check=False,
-        )
-        assert code in (None, done.returncode), done.stderr
-        return done
-
-    return run
+    return partial(of_python, "-m", "statemachine", folder=tmp_path, PYTHONUTF8="1")
 
 
 @pytest.fixture

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import ast
 import re
-import subprocess
-import sys
 import tomllib
 
-from .conftest import ROOT, assert_in
+from .conftest import ROOT, assert_in, of_python
 
 PACKAGE = ROOT / "statemachine"
 MAP = (ROOT / "docs" / "architecture.md").read_text("utf-8")
@@ -65,8 +63,7 @@ def test_the_glossary_tells_a_word_once() -> None:
 
 
 def test_the_lines_of_the_rooms_are_counted() -> None:
-    command = [sys.executable, ROOT / "docs" / "rooms.py"]
-    page = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    page = of_python(ROOT / "docs" / "rooms.py", code=0).stdout
     counted = dict(re.findall(r"\| `([\w./]+)` \| [\d,]+ \| ([\d,]+) \|", page))
     assert {room for _, room, _ in ROOMS} == set(counted) - {"__init__.py"}
     assert int(counted["errors.py"]) == len((PACKAGE / "errors.py").read_text().splitlines())

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,7 +24,7 @@ from statemachine.report.figures import svg
 from statemachine.report.notebook import _opening, build, lesson
 from statemachine.report.site import make_path
 
-from .conftest import ROOT, assert_in, refused
+from .conftest import ROOT, assert_in, of_python, refused
 
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
 
@@ -139,15 +137,8 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     )
     for name in ("models", "statemachine", "CONTRIBUTING.md"):
         (tmp_path / name).symlink_to(ROOT / name)
-    done = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", source, tmp_path / "o"],
-        capture_output=True,
-        text=True,
-        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "HOME": str(tmp_path),
-             "STATEMACHINE_DOCS_BACKENDS": "mujoco"},
-        check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    words = ("-m", "sphinx", "-W", "-q", "-b", "html", source, tmp_path / "o")
+    of_python(*words, code=0, HOME=str(tmp_path), STATEMACHINE_DOCS_BACKENDS="mujoco")
     pages = sorted((tmp_path / "o" / "path").glob("*.html"))
     assert len(pages) == len(LESSONS)
     images = []

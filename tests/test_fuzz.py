@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from fuzz.__main__ import run_apart, targets
 from statemachine.errors import BusyDataError
 from statemachine.runs import formats
 
-from .conftest import ROOT, assert_has, in_its_own_python
+from .conftest import ROOT, assert_has, in_its_own_python, of_python
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are POSIX's")
 
@@ -159,11 +158,7 @@ def test_a_target_that_crashes_is_a_failure(tmp_path: Path) -> None:
         "sys.argv = ['fuzz', 'kills', 'models', '--times', '0']\n"
         "sys.exit(fuzz.main())\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
-    )
-    assert done.returncode == 1, done.stderr
-    table = done.stdout.splitlines()
+    table = of_python("-c", code, code=1).stdout.splitlines()
     assert table[1].split()[:4] == ["kills", "0", "0", "1"]
     assert "code -6" in table[1]
     assert table[2].split() == ["models", "0", "5", "0", "none"]

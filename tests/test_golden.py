@@ -21,7 +21,7 @@ def _columns(table: np.ndarray, *names: str) -> np.ndarray:
     return np.stack([table[name] for name in names], axis=1)
 
 
-def _angles(table: np.ndarray) -> np.ndarray:
+def angles(table: np.ndarray) -> np.ndarray:
     return _columns(table, *(f"q{i}_rad" for i in range(6)))
 
 
@@ -32,7 +32,7 @@ def test_fingertip_at_200_poses(mujoco_arm: sm.Model, golden: Golden) -> None:
     positions = _columns(table, "x_m", "y_m", "z_m")
     matrices = _columns(table, *(f"R{i}{j}" for i in range(3) for j in range(3)))
     with sm.make_data(mujoco_arm) as data:
-        for qpos, position, matrix in zip(_angles(table), positions, matrices, strict=True):
+        for qpos, position, matrix in zip(angles(table), positions, matrices, strict=True):
             data.qpos = qpos
             sm.forward(mujoco_arm, data)
             assert np.abs(data.site_xpos[tip] - position).max() < 1e-12
@@ -41,16 +41,16 @@ def test_fingertip_at_200_poses(mujoco_arm: sm.Model, golden: Golden) -> None:
 
 def test_fingertip_by_the_witness(golden: Golden, pinocchio: None) -> None:
     table = golden("golden_fk")
-    poses = sm.Kinematics("so101").poses(_angles(table), "gripperframe")
+    poses = sm.Kinematics("so101").poses(angles(table), "gripperframe")
     assert np.abs(poses.pos - _columns(table, "x_m", "y_m", "z_m")).max() < 1e-12
 
 
 def test_servos_on(mujoco_scene: sm.Model, golden: Golden) -> None:
-    assert np.abs(path(mujoco_scene, 800) - _angles(golden("golden_gravity_on"))).max() < 1e-6
+    assert np.abs(path(mujoco_scene, 800) - angles(golden("golden_gravity_on"))).max() < 1e-6
 
 
 def test_servos_off(mujoco_scene: sm.Model, golden: Golden) -> None:
-    expected = _angles(golden("golden_gravity_off"))
+    expected = angles(golden("golden_gravity_off"))
     run = path(mujoco_scene.replace(actuation=False), 800)
     assert np.abs(np.degrees(run - expected)).max() < 0.0018
     lift = [f"{np.degrees(run[k, 1]):.2f}" for k in (200, 400, 600, 800)]
@@ -59,7 +59,7 @@ def test_servos_off(mujoco_scene: sm.Model, golden: Golden) -> None:
 
 def test_hold_until_and_after_its_first_contact(mujoco_scene: sm.Model, golden: Golden) -> None:
     table = golden("golden_hold")
-    expected = _angles(table)
+    expected = angles(table)
     run = path(mujoco_scene, 400, ctrl=TARGET)
     first = int(np.flatnonzero(table["ncon"])[0])
     assert first == 56

@@ -7,10 +7,7 @@ The figures are tested where they are made. After a change that was meant, write
 from __future__ import annotations
 
 import json
-import os
 import shlex
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -19,7 +16,7 @@ import pytest
 
 from statemachine.lessons import LESSONS
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT, need_engine, of_python
 
 TABLE = Path(__file__).with_suffix(".json")
 OPTIONS = {
@@ -51,14 +48,8 @@ COMMANDS = [
 
 
 def _said(command: str, folder: str | Path) -> Any:
-    done = subprocess.run(
-        [sys.executable, "-m", "statemachine", *shlex.split(command.format(ROOT=ROOT)), "--json"],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        check=False,
-    )
+    words = shlex.split(command.format(ROOT=ROOT))
+    done = of_python("-m", "statemachine", *words, "--json", folder=Path(folder))
     assert done.returncode in (0, 1), done.stderr
     return json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 

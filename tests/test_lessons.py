@@ -49,6 +49,7 @@ from .conftest import (
     assert_in,
     assert_not_in,
     lesson_result,
+    of_python,
     one_line,
     refused,
     written,
@@ -194,15 +195,7 @@ def test_the_code_is_typed_run_and_questioned(name: str, backend: str) -> None:
 @pytest.mark.parametrize("name", [lesson.name for lesson in PATH if lesson.name not in _TIMED])
 def test_what_is_shown_is_what_a_student_would_see(name: str, tmp_path: Path) -> None:
     _, taken = _take(name, "mujoco")
-    done = subprocess.run(
-        [sys.executable, "-c", taken.code],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
-        check=True,
-    )
-    assert done.stdout == taken.printed
+    assert of_python("-c", taken.code, folder=tmp_path, code=0).stdout == taken.printed
 
 
 def test_an_error_in_the_code_ends_the_lesson() -> None:

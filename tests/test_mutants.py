@@ -5,8 +5,6 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,7 +20,7 @@ from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
 from statemachine.report.grading import mutants_page
 
-from .conftest import ROOT, Cli, assert_has, opened, refused, shown, written_all
+from .conftest import ROOT, Cli, assert_has, of_python, opened, refused, shown, written_all
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -137,11 +135,8 @@ def test_the_short_step_keeps_the_clock_right(
 @pytest.mark.slow
 @pytest.mark.parametrize("plugin", [(), ("-p", "statemachine.grading.mutants.plugin")])
 def test_pytest_alone_runs_the_exercise(plugin: tuple[str, ...]) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *plugin, str(EXERCISE)],
-        capture_output=True, text=True, cwd=EXERCISE.parent, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
+    words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", *plugin, EXERCISE)
+    of_python(*words, folder=EXERCISE.parent, code=0)
 
 
 def test_the_exercise_begins_with_survivors_and_an_idle_test() -> None:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import ast
 import json
-import os
 import platform
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from .conftest import ROOT
+from .conftest import ROOT, of_python
 
 _RUN = """
 import hashlib, json, sys
@@ -56,17 +54,8 @@ _PROCESSORS = [
 ]
 
 
-def _digests(**environment: str) -> dict[str, str]:
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", _RUN],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+def _digests(**environment: Any) -> dict[str, str]:
+    return json.loads(of_python("-W", "ignore", "-c", _RUN, code=0, **environment).stdout)
 
 
 @pytest.mark.slow

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -19,7 +16,7 @@ from statemachine.lessons import PATH
 from statemachine.lessons.questions import ASKED
 from statemachine.probes.conventions import QUESTIONS
 
-from .conftest import ROOT, Cli, assert_in, need_engine, opened, written, written_all
+from .conftest import ROOT, Cli, assert_in, need_engine, of_python, opened, written_all
 
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text("utf-8")
@@ -49,6 +46,16 @@ SHOWN = [
     for part in re.finditer(r"^```text\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
     for command in re.findall(r"`(statemachine [^`]*)`", page[: part.start()])[-1:]
 ]
+# What the words of a command need to be there.
+ENGINE_OF = {
+    **dict.fromkeys(("pybullet", "compare", "audit", "view", "trace", "sweep"), "pybullet"),
+    "fingertip": "pinocchio",
+}
+ROBOT = (
+    "<mujoco><worldbody><body name='a'><inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/>"
+    "<joint name='j'/><site name='tip' pos='1 0 0'/></body></worldbody></mujoco>"
+)
+SUBMITTED = ("submissions/ann.py", "submissions/bob.py")
 MADE = ("path/", "reference/", "comparisons/")  # by `make docs`
 PYTHON = {name: "".join(blocks(page, "python")) for name, page in PAGES.items()}
 # Of exercises that are still to be written.
@@ -82,40 +89,22 @@ def test_readme_and_guides_are_short() -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     words = shlex.split(command)[1:]
-    if "pybullet" in words:
-        need_engine("pybullet")
-    if "fingertip" in words:
-        need_engine("pinocchio")
+    for engine in {ENGINE_OF[word] for word in words if word in ENGINE_OF}:
+        need_engine(engine)
     if "mujoco==" in command or "--versions" in command:
         request.getfixturevalue("old_releases")
+    solution = (ROOT / "teaching" / "solutions" / "step_loop.py").read_text()
+    written_all(tmp_path, {"robot.xml": ROBOT, **dict.fromkeys(SUBMITTED, solution)})
     if "path/to/menagerie" in words:
-        folder = request.getfixturevalue("menagerie")
-        words = [str(folder) if word == "path/to/menagerie" else word for word in words]
-    if "path/to/robot.xml" in words:
-        file = written(
-            tmp_path / "robot.xml",
-            "<mujoco><worldbody><body name='a'><inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/>"
-            "<joint name='j'/><site name='tip' pos='1 0 0'/></body></worldbody></mujoco>",
-        )
-        words = [str(file) if word == "path/to/robot.xml" else word for word in words]
-    if "submissions" in words:
-        solution = (ROOT / "teaching" / "solutions" / "step_loop.py").read_text()
-        written_all(tmp_path / "submissions", dict.fromkeys(("ann.py", "bob.py"), solution))
+        words[words.index("path/to/menagerie")] = str(request.getfixturevalue("menagerie"))
+    words = [word.replace("path/to/robot.xml", "robot.xml") for word in words]
     ours = ("exercises/", "models")
     words = [str(ROOT / word) if word.startswith(ours) else word for word in words]
-    if words and words[0] in ("compare", "audit", "view", "trace", "sweep"):
-        need_engine("pybullet")
     if "view" in words:
         words += ["--seconds", "1", "--port", "0"]
     if {"waves.npz", "played.npz", "my_controller.py"} & set(words):
         _make_traces(cli, tmp_path, words)
-    if command.startswith("python"):
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        done = subprocess.run(
-            [sys.executable, *words], capture_output=True, text=True, env=environment, check=False
-        )
-    else:
-        done = cli(*words)
+    done = of_python(*words) if command.startswith("python") else cli(*words)
     no = command in SAYS_NO or DIFFERS.match(command)
     assert done.returncode == (1 if no else 0), done.stderr
     assert done.stdout or words[:2] == ["trace", "plot"]
@@ -132,21 +121,8 @@ def _make_traces(cli: Cli, folder: Path, words: list[str]) -> None:
             assert cli(*line.split()).returncode == 0
 
 
-def _output(code: str, folder: Path) -> str:
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 def test_python_block(tmp_path: Path) -> None:
-    out = _output(PYTHON["README.md"], tmp_path)
+    out = of_python("-c", PYTHON["README.md"], folder=tmp_path, code=0).stdout
     assert out.startswith("9.0")  # 6 s of the keyframe and 600 steps
     tip = [float(word) for word in re.findall(r"-?\d\.\d+", out)[1:]]
     assert f"[{' '.join(f'{value:.4f}' for value in tip[:3])}]" in README
@@ -191,7 +167,7 @@ def test_the_code_of_a_guide_runs(page: str, tmp_path: Path) -> None:
         need_engine("pybullet")
     if page in LONG:
         need_engine("pinocchio")
-    out = _output(PYTHON[page], tmp_path)
+    out = of_python("-c", PYTHON[page], folder=tmp_path, code=0).stdout
     assert_in(out, *PRINTS[page])
     lines = {"docs/interface.md": slice(1), "docs/worlds.md": slice(-2, None)}.get(page, slice(0))
     shown = " ".join(PAGES[page].split())  # what it prints is there, too
@@ -249,8 +225,7 @@ def test_numbers_of_the_models_readme(mujoco_arm: Model) -> None:
     import statemachine as sm
 
     text = (ROOT / "models" / "so101" / "README.md").read_text()
-    mass = mujoco_arm.raw.body_mass.sum()
-    assert f"{mass:.2f} kg" in text
+    assert f"{mujoco_arm.raw.body_mass.sum():.2f} kg" in text
     assert_in(text, "0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744")
     assert mujoco_arm.dof_armature[0] == 0.028
     with opened(sm.load("so101/scene_box"), keyframe=0) as (box, data):

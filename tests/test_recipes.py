@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 import textwrap
 from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, assert_in, distribution, need_engine, written_all
+from .conftest import ROOT, assert_in, distribution, need_engine, of_python, written_all
 
 RECIPES = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 # Where a recipe says "in QUANTITIES": how the line of the file begins after which its lines go.
@@ -70,16 +67,8 @@ class Copy:
 
     def run(self, *words: str, code: int = 0) -> str:
         """A command of the copy; what it prints."""
-        done = subprocess.run(
-            [sys.executable, "-m", "statemachine", *words],
-            capture_output=True,
-            text=True,
-            cwd=self.folder,
-            env={**os.environ, "PYTHONPATH": str(self.folder), "PYTHONUTF8": "1"},
-            check=False,
-        )
-        assert done.returncode == code, done.stderr
-        return done.stdout
+        here = {"PYTHONPATH": str(self.folder), "PYTHONUTF8": "1"}
+        return of_python("-m", "statemachine", *words, folder=self.folder, code=code, **here).stdout
 
 
 @pytest.fixture
@@ -130,13 +119,8 @@ def test_a_backend(copy: Copy) -> None:
     package = written_all(copy.folder / "my_package", {"backend.py": backend, "__init__.py": ""})
     shutil.copytree(ROOT / "tests" / "made_up", package / "room")
     (register,) = code(recipe("Add a backend"))
-    done = subprocess.run(
-        [sys.executable, "-c", register],
-        capture_output=True,
-        text=True,
-        cwd=copy.folder,
-        check=True,
-    )
+    here = {"PYTHONPATH": str(copy.folder)}
+    done = of_python("-c", register, folder=copy.folder, code=0, **here)
     results = [line.split()[0] for line in done.stdout.splitlines()]
     assert set(results) <= {"passed", "skipped"}
     assert results.count("passed") > 40

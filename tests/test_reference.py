@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from copy import deepcopy
 from typing import Any
 
@@ -14,7 +12,7 @@ from reference.figures import differences, flatten
 from reference.groups import GROUPS, QUICK, absent, kept
 from reference.size import beyond, counts, lowered
 
-from .conftest import REQUIRED, ROOT, refused
+from .conftest import REQUIRED, ROOT, of_python, refused
 
 
 def _slow(group: str) -> Any:
@@ -26,9 +24,7 @@ def test_the_figures_are_those_of_the_reference(group: str) -> None:
     if absent(group):
         assert "shared" not in REQUIRED, f"{group} is not beside the checkout"
         pytest.skip(f"the public model {group} is not beside the checkout")
-    command = [sys.executable, "-m", "reference", "compare", group]
-    compared = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert compared.returncode == 0, compared.stdout[-5000:] + compared.stderr[-2000:]
+    of_python("-m", "reference", "compare", group, code=0)
 
 
 def test_every_group_has_figures() -> None:

@@ -22,79 +22,63 @@ from statemachine.backends import _edits, mujoco_backend
 from statemachine.backends._mujoco_alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
-from statemachine.interface import DERIVED, Model, State
+from statemachine.interface import Model, State, read_only
 
 from .conftest import Patch, around, need_engine, refused, registered
 from .pybullet_faults import PYBULLET_FAULTS
 
 
-def replaced(owner: type, name: str) -> Callable[[Callable[..., Any]], Patch]:
-    """A fault that puts another method, or a derived value, in the place of one."""
-    hook = "_derive" if name in DERIVED else "_find_contacts" if name == "contacts" else name
-
-    def decorate(function: Callable[..., Any]) -> Patch:
-        def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-            old = owner.__dict__[hook]
-
-            def method(self: Any, *arguments: Any) -> Any:
-                if hook == "_derive":
-                    return (
-                        function(self, lambda: old(self, name))
-                        if arguments == (name,)
-                        else old(self, *arguments)
-                    )
-                return function(self, lambda *a: old(self, *(a or arguments)), *arguments)
-
-            monkeypatch.setattr(owner, hook, method)
-
-        return apply
-
-    return decorate
+def derived(part: str, change: Callable[[MujocoData, np.ndarray], np.ndarray]) -> Patch:
+    """A fault in one derived array."""
+    return around(MujocoData, "_derive")(
+        lambda right, self, name: (
+            change(self, right(self, name)) if name == part else right(self, name)
+        )
+    )
 
 
-@replaced(MujocoData, "site_xpos")
-def a_read_recomputes(self: MujocoData, right: Callable[[], np.ndarray]) -> np.ndarray:
-    mujoco.mj_kinematics(self._home.raw, self.raw)
-    return right()
+@around(MujocoData, "_derive")
+def a_read_recomputes(right: Any, self: MujocoData, name: str) -> np.ndarray:
+    if name == "site_xpos":
+        mujoco.mj_kinematics(self._home.raw, self.raw)
+    return right(self, name)
 
 
-@replaced(MujocoData, "_reset")
-def reset_keeps_the_time(self: MujocoData, right: Callable[..., None], key: int | None) -> None:
+@around(MujocoData, "_reset")
+def reset_keeps_the_time(right: Any, self: MujocoData, key: int | None) -> None:
     time = self.raw.time
-    right(key)
+    right(self, key)
     self.raw.time = time
 
 
-@replaced(MujocoData, "_reset")
-def reset_computes(self: MujocoData, right: Callable[..., None], key: int | None) -> None:
-    right(key)
+@around(MujocoData, "_reset")
+def reset_computes(right: Any, self: MujocoData, key: int | None) -> None:
+    right(self, key)
     mujoco.mj_forward(self._home.raw, self.raw)
 
 
-@replaced(MujocoData, "_reset")
-def keyframe_forgets_ctrl(self: MujocoData, right: Callable[..., None], key: int | None) -> None:
-    right(key)
+@around(MujocoData, "_reset")
+def keyframe_forgets_ctrl(right: Any, self: MujocoData, key: int | None) -> None:
+    right(self, key)
     self.raw.ctrl[:] = 0
 
 
-@replaced(MujocoData, "_set_state")
-def state_forgets_the_commands(self: MujocoData, right: Callable[..., None], state: State) -> None:
+@around(MujocoData, "_set_state")
+def state_forgets_the_commands(right: Any, self: MujocoData, state: State) -> None:
     kept = self.raw.history.copy()
-    right(state)
+    right(self, state)
     self.raw.history[:] = kept
 
 
-@replaced(MujocoData, "_set_state")
-def state_forgets_the_warm_start(
-    self: MujocoData, right: Callable[..., None], state: State
-) -> None:
-    right(state)
+@around(MujocoData, "_set_state")
+def state_forgets_the_warm_start(right: Any, self: MujocoData, state: State) -> None:
+    right(self, state)
     self.raw.qacc_warmstart[:] = 0
 
 
-@replaced(MujocoData, "contacts")
-def contact_normal_the_other_way(self: MujocoData, right: Callable[[], Any]) -> Any:
-    found = right()
+@around(MujocoData, "_find_contacts")
+def contact_normal_the_other_way(right: Any, self: MujocoData) -> Any:
+    found = right(self)
     return dataclasses.replace(found, geom=found.geom[:, ::-1].copy())
 
 
@@ -127,19 +111,12 @@ def no_ctrl_clamp(right: Any, self: MujocoModel, raw: Any, *rest: Any, **named: 
     raw.actuator_ctrllimited[:] = 0  # behind the back of the Model's own ranges
 
 
-@replaced(MujocoData, "qacc")
-def acceleration_negated(self: MujocoData, right: Callable[[], np.ndarray]) -> np.ndarray:
-    negative = -right()
-    negative.setflags(write=False)
-    return negative
-
-
 def contacts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """A fault in one array of the contacts."""
 
-    @replaced(MujocoData, "contacts")
-    def faulty(self: MujocoData, right: Callable[[], Any]) -> Any:
-        found = right()
+    @around(MujocoData, "_find_contacts")
+    def faulty(right: Any, self: MujocoData) -> Any:
+        found = right(self)
         return dataclasses.replace(found, **{part: change(np.array(getattr(found, part)))})
 
     return faulty
@@ -175,15 +152,15 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
         {"restored_futures_agree", "forward_depends_on_the_state_alone"},
     ),
     "recovery leaves the counters": (
-        replaced(Alarms, "clear")(lambda self, right: None),
+        around(Alarms, "clear")(lambda right, self: None),
         {"divergence_is_caught_every_time"},
     ),
     "warnings are ignored": (
-        replaced(Alarms, "attend")(lambda self, right: None),
+        around(Alarms, "attend")(lambda right, self: None),
         {"not_finite_in_place_is_caught"},
     ),
     "contact is the whole constraint": (
-        replaced(MujocoData, "qfrc_contact")(lambda self, right: self.qfrc_constraint),
+        derived("qfrc_contact", lambda self, _: self.qfrc_constraint),
         {"forces_balance_at_rest"},
     ),
     "contact normal the other way": (
@@ -228,7 +205,7 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
     ),
     "inputs are new arrays": (fresh_arrays_each_time, {"inputs_are_the_same_arrays_for_life"}),
     "acceleration negated": (
-        acceleration_negated,
+        derived("qacc", lambda _, qacc: read_only(-qacc)),
         {"acceleration_is_the_rate_of_velocity", "a_force_accelerates_by_the_armature"},
     ),
     "friction of a contact the other way": (

@@ -6,9 +6,7 @@ import dataclasses
 import os
 import stat
 import threading
-import zipfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -168,26 +166,6 @@ def test_time_goes_on() -> None:
         data.time = 0.0
 
     refused((TraceError, "time does not go on", lambda: record(sm.load("so101"), back, 0.1)))
-
-
-def test_a_strange_archive_is_one_line(box: Trace, tmp_path: Path) -> None:
-    with zipfile.ZipFile(write(box, tmp_path / "good.npz")) as archive:
-        parts = {name: archive.read(name) for name in archive.namelist()}
-    huge = b"{'descr': '<f8', 'fortran_order': False, 'shape': (100000000000000,), }"
-    huge = b"\x93NUMPY\x01\x00" + (len(huge) + 1).to_bytes(2, "little") + huge + b"\n"
-    np.savez(tmp_path / "deep.npz", header=np.frombuffer(b"[" * 100_000, dtype=np.uint8))
-    for name, change in (
-        ("more", {"notes.txt": b"hello"}),
-        ("bare", {"header": b"{}"}),
-        ("huge", {"time.npy": huge}),
-        ("deep", None),
-    ):
-        path = tmp_path / f"{name}.npz"
-        if change is not None:
-            with zipfile.ZipFile(path, "w") as archive:
-                for part, content in (parts | change).items():
-                    archive.writestr(part, content)
-        refused((TraceError, "", partial(read, path)))
 
 
 def test_what_a_reader_says_at_length_is_cut(box: Trace, tmp_path: Path) -> None:

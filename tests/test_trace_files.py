@@ -33,7 +33,8 @@ def box() -> Trace:
 def npz(path: Path, trace: Trace, changes: Any = None, **entries: Any) -> Path:
     """A trace's file with another header and other entries.
 
-    These are bytes as they are, arrays, what makes another array of one, or None for none.
+    These are bytes as they are, arrays, what makes another array of one, or None for none; behind
+    a slash stands a name as it is.
     """
     facts = json.loads(trace.header.as_json()) | (changes or {})
     arrays: dict[str, Any] = {name: np.array(array) for name, array in trace.columns.items()}
@@ -42,7 +43,7 @@ def npz(path: Path, trace: Trace, changes: Any = None, **entries: Any) -> Path:
         for name, value in (arrays | entries).items():
             if value is not None:
                 array: Any = value(arrays[name]) if callable(value) else value
-                with archive.open(f"{name}.npy", "w") as out:
+                with archive.open(name[1:] if name[0] == "/" else f"{name}.npy", "w") as out:
                     out.write(value) if isinstance(value, bytes) else np.save(out, array)
     return path
 
@@ -185,6 +186,10 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
                 ({"contact_dist": None}, "contacts only"),
                 ({"speed": np.zeros(3)}, "no column 'speed'"),
                 ({"qpos": b"hello"}, "is no trace"),  # what is no array
+                ({"/notes.txt": b"hello"}, ""),
+                ({"/header": b"{}"}, ""),  # beside header.npy
+                ({"header": np.frombuffer(b"[" * 100_000, dtype=np.uint8)}, "is no trace"),
+                ({"time": claim(10**14)}, "shape"),
                 ({"qpos": claim(10**12)}, "shape"),
                 ({"qpos": claim(0, 10**18)}, "shape"),
                 ({"qpos": claim(21, 13)}, "is no trace"),  # and nothing after it
