@@ -127,8 +127,7 @@ def test_home_is_where_another_robot_starts(model: Any) -> None:
     assert trace.ctrl[0, 2] == 1  # a velocity servo is left at the keyframe's
     found, _, code = lesson("hold", robot, seconds=0.1)
     assert "sm.reset(model, data, keyframe='home')" in code
-    assert found.qpos[0, 0] == 0.2
-    assert found.keyframe == "home"
+    assert (found.qpos[0, 0], found.keyframe) == (0.2, "home")
 
 
 def test_a_force_is_never_read_as_a_place(model: Any) -> None:
@@ -279,8 +278,7 @@ def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
     assert robot.actuator_jntid.tolist() == [-1, -1, -1, 1, 1, 1, 1, 1]
     assert np.flatnonzero(np.isfinite(robot.actuator_kp)).tolist() == [6]
     assert np.flatnonzero(np.isfinite(robot.actuator_gain)).tolist() == [5]
-    assert robot.actuator_gear[5] == 3
-    assert robot.actuator_forcerange[6].tolist() == [-7, 7]
+    assert (robot.actuator_gear[5], robot.actuator_forcerange[6].tolist()) == (3, [-7, 7])
     with opened(robot, "home") as (_, data):
         data.ctrl[robot.actuator_id("m")] = 2.0
         sm.forward(robot, data)

@@ -28,8 +28,7 @@ def test_models_that_come_with_the_library() -> None:
 
 def test_every_parser_can_read_the_arm() -> None:
     root = ET.parse(ARM).getroot()
-    assert len(root.findall("worldbody/body")) == 1
-    assert len(root.findall("default")) == 1
+    assert (len(root.findall("worldbody/body")), len(root.findall("default"))) == (1, 1)
     assert not root.findall(".//include")
     assert not root.findall("keyframe")
     assert all(body.find("inertial") is not None for body in root.iter("body"))

@@ -587,9 +587,8 @@ def _lines(page: Page) -> list[str]:
 def test_the_page_says_what_suffices(of_mujoco: audit.Audit) -> None:
     page = report.page({"x": of_mujoco})
     needed = _needed(page)
-    assert needed["time"][0] == "clock"
-    assert needed["warmstart"][0] == "default, keyframe, limp, limit, clock"
-    assert needed["qpos"][0] == "all"
+    places = {name: cells[0] for name, cells in needed.items()}
+    assert_has(places, time="clock", warmstart="default, keyframe, limp, limit, clock", qpos="all")
     assert needed["ctrl"][0].startswith("none")
     assert set(needed) == {each.field for each in of_mujoco.audited[0].conclusion.missing}
     assert page.holds
@@ -631,5 +630,4 @@ def test_no_file_and_no_world_stay(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     before = bullet_clients()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     audit.run(sm.load(SCENE, backend="pybullet"), steps=5)
-    assert bullet_clients() == before
-    assert list(tmp_path.iterdir()) == []
+    assert (bullet_clients(), list(tmp_path.iterdir())) == (before, [])

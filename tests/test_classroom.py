@@ -329,9 +329,7 @@ def test_two_folders_may_have_files_of_one_name(tmp_path: Path, judged: list[str
         tmp_path, {f"{name}/ann.py": f"return # {name}\n" for name in ("monday", "tuesday")}
     )
     entries = judge_all(submissions([tmp_path / "monday", tmp_path / "tuesday"]), "mujoco")
-    assert len(entries) == 2
-    assert len({entry.name for entry in entries}) == 2
-    assert len(judged) == 2
+    assert (len(entries), len({entry.name for entry in entries}), len(judged)) == (2, 2, 2)
 
 
 def test_the_same_code_is_told_and_unwritten_files_are_not(folder: Path, judged: list[str]) -> None:

@@ -26,18 +26,14 @@ from statemachine.compare.series import normal_forces, total_forces
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.measures import COUNT, QUANTITIES, parse_tolerances, tolerance_of
 from statemachine.report import compare as report
-from statemachine.runs import Trace, record, record_scenario, write
+from statemachine.runs import Trace, record, write
 from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import Cli, assert_has, assert_in, one_line, refused
 from .small_models import NAMELESS_JOINTS, STILL, model_of
-from .test_strange_traces import changed
+from .test_strange_traces import added, changed
 from .test_strange_traces import named as by_name
-
-
-def traced(name: str, **options: Any) -> Trace:
-    scenario = SCENARIOS[name]
-    return record_scenario(scenario, sm.load(scenario.model), **options)
+from .test_traces import traced
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +59,11 @@ def test_a_trace_agrees_with_itself(box: Trace) -> None:
 
 
 def test_a_shifted_joint_is_found_with_its_size_and_time(hold: Trace) -> None:
-    qpos = hold.qpos.copy()
-    qpos[50:100, 2] += 0.01  # beyond a count of 0.00153
-    qpos[100:, 2] -= 0.001  # within
+    # Beyond a count of 0.00153, and within.
+    qpos = added(added(hold.qpos, np.s_[50:100, 2], 0.01), np.s_[100:, 2], -0.001)
     found = by_name(compare(hold, changed(hold, qpos=qpos)))
-    elbow = found.pop("elbow_flex")
     assert_has(
-        elbow,
+        found.pop("elbow_flex"),
         max=pytest.approx(0.01, rel=1e-9),
         at=pytest.approx(0.25),
         since=pytest.approx(0.25),
@@ -82,17 +76,13 @@ def test_a_shifted_joint_is_found_with_its_size_and_time(hold: Trace) -> None:
 
 
 def test_a_difference_that_stays_differs(hold: Trace) -> None:
-    qpos = hold.qpos.copy()
-    qpos[50:, 2] += 0.01
-    found = compare(hold, changed(hold, qpos=qpos))
-    assert by_name(found)["elbow_flex"].verdict == "differs"
-    assert found.worst.name == "elbow_flex"
-    assert not found.agrees
+    found = compare(hold, changed(hold, qpos=added(hold.qpos, np.s_[50:, 2], 0.01)))
+    assert by_name(found)["elbow_flex"] is found.worst
+    assert (found.worst.verdict, found.agrees) == ("differs", False)
 
 
 def test_a_turned_and_moved_box_by_as_much_as_it_was(box: Trace) -> None:
-    qpos = box.qpos.copy()
-    qpos[:, 6:9] += [0.003, 0.0, 0.004]  # 5 mm
+    qpos = added(box.qpos, np.s_[:, 6:9], [0.003, 0.0, 0.004])  # 5 mm
     w, x, y, z = qpos[:, 9:13].T.copy()
     c, s = np.cos(0.02), np.sin(0.02)  # 0.04 rad about its own z
     qpos[:, 9:13] = np.column_stack([c * w - s * z, c * x + s * y, c * y - s * x, c * z + s * w])
@@ -107,8 +97,8 @@ def test_a_turned_and_moved_box_by_as_much_as_it_was(box: Trace) -> None:
 
 def test_a_moved_and_turned_fingertip(hold: Trace) -> None:
     tip = hold.header.sites.index("gripperframe")
-    position, matrix = hold["site_xpos"].copy(), hold["site_xmat"].copy()
-    position[100, tip] += [0.0, 0.002, 0.0]
+    position = added(hold["site_xpos"], (100, tip), [0.0, 0.002, 0.0])
+    matrix = hold["site_xmat"].copy()
     turn = np.array([[np.cos(0.1), -np.sin(0.1), 0], [np.sin(0.1), np.cos(0.1), 0], [0, 0, 1]])
     matrix[:, tip] = (turn @ matrix[:, tip].reshape(-1, 3, 3)).reshape(-1, 9)
     found = by_name(compare(hold, changed(hold, site_xpos=position, site_xmat=matrix)))
@@ -158,11 +148,10 @@ def mean_force(trace: Trace, name: str) -> float:
 
 
 def test_energy_against_what_the_run_turns_over(hold: Trace) -> None:
-    energy = hold["energy"].copy()
-    total = hold["energy"].sum(axis=1)
-    energy[60:, 1] += 0.02 * np.ptp(total)
+    size = 0.02 * np.ptp(hold["energy"].sum(axis=1))
+    energy = added(hold["energy"], np.s_[60:, 1], size)
     found = by_name(compare(hold, changed(hold, energy=energy)))["energy"]
-    assert_has(found, max=pytest.approx(0.02 * np.ptp(total), rel=1e-9), verdict="differs")
+    assert_has(found, max=pytest.approx(size, rel=1e-9), verdict="differs")
 
 
 def test_a_touch_that_is_late_and_one_that_never_comes(hold: Trace) -> None:
@@ -270,17 +259,10 @@ def test_what_makes_it_less_than_a_comparison_of_engines_is_said(hold: Trace, bo
 
 
 def test_joints_without_names_are_each_compared(tmp_path: Path) -> None:
-    trace = record(
-        model_of(tmp_path, NAMELESS_JOINTS),
-        None,
-        0.2,
-    )
-    qpos = trace.qpos.copy()
-    qpos[:, 1] += 0.02
-    qpos[:, 3] += 0.003
+    trace = record(model_of(tmp_path, NAMELESS_JOINTS), None, 0.2)
+    qpos = added(trace.qpos, np.s_[:, 1:4:2], [0.02, 0.003])
     found = by_name(compare(trace, changed(trace, qpos=qpos)))
-    assert found["joint 0"].max == 0
-    assert found["joint 1"].max == pytest.approx(0.02)
+    assert (found["joint 0"].max, found["joint 1"].max) == (0, pytest.approx(0.02))
     assert found["joint 2, position"].max == pytest.approx(0.003)
 
 
@@ -300,8 +282,7 @@ def test_tolerances_are_read_in_their_units(hold: Trace) -> None:
     assert given["joint"] == pytest.approx(np.radians(0.5))
     assert [given[kind] for kind in ("tip", "energy", "contact", "force")] == [2e-3, 3e-3, 1e-2, 1]
     assert given["tip rotation"] == 1.0
-    qpos = hold.qpos.copy()
-    qpos[50:, 2] += np.radians(0.4)
+    qpos = added(hold.qpos, np.s_[50:, 2], np.radians(0.4))
     found = by_name(compare(hold, changed(hold, qpos=qpos), tolerances=given))["elbow_flex"]
     assert (found.verdict, found.reason) == ("agrees", "as given")
 
@@ -359,8 +340,7 @@ def test_one_trace_is_played_on_the_other_engine(tmp_path: Any) -> None:
 def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace, tmp_path: Path) -> None:
     for trace in (hold, box):  # its scene includes the arm, which is what Pinocchio can read
         tip = trace.header.sites.index("gripperframe")
-        position = trace["site_xpos"].copy()
-        position[30, tip, 0] += 0.001
+        position = added(trace["site_xpos"], (30, tip, 0), 0.001)
         found = witness(trace, changed(trace, site_xpos=position))
         assert found.one < 1e-12
         assert_has(found, two=pytest.approx(0.001, rel=1e-9), rows=2 * len(trace))
@@ -432,8 +412,7 @@ def test_a_robot_that_stands_still_agrees_with_itself(form: str, here: Cli, tmp_
 def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
     hold: Trace, here: Cli, tmp_path: Path
 ) -> None:
-    xpos = np.array(hold["xpos"])
-    xpos[len(xpos) // 2 :] = np.nan
+    xpos = added(hold["xpos"], np.s_[len(hold) // 2 :], np.nan)
     write(hold, tmp_path / "whole.npz")
     write(changed(hold, xpos=xpos), tmp_path / "nan.npz")
     for pair in (("nan.npz", "whole.npz"), ("whole.npz", "nan.npz")):

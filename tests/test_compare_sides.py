@@ -178,25 +178,30 @@ def test_identical_sides_differ_by_nothing_at_all(files: Path) -> None:
         assert (found.one.short, found.two.short) == (f"{engine} (first)", f"{engine} (second)")
 
 
-def test_two_files_on_one_engine(files: Path) -> None:
-    run, found = ran("hold", Side(str(files / "arm.xml")), Side(str(files / "heavy.xml")))
-    assert (found.one.label, found.two.label) == ("arm.xml", "heavy.xml")
-    assert largest(found) > 0.01
+@pytest.mark.parametrize(
+    ("left", "right", "told", "least"),
+    [
+        ("arm.xml", "heavy.xml", ("arm.xml", "heavy.xml"), 0.01),
+        ("arm.xml damping=0.3", "arm.xml damping=0.1", ("damping=0.3", "damping=0.1"), 0.01),
+        # What only one says is told of the other, too, where that is known.
+        ("arm.xml", "arm.xml timestep=0.001", ("timestep=0.002", "timestep=0.001"), 0),
+        # The shortest path that tells them apart.
+        ("old/robot/arm.xml", "new/robot/arm.xml", ("old/robot/arm.xml", "new/robot/arm.xml"), 0),
+    ],
+)
+def test_two_sides_on_one_engine_are_called_by_what_tells_them_apart(
+    files: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    left: str,
+    right: str,
+    told: tuple[str, str],
+    least: float,
+) -> None:
+    monkeypatch.chdir(files)
+    run, found = ran("hold", *parse_sides([left, right]))
+    assert labels_of(run.left.header, run.right.header).short == told
+    assert largest(found) > least
     assert run.commands == "the same"  # the left's, told to both
-
-
-def test_one_file_with_two_sets_of_options(files: Path) -> None:
-    arm = str(files / "arm.xml")
-    sides = Side(arm, options={"damping": 0.3}), Side(arm, options={"damping": 0.1})
-    run, found = ran("hold", *sides)
-    assert (found.one.label, found.two.label) == ("damping=0.3", "damping=0.1")
-    assert largest(found) > 0.01
-    # What only one says is told of the other, too, where that is known.
-    run = run_sides(asked("hold", Side(arm), Side(arm, options={"timestep": 0.001})))
-    assert labels_of(run.left.header, run.right.header).short == (
-        "timestep=0.002",
-        "timestep=0.001",
-    )
 
 
 @pytest.mark.usefixtures("bullet")
@@ -220,15 +225,6 @@ def test_an_mjcf_against_its_own_urdf() -> None:
     assert {"shoulder_pan", "elbow_flex", "gripper", "energy"} <= names
     (line,) = run.unmatched
     assert line.startswith("only so101.xml has actuators shoulder_pan, ")
-
-
-def test_the_shortest_path_that_tells_two_files_apart(files: Path) -> None:
-    sides = [Side(str(files / name / "robot" / "arm.xml")) for name in ("old", "new")]
-    run = run_sides(asked("hold", *sides))
-    assert labels_of(run.left.header, run.right.header).short == (
-        "old/robot/arm.xml",
-        "new/robot/arm.xml",
-    )
 
 
 # Joints and commands by name, by structure, by a map.
@@ -314,8 +310,7 @@ def test_a_function_sees_its_own_side(files: Path) -> None:
     run, found = ran(what, Side(str(files / "arm.xml")), Side(str(files / "turned.xml")))
     assert run.left.ctrl[0].tolist() == [0.4, 0.0]
     assert largest(found) < 1e-12
-    assert run.left.header.experiment == "own.py:hold"
-    assert run.commands == "the same"
+    assert (run.left.header.experiment, run.commands) == ("own.py:hold", "the same")
 
 
 def test_a_function_is_asked_every_so_many_steps_and_starts_anew_on_each_side(files: Path) -> None:

@@ -38,8 +38,7 @@ def test_provenance_covers_included_files(tmp_path: Path) -> None:
 
 
 def test_milestones() -> None:
-    assert milestones(4.0) == [0, 1, 2, 3, 4]
-    assert milestones(0.5) == [0, 0.5]
+    assert (milestones(4.0), milestones(0.5)) == ([0, 1, 2, 3, 4], [0, 0.5])
     assert milestones(60) == [0, 1, 2, 3, 4, 10, 20, 30, 50, 60]
 
 

@@ -180,8 +180,7 @@ def test_a_function_is_run_here_unless_asked(
 
 def test_how_many_forks() -> None:
     if forks_for(2, 1.0, 2) == 2:
-        assert forks_for(10, 1.0, 3) == 3
-        assert forks_for(1, 1.0, 3) == 1
+        assert (forks_for(10, 1.0, 3), forks_for(1, 1.0, 3)) == (3, 1)
         assert forks_for(10, 0.001, 2) == 2
     assert forks_for(10, 0.001, None) == 1  # short work
     refused((BadInputError, "jobs must be at least 1", lambda: forks_for(10, 1.0, 0)))

@@ -405,8 +405,7 @@ def test_gaps_in_words(gap: Gap, text: str) -> None:
 def test_rounding_is_left_out_beside_more() -> None:
     small, large = Gap(1e-15, "N", "box"), Gap(0.5, "N·m", "j")
     assert gaps_text([small, large]) == "0.5 N·m at j"
-    assert gaps_text([small]) == "below 1e-06 N at box"
-    assert gaps_text([]) == ""
+    assert (gaps_text([small]), gaps_text([])) == ("below 1e-06 N at box", "")
 
 
 def test_a_figure_and_its_place_stay_on_one_line() -> None:

@@ -63,8 +63,7 @@ def test_batch_is_the_single_pose_many_times() -> None:
     qpos = np.random.default_rng(1).uniform(-1, 1, (20, 6))
     for kind, name in (("site", "gripperframe"), ("body", "wrist")):
         batch = kinematics.poses(qpos, name, kind)  # pyright: ignore[reportArgumentType]
-        assert batch.pos.shape == (20, 3)
-        assert batch.mat.shape == (20, 3, 3)
+        assert (batch.pos.shape, batch.mat.shape) == ((20, 3), (20, 3, 3))
         for k in range(20):
             pose = kinematics.pose(qpos[k], name, kind)  # pyright: ignore[reportArgumentType]
             assert np.array_equal(pose.pos, batch.pos[k])

@@ -422,8 +422,7 @@ def test_forward_computes_what_it_shows(asked: tuple[str, ...], backend: str) ->
 
 
 def test_what_a_lesson_shows_when_it_is_asked_for_all() -> None:
-    assert LESSONS["forward"].more == ("arrays", "lag")
-    assert LESSONS["time"].more == ()
+    assert (LESSONS["forward"].more, LESSONS["time"].more) == (("arrays", "lag"), ())
 
 
 def test_of_which_moment_a_step_leaves_what(backend: str) -> None:

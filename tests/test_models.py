@@ -153,8 +153,7 @@ def test_a_model_without_anything_steps(tmp_path: Path) -> None:
         sm.forward(model, data)
         sm.step(model, data, 3)
         sm.set_state(model, data, sm.get_state(model, data))
-        assert data.qpos.shape == (0,)
-        assert data.time == pytest.approx(3 * model.timestep)
+        assert (data.qpos.shape, data.time) == ((0,), pytest.approx(3 * model.timestep))
 
 
 @pytest.mark.parametrize("where", ["robot/urdf", "robot"])
@@ -167,7 +166,6 @@ def test_meshes_of_ros_packages_are_found_in_the_folders_above(tmp_path: Path, w
     file.parent.mkdir(exist_ok=True)
     file.write_text(PACKAGED_URDF.format(name="a &amp; b.obj"))
     model = sm.load(file)
-    assert model.nq == 1
-    assert model.compiled.nmesh == 1
+    assert (model.nq, model.compiled.nmesh) == (1, 1)
     file.write_text(PACKAGED_URDF.format(name="none.obj"))
     refused((errors.ModelError, r"none\.obj", lambda: sm.load(file)))

@@ -168,16 +168,11 @@ def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) 
             sm.step(calm, other)
         sm.reset(model, data)
         with pytest.warns(EngineWarning):
-            sm.step(model, data)
+            sm.forward(model, data)
         sm.reset(model, data)
         with warnings.catch_warnings(action="error"):
             refused((EngineWarning, "", lambda: sm.step(model, data)))
             sm.get_state(model, data)  # a warning is no trouble
-
-
-def test_forward_warns_too(tmp_path: Path) -> None:
-    with opened(crowded(tmp_path, 18, "300K")) as (model, data), pytest.warns(EngineWarning):
-        sm.forward(model, data)
 
 
 def test_a_data_that_raw_drove_to_nan_says_so_at_the_next_step() -> None:

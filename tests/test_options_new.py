@@ -79,14 +79,22 @@ def test_the_value_that_is_wrong_is_named(
     refused((BadInputError, says, lambda: model.replace(**{option: value})))
 
 
-def test_options_add_up_and_their_order_does_not_count(box: sm.Model) -> None:
-    options = {"mass": 1.5 * box.body_mass, "kv": 3.0, "friction": 0.5, "kp": 200.0}
-    once = box.replace(**options)
-    step_by_step = box
-    for name in reversed(options):
-        step_by_step = step_by_step.replace(**{name: options[name]})
-    for name in ("body_mass", "actuator_kp", "actuator_kv", "geom_friction"):
-        np.testing.assert_array_equal(getattr(once, name), getattr(step_by_step, name))
+@pytest.mark.parametrize("order", [1, -1])
+def test_options_add_up_and_their_order_does_not_count(box: sm.Model, order: int) -> None:
+    options = {
+        **{"mass": 1.5 * box.body_mass, "kv": 3.0, "friction": 0.5, "kp": 200.0},
+        **{"substeps": 5, "timestep": 0.01, "latency": 0.03},
+    }
+    once, each = box.replace(**options), box.replace(timestep=0.004, latency=0.5)
+    for name in list(options)[::order]:
+        each = each.replace(**{name: options[name]})
+    for model in (once, each, each.replace(latency=once.actuator_delay)):
+        assert (model.timestep, model.substeps) == (0.01, 5)
+        np.testing.assert_allclose(model.actuator_delay, 0.03, rtol=1e-12)
+        for name in ("body_mass", "actuator_kp", "actuator_kv", "geom_friction"):
+            np.testing.assert_array_equal(getattr(once, name), getattr(model, name))
+        with opened(model, nstep=3) as (_, data):
+            assert data.time == pytest.approx(0.03)
     # The friction of turning stays.
     np.testing.assert_array_equal(once.geom_friction[:, 1:], box.geom_friction[:, 1:])
 
@@ -187,20 +195,6 @@ def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, back
             worlds.reset(many, keyframe=0)
             rows = worlds.record(many, 30, ("qpos",))["qpos"][0]
         assert np.abs(rows - of).max() < 1e-9
-
-
-def test_latency_follows_the_timestep(arm: sm.Model) -> None:
-    orders = (
-        arm.replace(latency=0.03).replace(timestep=0.001),
-        arm.replace(timestep=0.001).replace(latency=0.03),
-        arm.replace(latency=0.03, timestep=0.001),
-        arm.replace(timestep=0.01, latency=0.5).replace(timestep=0.001, latency=0.03),
-    )
-    for each in orders:
-        np.testing.assert_allclose(each.actuator_delay, 0.03, rtol=1e-12)
-    assert orders[0].timestep == 0.001
-    again = orders[0].replace(latency=orders[0].actuator_delay)
-    np.testing.assert_array_equal(again.actuator_delay, orders[0].actuator_delay)
 
 
 def test_a_latency_of_whole_steps_is_that_many_at_any_time(tmp_path: Path) -> None:

@@ -505,8 +505,7 @@ def test_the_same_figure_has_the_same_bytes(
             assert matplotlib.rcParams["font.size"] == 20
         monkeypatch.delenv("SOURCE_DATE_EPOCH")
         target = tmp_path / f"a.{form}"
-        assert write_plot(figure, target) == len(once)
-        assert target.read_bytes() == once
+        assert (write_plot(figure, target), target.read_bytes()) == (len(once), once)
 
 
 @pytest.mark.usefixtures("matplotlib")

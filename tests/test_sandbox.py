@@ -79,8 +79,7 @@ def test_it_is_ended_from_outside() -> None:
 
 def test_a_flood_is_read_and_dropped() -> None:
     done = _python("import os\nfor _ in range(300): os.write(2, b'x' * 65536)", output_most=1000)
-    assert done.code == 0
-    assert len(done.stderr) == 1000
+    assert (done.code, len(done.stderr)) == (0, 1000)
 
 
 def test_a_flood_without_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:

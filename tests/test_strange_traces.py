@@ -46,7 +46,7 @@ def named(found: Comparison) -> dict[str, Agreement]:
     return {each.name: each for each in found.agreements}
 
 
-def added(array: Any, row: Any, by: float) -> Any:
+def added(array: Any, row: Any, by: Any) -> Any:
     copy = np.array(array)
     copy[row] += by
     return copy
@@ -65,8 +65,7 @@ def test_what_is_no_number_never_agrees(column: str, quantity: str, box: Trace) 
     other = changed(box, None, **{column: added(box[column], 20, np.nan)})
     found = compare(box, other)
     assert not found.agrees
-    assert named(found)[quantity].verdict == "differs"
-    assert found.worst.name == quantity
+    assert (named(found)[quantity].verdict, found.worst.name) == ("differs", quantity)
     assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
     assert "nan" not in shown(report.page(found, box, other))
 

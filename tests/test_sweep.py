@@ -333,8 +333,7 @@ def test_a_request_is_kept_and_another_one_refused(tmp_path: Path) -> None:
     settle_manifest(tmp_path, first.manifest(), False)
     settle_manifest(tmp_path, first.manifest(), False)
     told = read_manifest(tmp_path)
-    assert design_of(told) == first.design
-    assert (told["cells"], told["points"]) == (2, 2)
+    assert (design_of(told), told["cells"], told["points"]) == (first.design, 2, 2)
     longer = prepared(small("hold", "timestep=0.005,0.01", seconds=0.1))
     more = prepared(small("hold", "timestep=0.005,0.01", seeds=2))
     other = prepared(small("hold", "damping=1"))

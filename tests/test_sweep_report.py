@@ -157,8 +157,7 @@ def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> 
         tmp_path / "s", design, nowhere, ishigami, fails=lambda b, v, _: b == "mujoco" and v == gone
     )
     found = of(folder)
-    assert found.failed == {"DivergedError": 1}
-    assert found.quantity.counts["no runs"] == 1
+    assert (found.failed, found.quantity.counts["no runs"]) == ({"DivergedError": 1}, 1)
     assert the(found.sensitivity).samples == 128
     assert "1 of 256 samples" in the(found.sensitivity).notes[0]
     assert shares(found)["y"][0] == pytest.approx(ISHIGAMI["y"][0], abs=0.15)

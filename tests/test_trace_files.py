@@ -188,7 +188,7 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
                 ({"qpos": b"hello"}, "is no trace"),  # what is no array
                 ({"/notes.txt": b"hello"}, ""),
                 ({"/header": b"{}"}, ""),  # beside header.npy
-                ({"header": np.frombuffer(b"[" * 100_000, dtype=np.uint8)}, "is no trace"),
+                ({"header": np.frombuffer(b"[" * 100_000, dtype=np.uint8)}, "no header"),
                 ({"time": claim(10**14)}, "shape"),
                 ({"qpos": claim(10**12)}, "shape"),
                 ({"qpos": claim(0, 10**18)}, "shape"),

@@ -60,50 +60,38 @@ def model(box: sm.Model) -> sm.Model:
     return box
 
 
-def _meanwhile(data: sm.Data, use: Callable[[], object]) -> list[BaseException | None]:
+def _meanwhile(
+    data: sm.Data, use: Callable[[], object], hook: str = "_advance"
+) -> list[BaseException | None]:
     """Let another thread use something in the middle of the next step; what it raised."""
-    right, raised = data._advance, []
+    place: Any = data if hook == "_advance" else type(data)
+    put = object.__setattr__ if place is data else type.__setattr__
+    right, raised = getattr(place, hook), []
 
-    def advance(*args: object) -> None:
-        object.__setattr__(data, "_advance", right)
+    def hooked(*args: object) -> None:
+        put(place, hook, right)
         right(*args)
         raised.append(raised_in_a_thread(use))
 
-    object.__setattr__(data, "_advance", advance)
+    put(place, hook, hooked)
     return raised
 
 
 @pytest.mark.parametrize("name", USES)
-def test_a_second_thread_is_refused_while_one_steps(model: sm.Model, name: str) -> None:
+@pytest.mark.parametrize(("verb", "hook"), [("bulk", "_advance"), ("reset", "_reset")])
+def test_a_second_thread_is_refused_while_one_steps_or_resets(
+    model: sm.Model, verb: str, hook: str, name: str
+) -> None:
+    """And the Data is not one that diverged: it is only in the middle of something."""
     with opened(model, 0, nstep=20) as (_, data), opened(model, 0, nstep=20) as (_, alone):
-        raised = _meanwhile(data, lambda: USES[name](model, data))
+        raised = _meanwhile(data, lambda: USES[name](model, data), hook)
         for each in (data, alone):
+            USES[verb](model, each)
             sm.step(model, each, 3)
-        (error,) = raised
-        assert isinstance(error, BusyDataError)
+        assert [type(error) for error in raised] == [BusyDataError]
         assert np.array_equal(data.qacc, alone.qacc)
         assert sm.get_state(model, data) == sm.get_state(model, alone)
         USES[name](model, data)  # afterwards nothing is held any more
-
-
-@pytest.mark.parametrize("name", USES)
-def test_a_reset_under_way_is_a_busy_data(
-    model: sm.Model, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Not one that diverged: it is only in the middle of a reset."""
-    raised: list[BaseException | None] = []
-    with sm.make_data(model) as data:
-        right = type(data)._reset
-
-        def slow(self: Any, key: int | None) -> None:
-            raised.append(raised_in_a_thread(lambda: USES[name](model, data)))
-            right(self, key)
-
-        with monkeypatch.context() as patch:
-            patch.setattr(type(data), "_reset", slow)
-            sm.reset(model, data)
-        assert [type(error) for error in raised] == [BusyDataError]
-        USES[name](model, data)
 
 
 def _in_each_step(data: sm.Data, act: Callable[[], object]) -> None:

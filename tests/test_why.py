@@ -114,8 +114,7 @@ def test_a_cause_is_found_on_another_engine_too(arm: Model) -> None:
     with registered("hidden", "tests.hidden_world:load"):
         two = sm.load("so101/scene", backend="hidden").replace(armature=armature)
         result = explain(arm, two, HOLD, uncertain=None)
-    assert shares(result) == {"armature": pytest.approx(1.0)}
-    assert result.brought == 0.0
+    assert (shares(result), result.brought) == ({"armature": pytest.approx(1.0)}, 0.0)
 
 
 def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -618,8 +617,7 @@ def test_an_integrator_is_found_behind_contact_too() -> None:
 def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
     fresh = quietly("so101/scene", defaults="engine")
     result = explain(fresh, fresh.replace(gravity=[0, 0, -9.81]), HOLD, uncertain=None)
-    assert list(shares(result)) == ["gravity"]
-    assert result.brought == 0.0
+    assert (list(shares(result)), result.brought) == (["gravity"], 0.0)
 
 
 @pytest.mark.usefixtures("bullet")

@@ -367,8 +367,7 @@ def test_what_is_refused_is_said(
 def test_what_is_not_kept_is_not_there(box: sm.Model) -> None:
     with worlds_of(box, 2, derived=("xpos",)) as worlds:
         many.step(worlds)
-        assert worlds.derived == ("xpos",)
-        assert worlds.xpos.shape == (2, box.nbody, 3)
+        assert (worlds.derived, worlds.xpos.shape) == (("xpos",), (2, box.nbody, 3))
         refused(
             (AttributeError, "do not keep 'qacc'", lambda: worlds.qacc),
             (UnknownNameError, "", lambda: many.record(worlds, 1, ["qacc"])),

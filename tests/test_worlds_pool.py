@@ -409,8 +409,7 @@ def test_a_script_without_a_main_and_without_a_close(tmp_path: Path) -> None:
         _SCRIPT + "step(worlds, 3)\nprint(worlds.time)", cwd=tmp_path, start_new_session=True
     )
     numbers = [int(pid) for pid in run.stdout.readline().split()]
-    assert rest(run) == (0, "[0.015 0.015 0.015]\n", "")
-    assert len(numbers) == 2
+    assert (rest(run), len(numbers)) == ((0, "[0.015 0.015 0.015]\n", ""), 2)
     assert all_end(numbers, 0.5)
     assert set(os.listdir("/dev/shm")) <= shared
     assert not list(tmp_path.iterdir())
