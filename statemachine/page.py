@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
@@ -16,6 +17,14 @@ if TYPE_CHECKING:
     Numbers = Sequence[float] | NDArray[Any]
 
 R = TypeVar("R")  # a record that is a row of a table
+
+
+class Figures(SimpleNamespace):
+    """What was measured, by name: the slots of a page are filled from it, and JSON prints it.
+
+    What each of them is, and its unit, is said where it is measured. One whose name begins with an
+    underscore is for pages alone.
+    """
 
 
 @dataclass(frozen=True)

@@ -283,6 +283,11 @@ def shown(page: Page) -> str:
     return said.getvalue()
 
 
+def with_figures(figures: Any, **others: Any) -> Any:
+    """Figures of which some are others."""
+    return type(figures)(**vars(figures) | others)
+
+
 def lesson_result(name: str, model: Model, **options: Any) -> Any:
     """What a lesson finds on a Model."""
     return take(LESSONS[name], model, model.backend, options).result

@@ -25,7 +25,7 @@ from statemachine.errors import BadInputError, EngineError, EngineWarning
 from statemachine.installed import require
 from statemachine.interface import JointType
 from statemachine.measures import JointPlaces
-from statemachine.page import Items, Page, Table
+from statemachine.page import Figures, Items, Page, Table
 from statemachine.probes import audit
 from statemachine.probes.audit import drivers_of, trials
 from statemachine.probes.audit.conclusions import conclude
@@ -95,18 +95,18 @@ def test_quaternions_are_apart_by_their_angle(angle: float) -> None:
 
 
 @pytest.fixture(scope="module")
-def of_mujoco() -> audit.Audit:
+def of_mujoco() -> Figures:
     return audit.run(sm.load(SCENE), steps=40)
 
 
 @pytest.fixture(scope="module")
-def of_pybullet() -> audit.Audit:
+def of_pybullet() -> Figures:
     need_engine("pybullet")
     return audit.run(sm.load(SCENE, backend="pybullet"), steps=40)
 
 
 @pytest.mark.slow
-def test_mujoco_needs_its_warm_start_in_contact(of_mujoco: audit.Audit) -> None:
+def test_mujoco_needs_its_warm_start_in_contact(of_mujoco: Figures) -> None:
     engine, interface = of_mujoco.audited
     found = engine.conclusion
     assert found.suffice == ("mjSTATE_INTEGRATION", "mj_copyData")
@@ -136,7 +136,7 @@ def test_mujoco_needs_its_warm_start_in_contact(of_mujoco: audit.Audit) -> None:
     }
 
 
-def test_mujoco_is_tried_where_it_should_be(of_mujoco: audit.Audit) -> None:
+def test_mujoco_is_tried_where_it_should_be(of_mujoco: Figures) -> None:
     seen = {each.point: each for each in of_mujoco.audited[0].points}
     assert seen["default"].speed < 1e-6
     assert seen["motion"].contacts == 0
@@ -148,7 +148,7 @@ def test_mujoco_is_tried_where_it_should_be(of_mujoco: audit.Audit) -> None:
 
 
 @pytest.mark.slow
-def test_pybullet_forgets_its_contacts(of_pybullet: audit.Audit) -> None:
+def test_pybullet_forgets_its_contacts(of_pybullet: Figures) -> None:
     engine, interface = of_pybullet.audited
     found = engine.conclusion
     assert found.suffice == ()
@@ -176,7 +176,7 @@ COMMON = {"again", "look", "two at once", "restore", "threads", "process"}
 
 
 @pytest.mark.slow
-def test_a_call_that_is_harmless_here_moves_falling_boxes(of_pybullet: audit.Audit) -> None:
+def test_a_call_that_is_harmless_here_moves_falling_boxes(of_pybullet: Figures) -> None:
     """By 0.6 mm to 13 cm, as was measured on the raw engine, where contacts come and go."""
     call, engine = "performCollisionDetection", of_pybullet.audited[0]
     found = [each for each in engine.findings if each.case == call]
@@ -197,7 +197,7 @@ def test_a_call_that_is_harmless_here_moves_falling_boxes(of_pybullet: audit.Aud
     assert [(row[0], row[2]) for row in rows] == [(call, f"{1e3 * off:.0f} mm")]
 
 
-def test_no_call_of_mujoco_moves_falling_boxes(of_mujoco: audit.Audit) -> None:
+def test_no_call_of_mujoco_moves_falling_boxes(of_mujoco: Figures) -> None:
     engine, interface = of_mujoco.audited
     drops = [each for each in engine.findings if each.point.startswith(trials.FALL)]
     assert {each.case for each in drops} >= {"mj_forward", "mj_inverse"}
@@ -205,7 +205,7 @@ def test_no_call_of_mujoco_moves_falling_boxes(of_mujoco: audit.Audit) -> None:
     assert not any(each.point.startswith(trials.FALL) for each in interface.findings)
 
 
-def _experiments(one: audit.Audited) -> set[str]:
+def _experiments(one: Figures) -> set[str]:
     assert all(each.gap.steps > 0 for each in one.findings)
     return {each.experiment for each in one.findings}
 
@@ -553,7 +553,7 @@ def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch
 # Conclusions follow from findings, and a page from conclusions.
 
 
-def test_conclusions_follow_from_findings(of_mujoco: audit.Audit) -> None:
+def test_conclusions_follow_from_findings(of_mujoco: Figures) -> None:
     """Another engine would get other sentences."""
     engine = of_mujoco.audited[0]
 
@@ -565,8 +565,8 @@ def test_conclusions_follow_from_findings(of_mujoco: audit.Audit) -> None:
     changed = [without_warm_start(each) for each in engine.findings]
     found = conclude(changed)
     assert found.idle == ("warmstart",)
-    other = dataclasses.replace(engine, findings=tuple(changed), conclusion=found)
-    changed_page = report.page({"x": dataclasses.replace(of_mujoco, audited=(other,))})
+    other = Figures(**vars(engine) | {"findings": tuple(changed), "conclusion": found})
+    changed_page = report.page({"x": Figures(**vars(of_mujoco) | {"audited": (other,)})})
     assert "warmstart" not in _needed(changed_page)
     assert any("warmstart" in line for line in _lines(changed_page))
     assert not any("warmstart" in line for line in _lines(report.page({"x": of_mujoco})))
@@ -584,7 +584,7 @@ def _lines(page: Page) -> list[str]:
     return [line for block in page.blocks if isinstance(block, Items) for line in block.texts]
 
 
-def test_the_page_says_what_suffices(of_mujoco: audit.Audit) -> None:
+def test_the_page_says_what_suffices(of_mujoco: Figures) -> None:
     page = report.page({"x": of_mujoco})
     needed = _needed(page)
     places = {name: cells[0] for name, cells in needed.items()}
@@ -595,7 +595,7 @@ def test_the_page_says_what_suffices(of_mujoco: audit.Audit) -> None:
 
 
 @pytest.mark.slow
-def test_the_page_says_that_nothing_suffices(of_pybullet: audit.Audit) -> None:
+def test_the_page_says_that_nothing_suffices(of_pybullet: Figures) -> None:
     page = report.page({"x": of_pybullet})
     assert _needed(page) == {}
     assert any("acts through contacts" in line for line in _lines(page))

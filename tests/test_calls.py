@@ -23,12 +23,10 @@ from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
 from statemachine.engines.call_watch import CLOSED, NEW
 from statemachine.errors import BadInputError, UnknownNameError
-from statemachine.page import Page, Table
+from statemachine.page import Figures, Page, Table
 from statemachine.probes import calls
 from statemachine.probes.calls import (
     CallRecorder,
-    CallRecording,
-    Statement,
     record,
     recorded_engines,
 )
@@ -74,14 +72,14 @@ def engine(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
-def short(engine: str, code: str) -> list[Statement]:
+def short(engine: str, code: str) -> list[Figures]:
     """What each line of some code did, after a Data was made."""
     recording = record(SHORT.format(engine=engine, code=code), engine)
     assert recording.error is None
     return list(recording.statements[3:])
 
 
-def counts(recording: CallRecording, engine: str | None = None) -> Counter[str]:
+def counts(recording: Figures, engine: str | None = None) -> Counter[str]:
     found: Counter[str] = Counter()
     for statement in recording.statements:
         for call in statement.calls:
@@ -184,7 +182,7 @@ def test_no_call_goes_round_the_recorder(engine: str) -> None:
 
 def test_early_hold_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """That the test above can fail."""
-    early, lines = mujoco.mj_forward, list[Statement]()
+    early, lines = mujoco.mj_forward, list[Figures]()
     monkeypatch.setattr(MujocoData, "_recompute", lambda self: early(self._home.raw, self.raw))
     run = functools.partial(short, "mujoco", "sm.forward(model, data)")
     assert past_the_recorder("mujoco", lambda: lines.extend(run())) == {"mj_forward"}

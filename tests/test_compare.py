@@ -377,7 +377,7 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
     assert ", recorded" in found.two.label
     if defaults == "model":
         assert found.agrees == (name in ("droop", "fall", "waves"))
-    assert report.page(found, one, two, said=run.said).blocks
+    assert report.page(found, said=run.said).blocks
 
 
 # The command.

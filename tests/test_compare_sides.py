@@ -391,7 +391,7 @@ def test_feedback_that_makes_the_difference_and_a_machine_that_is_the_same(files
     closed, opened = compare(run.left, run.right), compare(run.left, run.played)
     assert not closed.agrees
     assert largest(opened) == 0
-    assert not report.page(closed, run.left, run.right, run=run, played=opened).holds
+    assert not report.page(closed, run=run, played=opened).holds
 
 
 def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import compare, touches
+from statemachine.compare import compare
 from statemachine.measures import (
     ContactNames,
     Gap,
@@ -42,8 +42,8 @@ def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(trace: T
     assert {each.name for each in found.agreements if each.kind == "contact"} == {
         f"{name}, first touch"
     }
-    assert [touch.pair for touch in touches(trace, trace)] == [name]
-    assert {event.what for event in events_of(found, touches(trace, trace)) if event.what} == {name}
+    assert [touch.pair for touch in found.touches] == [name]
+    assert {event.what for event in events_of(found) if event.what} == {name}
     assert list(of_trace(trace).touches) == [name]
     # The lesson and freshness also say which of the gripper's geoms it is.
     model = sm.load("so101/scene")

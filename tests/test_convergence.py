@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 import statemachine as sm
-from statemachine.compare import TimestepConvergence, convergence
+from statemachine.compare.convergence import convergence
 from statemachine.errors import EndedEarlyError
+from statemachine.page import Figures
 from statemachine.report.steps import convergence as page
 from statemachine.runs import Trace, record, write
 
@@ -18,7 +19,7 @@ from .conftest import Cli, one_line, refused, written
 from .small_models import FALLING_BAR
 
 
-def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> TimestepConvergence:
+def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> Figures:
     usual = {"integrator": "implicitfast", "flag": "", "mass": "0.1", "height": "0.3"}
     usual["touch"] = 'contype="0" conaffinity="0"'
     models = [

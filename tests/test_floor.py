@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import FloorBand, Uncertainty, chaos_floor, compare, perturbed_runs
+from statemachine.compare import Uncertainty, chaos_floor, compare, perturbed_runs
 from statemachine.compare.matching import match_models
 from statemachine.compare.perturbed import ROUNDING, parse_uncertainty
 from statemachine.compare.why.gap import Ruler
 from statemachine.errors import BadInputError
+from statemachine.page import Figures
 from statemachine.report import compare as report
 from statemachine.runs import Trace
 from statemachine.runs.rerun import Rerun
@@ -27,14 +28,12 @@ def rerun(model: sm.Model, seconds: float, **start: Any) -> Rerun:
     return Rerun(model, lambda _: None, seconds, **start)
 
 
-def band_of(run: Rerun, name: str, two: Trace | None = None, **how: Any) -> FloorBand:
+def band_of(run: Rerun, name: str, two: Trace | None = None, **how: Any) -> Figures:
     """The floor of one quantity of a run, against itself or another."""
     one = run.record()
     two = one if two is None else two
     (band,) = [
-        band
-        for band in chaos_floor(compare(one, two), one, two, run, **how).bands
-        if band.name == name
+        band for band in chaos_floor(compare(one, two), run, **how).bands if band.name == name
     ]
     return band
 
@@ -48,14 +47,14 @@ def test_a_damped_pendulum_that_hangs_has_a_floor_at_rounding(tmp_path: Path) ->
 def test_the_floor_of_a_double_pendulum_grows(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 20.0, qpos=np.array([2.5, 1.0]))
     band = band_of(run, "lower")
-    assert band.width[0] < 1e-9
-    assert band.end > 1e4 * band.width[0]
+    assert band._width[0] < 1e-9
+    assert band.end > 1e4 * band._width[0]
 
 
 def test_the_floor_of_a_box_that_lands_on_an_edge_grows_with_the_impact(tmp_path: Path) -> None:
     tilt = np.array([0.0, 0.0, 0.4, np.cos(0.6), np.sin(0.6) * 0.8, np.sin(0.6) * 0.6, 0.0])
     band = band_of(rerun(model_of(tmp_path, TILTED_BOX), 1.0, qpos=tilt), "box, rotation")
-    before = band.width[:75]  # 0.15 s
+    before = band._width[:75]  # 0.15 s
     assert band.most > 20 * before.max()
 
 
@@ -63,10 +62,10 @@ def test_identical_sides_are_inside_all_the_time(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 2.0, qpos=np.array([2.5, 1.0]))
     trace = run.record()
     comparison = compare(trace, trace)
-    floor = chaos_floor(comparison, trace, trace, run)
+    floor = chaos_floor(comparison, run)
     assert {band.inside_from for band in floor.bands} == {0.0}
     assert not any(band.beyond for band in floor.bands)
-    text = shown(report.page(comparison, trace, trace, floor=floor))
+    text = shown(report.page(comparison, floor=floor))
     assert "Every gap lies inside it, all the time." in " ".join(text.split())
 
 
@@ -87,10 +86,10 @@ def test_the_band_is_wide_about_a_moment_and_forgets_it_later(tmp_path: Path) ->
     """A running maximum would not fall, and one moment alone would dip at each crossing."""
     run = rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([1.0]))
     band = band_of(run, "swing", uncertain=Uncertainty(0.0, 0.01))
-    assert band.width.min() > 0
+    assert band._width.min() > 0
     assert band.end < 0.2 * band.most
     # The difference oscillates: at a moment alone it is next to zero again and again.
-    assert band.width[:200].min() > 0.2 * band.most
+    assert band._width[:200].min() > 0.2 * band.most
 
 
 def test_quaternions_of_perturbed_starts_stay_unit(tmp_path: Path) -> None:

@@ -36,7 +36,17 @@ from statemachine.lessons import LESSONS, PATH, module, template, worlds
 from statemachine.lessons._falling import summed
 from statemachine.lessons.in_turns import Ratio
 from statemachine.lessons.session import CodeRun, Taken, load_line, page_of_lesson, take
-from statemachine.page import Code, Heading, Page, Printed, Question, Table, Text, Traces, Verdict
+from statemachine.page import (
+    Code,
+    Heading,
+    Page,
+    Printed,
+    Question,
+    Table,
+    Text,
+    Traces,
+    Verdict,
+)
 from statemachine.report import progress as bar
 from statemachine.report import quiz
 from statemachine.runs.rerun import record_scenario
@@ -52,6 +62,7 @@ from .conftest import (
     of_python,
     one_line,
     refused,
+    with_figures,
     written,
 )
 
@@ -105,7 +116,7 @@ def test_what_a_shared_model_saves(backend: str, monkeypatch: pytest.MonkeyPatch
     (curves,) = (block for block in page.blocks if isinstance(block, Traces))
     assert list(curves.curves) == [f"{backend}: a step of one world"]
     if not shared:
-        text = _repage("worlds", backend, dataclasses.replace(result, limit="the reason")).blocks
+        text = _repage("worlds", backend, with_figures(result, limit="the reason")).blocks
         assert any("the reason" in b.text for b in text if isinstance(b, Text))
 
 
@@ -273,31 +284,31 @@ def test_the_line_that_loads_a_model() -> None:
 Change = Callable[[Any], Any]
 # For each claim a result that belies it: the page must say so.
 _BELIED: dict[str, tuple[str, Change]] = {
-    "worlds disturb each other": ("objects", lambda r: dataclasses.replace(r, alone=False)),
-    "the model changes": ("objects", lambda r: dataclasses.replace(r, constant=False)),
-    "a write is seen": ("write", lambda r: dataclasses.replace(r, changed=("xpos",))),
-    "an array is made anew": ("write", lambda r: dataclasses.replace(r, same_arrays=False)),
-    "readings 3 and 4 are equal": ("forward", lambda r: dataclasses.replace(r, equal=((2, 3),))),
+    "worlds disturb each other": ("objects", lambda r: with_figures(r, alone=False)),
+    "the model changes": ("objects", lambda r: with_figures(r, constant=False)),
+    "a write is seen": ("write", lambda r: with_figures(r, changed=("xpos",))),
+    "an array is made anew": ("write", lambda r: with_figures(r, same_arrays=False)),
+    "readings 3 and 4 are equal": ("forward", lambda r: with_figures(r, equal=((2, 3),))),
     "a step leaves what is new": (
         "forward",
-        lambda r: dataclasses.replace(
-            r, lag=dataclasses.replace(r.lag, of_before=dict.fromkeys(r.lag.of_before, 0))
+        lambda r: with_figures(
+            r, lag=with_figures(r.lag, of_before=dict.fromkeys(r.lag.of_before, 0))
         ),
     ),
     "a reset forgets the time": (
         "reset",
-        lambda r: dataclasses.replace(r, restored=("qpos", "qvel", "ctrl")),
+        lambda r: with_figures(r, restored=("qpos", "qvel", "ctrl")),
     ),
-    "a reset computes": ("reset", lambda r: dataclasses.replace(r, empty=False)),
-    "a reset has another future": ("reset", lambda r: dataclasses.replace(r, same_future=False)),
-    "time passes by itself": ("time", lambda r: dataclasses.replace(r, passed=0.2)),
-    "pacing changes the physics": ("time", lambda r: dataclasses.replace(r, identical=False)),
-    "a run does not repeat": ("replay", lambda r: dataclasses.replace(r, identical=False)),
+    "a reset computes": ("reset", lambda r: with_figures(r, empty=False)),
+    "a reset has another future": ("reset", lambda r: with_figures(r, same_future=False)),
+    "time passes by itself": ("time", lambda r: with_figures(r, passed=0.2)),
+    "pacing changes the physics": ("time", lambda r: with_figures(r, identical=False)),
+    "a run does not repeat": ("replay", lambda r: with_figures(r, identical=False)),
     "forces do not balance": (
         "gravity",
-        lambda r: dataclasses.replace(
+        lambda r: with_figures(
             r,
-            servos_on=dataclasses.replace(
+            servos_on=with_figures(
                 r.servos_on, forces=summed({**r.servos_on.forces, "actuator": 0.0})
             ),
         ),
@@ -341,7 +352,7 @@ _QUIET = Ratio("null", 1.0, 0.99, 1.01, 20)
 def test_the_right_choice_is_computed(name: str, changes: Change, right: int | None) -> None:
     result = _on_mujoco(name)
     quiet = {"null": _QUIET} if name == "speed" else {}
-    page = _repage(name, "mujoco", dataclasses.replace(result, **quiet, **changes(result)))
+    page = _repage(name, "mujoco", with_figures(result, **quiet, **changes(result)))
     assert next(block.right for block in page.blocks if isinstance(block, Question)) == right
 
 
@@ -352,7 +363,7 @@ def test_what_cannot_be_told_apart_is_said_so() -> None:
         (Ratio("loop", 1.02, 1.0, 1.04, 20), "cannot be told apart by 20 rounds"),
         (Ratio("loop", 1.5, 1.4, 1.6, 4), "cannot be told apart by 4 rounds"),
     ):
-        page = _repage("speed", "mujoco", dataclasses.replace(result, loop=loop, null=_QUIET))
+        page = _repage("speed", "mujoco", with_figures(result, loop=loop, null=_QUIET))
         assert any(said in b.text for b in page.blocks if isinstance(b, Text))
     # The code measures the steps that the table does.
     page, taken = _take("speed", "mujoco", steps=123)
@@ -367,18 +378,18 @@ def test_what_cannot_be_told_apart_is_said_so() -> None:
 @pytest.mark.parametrize(
     ("part", "change"),
     [
-        ("forward", lambda r: dataclasses.replace(r, equal=())),
-        ("state", lambda r: dataclasses.replace(r, joints=r.joints[:6])),
-        ("replay", lambda r: dataclasses.replace(r, identical=False)),
-        ("gravity", lambda r: dataclasses.replace(r, servos_on=r.servos_off)),
-        ("objects", lambda r: dataclasses.replace(r, alone=False)),
-        ("time", lambda r: dataclasses.replace(r, identical=False)),
+        ("forward", lambda r: with_figures(r, equal=())),
+        ("state", lambda r: with_figures(r, joints=r.joints[:6])),
+        ("replay", lambda r: with_figures(r, identical=False)),
+        ("gravity", lambda r: with_figures(r, servos_on=r.servos_off)),
+        ("objects", lambda r: with_figures(r, alone=False)),
+        ("time", lambda r: with_figures(r, identical=False)),
     ],
 )
 def test_an_answer_that_its_run_belies_is_none(part: str, change: Change) -> None:
     result = _on_mujoco("questions")
     answers = {**result.answers, part: change(result.answers[part])}
-    page = _repage("questions", "mujoco", dataclasses.replace(result, answers=answers))
+    page = _repage("questions", "mujoco", with_figures(result, answers=answers))
     assert not page.holds
     asked = [block for block in page.blocks if isinstance(block, Question)]
     assert sorted(question.right is None for question in asked) == [False] * 5 + [True]

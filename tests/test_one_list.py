@@ -9,16 +9,17 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare.matching import match_models
-from statemachine.compare.models import Difference, compare
+from statemachine.compare.models import compare
 from statemachine.compare.why.causes import differences_of
+from statemachine.page import Figures
 
 from .conftest import Cli, assert_has, written_all
 from .explained import ALONE, ARM, Case, changed
 
 
-def _listed(folder: Path, right: str, left: str = ARM) -> list[Difference]:
+def _listed(folder: Path, right: str, left: str = ARM) -> list[Figures]:
     written_all(folder, {"left.xml": left, "right.xml": right})
-    rows = compare(folder / "left.xml", folder / "right.xml").found.differences
+    rows = compare(folder / "left.xml", folder / "right.xml").differences
     return [row for row in rows if row.matters]
 
 
@@ -69,7 +70,7 @@ def test_the_words_are_those_of_two_sides(here: Cli, tmp_path):
     files = str(tmp_path / "left.xml"), str(tmp_path / "right.xml")
     for option in ("--map", "--rename"):  # the name that it had
         words = ("compare", "--models", *files, option, "elbow=e", option, "shoulder=s", "--json")
-        found = json.loads(here(*words).stdout)["found"]["differences"]
+        found = json.loads(here(*words).stdout)["differences"]
         assert [row["causes"] for row in found] == [["range of shoulder"]]
 
 

@@ -8,11 +8,12 @@ from typing import Any
 import pytest
 
 import statemachine as sm
-from statemachine.compare import StepComparison, one_step, rerun_of
-from statemachine.compare.one_step import RELATIVE
+from statemachine.compare import rerun_of
+from statemachine.compare.one_step import RELATIVE, one_step
 from statemachine.compare.stages import STAGES
 from statemachine.compare.why import explain
 from statemachine.errors import BadInputError
+from statemachine.page import Figures
 from statemachine.report.steps import one_step as page
 from statemachine.runs.rerun import Rerun
 from statemachine.runs.scenarios import scenario
@@ -46,11 +47,11 @@ def stepped(folder: Path, text: str, **how: Any) -> Any:
     return one_step(rerun(one), two, **how)
 
 
-def first(found: StepComparison) -> str:
+def first(found: Figures) -> str:
     return found.first.stage if found.first else ""
 
 
-def verdict(found: StepComparison) -> Any:
+def verdict(found: Figures) -> Any:
     return page(found, ("one", "two"), "hold").blocks[-1]
 
 

@@ -19,14 +19,14 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import compare, series
+from statemachine.compare import compare
 from statemachine.drawing.scene import Camera, Shot, compose, framed, smaller
 from statemachine.engines import pictures as probe
 from statemachine.engines import pybullet as pybullet_room
 from statemachine.engines.mujoco import rendering as mujoco_rendering
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
+from statemachine.page import Figures
 from statemachine.report.film import (
-    Film,
     Timing,
     frames,
     motion_of,
@@ -276,7 +276,7 @@ def test_two_models_of_one_robot_are_drawn_in_one_picture(
 def film(sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer, tmp_path: Path) -> Any:
     model, *traces = sides
 
-    def make(name: str, **how: Any) -> Film:
+    def make(name: str, **how: Any) -> Figures:
         how = {"size": SIZE, "fps": 20, "slow": 2, **how}
         found = compare(*traces)
         return write_film(tmp_path / name, traces, [model] * 2, mujoco_here, found, **how)
@@ -323,7 +323,7 @@ def test_mp4(film: Any) -> None:
 @pytest.mark.usefixtures("pillow")
 def test_the_strip_has_cursor_curve_and_figures(sides: tuple[sm.Model, Trace, Trace]) -> None:
     _, one, two = sides
-    charts = charts_of(compare(one, two), one, two, series(one, two), None)
+    charts = charts_of(compare(one, two))
     overlay = Overlay((400, 300), Timing(0.5, 20).times, 1.0, "x", ["a", "b"], charts[0])
     width, height = overlay.inner
     assert (width, height % 2) == (400, 0)
@@ -483,7 +483,7 @@ def _texts(svg: bytes) -> str:
 @pytest.mark.usefixtures("matplotlib")
 def test_an_svg_says_in_text_what_it_shows(compared: tuple[Trace, Trace, Any]) -> None:
     one, two, found = compared
-    text = _texts(drawn(of_comparison(one, two, found), "svg"))
+    text = _texts(drawn(of_comparison(found), "svg"))
     assert_in(text, one.header.label, two.header.label, "hold", *one.header.joints, "gripperframe")
     assert_in(text, "energy", "tolerance", "gripper on floor", "time [s]", "statemachine 0.")
     assert f"they part at {min(a.since for a in found.agreements if a.since):.3f} s" in text
@@ -495,7 +495,7 @@ def test_the_same_figure_has_the_same_bytes(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    figure = of_comparison(*compared)
+    figure = of_comparison(compared[-1])
     for form in ("svg", "png", "pdf"):
         once = drawn(figure, form)
         # Another day, and a reader who likes other fonts.
@@ -514,7 +514,7 @@ def test_a_png_is_a_picture_with_both_sides_in_it(
 ) -> None:
     import io
 
-    image = pillow.open(io.BytesIO(drawn(of_comparison(*compared), "png"))).convert("RGB")
+    image = pillow.open(io.BytesIO(drawn(of_comparison(compared[-1]), "png"))).convert("RGB")
     assert image.width == pytest.approx(80 / 25.4 * 300, abs=1)
     pixels = np.asarray(image).astype(int)
     for colour in ((240, 168, 48), (75, 31, 120)):
@@ -523,7 +523,7 @@ def test_a_png_is_a_picture_with_both_sides_in_it(
 
 def test_who_touches_when(compared: tuple[Trace, Trace, Any]) -> None:
     one, two, found = compared
-    figure = of_comparison(one, two, found)
+    figure = of_comparison(found)
     sides = figure.touches["gripper on floor"]
     for spans, trace in zip(sides, (one, two), strict=True):
         rows = np.unique(trace["contact_row"])
@@ -544,7 +544,7 @@ def test_nothing_is_cut_off_at_the_edges(
     one, two, found = compared
     if what == "recorded":
         one = Trace(dataclasses.replace(one.header, recorded=True, defaults="engine"), one.columns)
-    figure = of_trace(two) if what == "alone" else of_comparison(one, two, found)
+    figure = of_trace(two) if what == "alone" else of_comparison(found)
     with matplotlib.rc_context(FIGURE_SETTINGS):
         canvas = draw(figure)
         pen = FigureCanvasAgg(canvas)
@@ -559,6 +559,5 @@ def test_nothing_is_cut_off_at_the_edges(
 
 @pytest.mark.usefixtures("matplotlib")
 def test_one_trace_alone(compared: tuple[Trace, Trace, Any]) -> None:
-    _, two, _ = compared
-    text = _texts(drawn(of_trace(two), "svg"))
-    assert_in(text, two.header.label, "the command", *two.header.joints, "energy")
+    text = _texts(drawn(of_trace(compared[1]), "svg"))
+    assert_in(text, compared[1].header.label, *compared[1].header.joints, "the command", "energy")

@@ -359,7 +359,10 @@ class TestReleases:
         versions = ("--versions", "3.3.7," + SAME.partition("==")[2], "--model", "so101")
         assert main(["compare", "hold", *versions, "--json"]) == SAYS_NO
         (found,) = json.loads(capsys.readouterr().out)
-        assert [side["backend"] for side in (found["one"], found["two"])] == [OLD, "mujoco"]
+        assert [side["run"]["backend"] for side in (found["one"], found["two"])] == [
+            OLD,
+            "mujoco",
+        ]
         picture = tmp_path / "releases.svg"
         assert main(["compare", "hold", *versions, "--plot", str(picture)]) == SAYS_NO
         assert f"3.3.7 to {engine_version('mujoco')}" in picture.read_text("utf-8")
@@ -384,7 +387,7 @@ class TestReleases:
         asked = ("--versions", "3.3.7", "--bisect", "--model", "so101", "--json")
         assert main(["compare", "hold", *asked]) == SAYS_NO
         pairs = [
-            (pair["one"]["backend"], pair["two"]["backend"], pair["agrees"])
+            (pair["one"]["run"]["backend"], pair["two"]["run"]["backend"], pair["agrees"])
             for pair in json.loads(capsys.readouterr().out)
         ]
         assert pairs == [(OLD, OLD, True), (OLD, SAME, False), (SAME, "mujoco", True)]

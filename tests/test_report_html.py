@@ -21,14 +21,15 @@ import pytest
 from PIL import Image
 
 import statemachine as sm
-from statemachine.compare import Comparison, compare, series, touches
+from statemachine.compare import Comparison, compare, touches
 from statemachine.compare.series import total_forces
-from statemachine.compare.why import CauseShare, Explanation, FirstTouch, Located
+from statemachine.compare.why import Explanation
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError, MissingEngineError
 from statemachine.measures import Deviation
 from statemachine.measures.text import quantity
 from statemachine.page import (
+    Figures,
     Headline,
     Items,
     Page,
@@ -51,7 +52,7 @@ from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
-from .conftest import ROOT, assert_has, assert_in, refused, soon
+from .conftest import ROOT, assert_has, assert_in, refused, soon, with_figures
 from .test_drawing import area_of
 from .test_strange_traces import added, cut
 from .test_strange_traces import changed as edited
@@ -66,9 +67,8 @@ def of(one: Trace, two: Trace) -> Made:
 
 
 def page_of(made: Made, **more: Any) -> str:
-    comparison, one, two, look = made
-    looks = more.pop("looks", (look, look))
-    return report(compared(comparison, one, two, **more), looks)
+    looks = more.pop("looks", made[3:] * 2)
+    return report(compared(made[0], **more), looks)
 
 
 def recorded(name: str, kind: Any = "model") -> Made:
@@ -270,10 +270,9 @@ def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
 
 
 def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
-    comparison, one, two, _ = hold
+    comparison, one, *_ = hold
     found = {each.name: each for each in comparison.agreements}
-    curves = series(one, two)
-    finding = headline(comparison, events_of(comparison, touches(one, two)), None, curves)
+    finding = headline(comparison, events_of(comparison))
     wrist = found["wrist_flex"]
     far, at = quantity(wrist.max, wrist.unit), f"{wrist.at:.3f} s"
     assert finding.lead.startswith(f"Joint wrist_flex is up to {far} apart")
@@ -282,13 +281,13 @@ def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
     assert f"the runs part at {since:.3f} s, when gripper touches floor" in finding.lead
     assert finding.causes == ()  # nothing was asked about causes
     # The end is a mean over the last tenth, and the last moment is something else.
-    (curve,) = (each for each in curves if each.name == "wrist_flex")
+    (curve,) = (each for each in comparison.curves if each.name == "wrist_flex")
     tail = np.degrees(curve.difference[curve.time >= 1.8 - 1e-9])
     said = [float(x) for x in re.findall(r"([\d.]+)°", finding.end)]
     assert said == pytest.approx([tail.mean(), tail[-1]], rel=0.005)
     assert "still changing" in finding.end
     still = edited(one, qpos=added(one.qpos, np.s_[100:, 3], 0.05))
-    assert "changing" not in headline(compare(one, still), [], None, series(one, still)).end
+    assert "changing" not in headline(compare(one, still), []).end
 
 
 def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explanation:
@@ -298,11 +297,15 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     gap = Deviation("rad", worst.max, worst.at, worst.rms, worst.settled)
     g = worst.max
 
-    contact = Located("contact", "nothing touches", None, 0.5, 1e-8 * g, 0.3, False, False)
+    contact = Figures(
+        name="contact", values=None, share=0.5, gap=1e-8 * g, is_still=False, is_setting=False
+    )  # fmt: skip
 
-    def row(name: str, share: float) -> CauseShare:
-        values = ((name, "kp 998.2", "its motors"),)
-        return CauseShare(name, "engine", values, "", share, 0.0, share, share)
+    def row(name: str, share: float) -> Figures:
+        values, parts = ((name, "kp 998.2", "its motors"),), dict.fromkeys(("alone", "last"), share)
+        return Figures(
+            name=name, values=values, unit="", share=share, error=0.0, note="", place=None, **parts
+        )
 
     fields: dict[str, Any] = {
         "experiment": "hold", "says": "", "seconds": 2.0, "one": "mujoco", "two": "pybullet",
@@ -326,11 +329,11 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
         "Servo law, kp 998.2 on the left and its motors on the right: 60.0 % of the 2.58°.",
     )
     # What the run shows itself comes before.
-    touch = FirstTouch(0.27, "gripper on floor", 3e-16, 55)
+    touch = Figures(time=0.27, what="gripper on floor", before=3e-16)
     lead = headline(comparison, [], explanation_of(hold, touch=touch))
     assert lead.causes[0].startswith("Until the first touch, gripper on floor at 0.270 s")
     assert "2e-14° apart" in lead.causes[0]
-    late = FirstTouch(0.27, "finger on floor", 0.01, 55)  # they were apart before
+    late = Figures(time=0.27, what="finger on floor", before=0.01)  # they were apart before
     assert len(headline(comparison, [], explanation_of(hold, touch=late)).causes) == 1
     # Of another quantity than any that is compared: named as it is.
     other = headline(comparison, [], explanation_of(hold, quantity="box relative to gripperframe"))
@@ -344,11 +347,13 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     assert answer(stays) == "The cause was not found: 100.0 % of the 2.58° is unexplained"
     for shares in ((-217.0, 127.0), (127.0, -126.5)):
         rows = zip(explanation_of(hold).shares, shares, strict=True)
-        masked = explanation_of(hold, shares=[replace(row, share=share) for row, share in rows])
+        masked = explanation_of(
+            hold, shares=[with_figures(row, share=share) for row, share in rows]
+        )
         assert answer(masked).startswith("No single difference causes the 2.58°"), shares
     # Two values that read the same are shown with all their digits.
     close = ("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
-    rounded = replace(explanation_of(hold).shares[0], values=(close,), unit="rad")
+    rounded = with_figures(explanation_of(hold).shares[0], values=(close,), unit="rad")
     found = answer(explanation_of(hold, shares=(rounded,)))
     assert "1.5708 on the left and 1.570796 on the right" in found
     noisy = explanation_of(hold, floor=0.2 * located.gap)
@@ -359,17 +364,17 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     assert chaos.is_rounding
     assert answer(explanation_of(hold, negligible=1.0)).startswith("The two sides move alike")
     # Where something cannot be brought to the same, a location is no explanation.
-    refused = replace(located.found_in[0], share=1.0)
-    row = CauseShare("shape of box", "geom", (), "", None, 0.0, None, None, "another size")
+    refused = with_figures(located.found_in[0], share=1.0)
+    row = Figures(name="shape of box", note="another size", share=None)
     assert located.is_explained
-    assert not replace(located, shares=(row,), found_in=(refused,)).is_explained
+    assert not with_figures(located, shares=(row,), found_in=(refused,)).is_explained
 
 
 def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
     text = page_of(hold, explanation=explanation_of(hold))
     with looking(write_report(tmp_path / "x.html", text), java_script_enabled=False) as tab:
         (table,) = tab.locator("#why").locator("table").all()
-        assert "explains" in table.inner_text()
+        assert "alone" in table.inner_text()
 
         def bar(row: str) -> tuple[float, float]:
             line = table.locator("tr", has_text=row)
@@ -407,7 +412,7 @@ def test_who_presses_on_what(hold: Made) -> None:
 
 
 def test_what_was_commanded(hold: Made) -> None:
-    sections: Any = commanded(hold[1], hold[2], ("left", "right"))
+    sections: Any = commanded(hold[0])
     ((table,),) = [section.blocks for section in sections]
     for row, value, last in zip(table.rows, hold[1].ctrl[0], hold[1].qpos[-1], strict=True):
         far = quantity(abs(float(last - value)), "rad")
@@ -431,8 +436,8 @@ def test_a_link_only_to_what_is_there(hold: Made) -> None:
 
 def test_charts_show_what_was_compared_and_are_few(hold: Made) -> None:
     comparison, one, two, _ = hold
-    curves = series(one, two)
-    charts = charts_of(comparison, one, two, curves, None)
+    curves = comparison.curves
+    charts = charts_of(comparison)
     assert [chart.curve.name for chart in charts] == [curve.name for curve in curves]
     lift = next(chart for chart in charts if chart.title == "shoulder_lift")
     values = lift.values()
@@ -448,7 +453,7 @@ def test_charts_show_what_was_compared_and_are_few(hold: Made) -> None:
         for k in range(4)
         for a in comparison.agreements
     ]
-    some = charts_of(replace(comparison, agreements=tuple(agreements)), one, two, many, None)
+    some = charts_of(replace(comparison, agreements=tuple(agreements), curves=many))
     assert len(some) == CHARTS_SHOWN < len(many)
     assert "wrist_flex 0" in {chart.title for chart in some}
 

@@ -67,7 +67,7 @@ def test_what_is_no_number_never_agrees(column: str, quantity: str, box: Trace) 
     assert not found.agrees
     assert (named(found)[quantity].verdict, found.worst.name) == ("differs", quantity)
     assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
-    assert "nan" not in shown(report.page(found, box, other))
+    assert "nan" not in shown(report.page(found))
 
 
 def test_a_column_that_is_not_told_is_not_compared_and_that_is_said(box: Trace) -> None:
@@ -92,7 +92,7 @@ def test_who_ended_early_does_not_agree(box: Trace) -> None:
     found = compare(box, other)
     assert {each.verdict for each in found.agreements} == {"agrees"}
     assert_has(found, ended=True, agrees=False)
-    assert not report.page(found, box, other).holds
+    assert not report.page(found).holds
     assert any("0.02 s is not compared" in note for note in found.notes)
 
 

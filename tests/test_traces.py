@@ -439,9 +439,8 @@ def test_the_recorded_run_of_an_older_release_is_what_it_does(
     model = sm.load("so101/scene")
     here = take(LESSONS["hold"], model, "mujoco", {}).result.older
     monkeypatch.setenv("STATEMACHINE_ENGINES", "nowhere")
-    assert here == dataclasses.replace(
-        take(LESSONS["hold"], model, "mujoco", {}).result.older, recorded=False
-    )
+    recorded = vars(take(LESSONS["hold"], model, "mujoco", {}).result.older)
+    assert recorded | {"recorded": False} == vars(here)
     assert np.degrees(here.gap) == pytest.approx(6.12, abs=0.01)
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from ._common import PROGRAM, Row, complain, refuse, show
-from ._compare_pictures import checked
+from ._compare_files import write_tests
 
 OPTIONS: tuple[Row, ...] = (
     (
@@ -59,8 +58,9 @@ def run(options: argparse.Namespace, request: Any) -> int:
 
 
 def _one_step(options: argparse.Namespace, request: Any) -> int:
-    from ..compare import one_step, prepare_sides
+    from ..compare import prepare_sides
     from ..compare.labels import numbered
+    from ..compare.one_step import one_step
     from ..report import steps
     from ..report.progress import progress
 
@@ -68,11 +68,12 @@ def _one_step(options: argparse.Namespace, request: Any) -> int:
     with progress("one step") as told:
         result = one_step(left, right.model, names=request.names, progress=told)
     labels = numbered(tuple(side.label for side in request.sides) or request.backends)
-    return show(steps.one_step(result, labels, _name(request)), result, options.json)
+    return show(steps.one_step(result, labels, Path(request.what[0]).name), result, options.json)
 
 
 def _converge(options: argparse.Namespace, request: Any) -> int:
-    from ..compare import convergence, run_sides
+    from ..compare import run_sides
+    from ..compare.convergence import convergence
     from ..report import steps
     from ..report.progress import progress
 
@@ -89,7 +90,7 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
 
     with progress("converge") as told:
         result = convergence(run, progress=told)
-    return show(steps.convergence(result, _name(request)), result, options.json)
+    return show(steps.convergence(result, Path(request.what[0]).name), result, options.json)
 
 
 def _versions(options: argparse.Namespace, request: Any) -> int:
@@ -102,8 +103,6 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
     from ..runs.drive import part_of
 
     tolerances = parse_tolerances(options.tolerance)
-    check_junit(options)
-    checked(options)
 
     def compared(pair: tuple[str, str], *bar: Any) -> Any:
         traces = run_sides(replace(request, backends=pair), *bar).traces
@@ -121,30 +120,8 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
             compared(pair, part_of(bar, k / len(pairs), 1 / len(pairs)))
             for k, pair in enumerate(pairs)
         ]
-    write_junit(options, comparisons)
+    write_tests(options, comparisons)
     page = steps.versions(comparisons, request)
     if options.plot is not None:
         write_pictures(page.blocks, options.plot)
     return show(page, comparisons, options.json)
-
-
-def check_junit(options: argparse.Namespace) -> None:
-    """Refuse a place for `--junit` that nothing can be written to, before anything runs."""
-    from ..runs.whole import check_place
-
-    if options.junit is not None:
-        check_place(options.junit)
-
-
-def write_junit(options: argparse.Namespace, comparisons: Sequence[Any]) -> None:
-    """Write the comparisons where `--junit` says."""
-    from ..report.junit import junit
-    from ..runs.whole import replace_text
-
-    if options.junit is not None:
-        replace_text(options.junit, junit(comparisons))
-
-
-def _name(request: Any) -> str:
-    """What is run: an experiment, or a file without its folder."""
-    return Path(request.what[0]).name

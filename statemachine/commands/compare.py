@@ -7,13 +7,8 @@ from typing import Any
 
 from ..errors import EndedEarlyError
 from ..installed import PAIR
-from . import (
-    _compare_html,
-    _compare_models,
-    _compare_steps,
-    _compare_why,
-)
-from . import _compare_pictures as pictures
+from . import _compare_files as files
+from . import _compare_models, _compare_steps, _compare_why
 from ._common import (
     DEFAULTS,
     EXCLUDES,
@@ -28,7 +23,6 @@ from ._common import (
     add_rules,
     add_table,
     complain,
-    file_name,
     json_of,
     menagerie,
     pairs_of,
@@ -38,7 +32,6 @@ from ._common import (
     shorten_help,
     show,
 )
-from ._compare_steps import check_junit, write_junit
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -84,9 +77,9 @@ def add(parser: argparse.ArgumentParser) -> None:
             REPEATED,
         ),
         ("--no-chaos", "", "do not look for the chaos floor: faster"),
-        *_compare_html.OPTIONS,
+        *files.OF_PAGE,
         json_of(),
-        ("--junit", "FILE", "write each quantity as a test of JUnit, for CI", {"type": file_name}),
+        files.OF_TESTS,
     )
     add_table(
         parser.add_argument_group("two sides"),
@@ -110,7 +103,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     for title, rows in (
         ("why", _compare_why.OPTIONS),
         ("is it a difference, and of what?", _compare_steps.OPTIONS),
-        ("pictures", pictures.OPTIONS),
+        ("pictures", files.OF_PICTURES),
         ("comparing descriptions of a robot", _compare_models.OPTIONS),
     ):
         add_table(parser.add_argument_group(title), *rows)
@@ -260,8 +253,7 @@ def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     from ..compare.perturbed import parse_uncertainty
 
-    _compare_html.check(options)
-    parse_uncertainty(options.uncertainty)  # which refuses what is no size
+    uncertain, why = parse_uncertainty(options.uncertainty), options.why and not options.html
     refuse(
         (
             options.budget is not None and options.budget < 1,
@@ -275,74 +267,58 @@ def run(options: argparse.Namespace) -> int:
             not options.what,
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
             f"{PROGRAM} compare hold",
-        )
+        ),
+        (
+            why and options.tolerance,
+            "--why takes no --tolerance: it explains the gap, whatever its size",
+        ),
+        (
+            why and (options.plot or options.film),
+            "--why runs many times: --plot and --film go without it",
+        ),
     )
+    request, renderer = request_of(options), files.checked(options)
     if options.one_step or options.converge or options.versions is not None:
-        return _compare_steps.run(options, request_of(options))
-    if options.why and not options.html:
-        refuse(
-            (
-                options.tolerance,
-                "--why takes no --tolerance: it explains the gap, whatever its size",
-            ),
-            (
-                options.plot or options.film,
-                "--why runs many times: --plot and --film go without it",
-            ),
-        )
+        return _compare_steps.run(options, request)
+    why_not = ""
+    if why:
         try:
-            return _compare_why.run(options, request_of(options))
+            return _compare_why.run(options, request)
         except EndedEarlyError as error:  # what there is until then, and no cause
-            return _run_compare(options, f"No cause is named: {error}.")
-    return _run_compare(options)
+            why_not = f"No cause is named: {error}."
+    return _run_compare(options, request, renderer, uncertain, why_not)
 
 
-def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
-    from ..compare import compare, run_sides, touches, witness
+def _run_compare(
+    options: argparse.Namespace, request: Any, renderer: Any, uncertain: Any, why_not: str
+) -> int:
+    from ..compare import compare, run_sides, witness
     from ..measures import parse_tolerances
     from ..report import compare as report
     from ..report.progress import progress
 
     tolerances = parse_tolerances(options.tolerance)
-    check_junit(options)
-    request = request_of(options)
     if request.is_traces and len(request.what) == 2:
         refuse_given(
             options, ["backends"], "{} is of a run, and two traces are runs that were made"
         )
-    renderer = pictures.checked(options)
     with progress("compare") as told:
         run = run_sides(request, told)
-    one, two, said = run.left, run.right, run.said
-    comparison = compare(one, two, tolerances=tolerances)
-    played = compare(one, run.played, tolerances=tolerances) if run.is_apart else None
-    if options.json:
-        for line in (*run.unmatched, *said):
-            complain(line, 0)
-    asked = witness(one, two, run.file)
-    floor = _floor(options, comparison, run)
-    given = run if request.sides else None
-    if options.html:
-        _compare_html.write(
-            options, request, comparison, (one, two), said, asked, given, played, floor
-        )
-    page = report.page(
-        comparison,
-        one,
-        two,
-        said=said,
-        witness=asked,
-        run=given,
-        played=played,
-        floor=floor,
-        why_not="" if comparison.ended else why_not,  # which the page says itself
-    )
-    result = {
-        "comparison": comparison,
-        "witness": asked,
-        "touches": touches(one, two),
-        "floor": floor,
+    comparison = compare(*run.traces, tolerances=tolerances)
+    played = compare(run.left, run.played, tolerances=tolerances) if run.is_apart else None
+    parts = {
+        "witness": witness(*run.traces, run.file),
+        "floor": _floor(options, comparison, run.reruns[0], uncertain),
     }
+    more: dict[str, Any] = {"why_not": "" if comparison.ended else why_not}  # the page says it
+    if options.html:
+        more = files.for_page(options, request, run.traces, comparison.ended)
+    given = run if request.sides else None
+    page = report.page(comparison, said=run.said, run=given, played=played, **parts, **more)
+    if options.html:
+        files.write_page(options, request, run.traces, page)
+    files.write_tests(options, [comparison])
+    result = {"comparison": comparison, "touches": comparison.touches, **parts}
     if request.sides:
         result |= {
             "sides": request.sides,
@@ -351,36 +327,28 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
             "unmatched": run.unmatched,
             "only": run.matched.only if run.matched else ({}, {}),
         }
-    write_junit(options, [comparison])
+    if options.json:
+        for line in (*run.unmatched, *run.said):
+            complain(line, 0)
     code = show(page, result, options.json)
-    pictures.write(renderer, options, one, two, comparison, request, floor)
+    files.write_pictures(renderer, options, run.traces, request, comparison, parts["floor"])
     return code
 
 
-def _floor(options: argparse.Namespace, comparison: Any, run: Any) -> Any:
-    """The chaos floor of a `compare.SidesRun`; None where the left side was not run here.
+def _floor(options: argparse.Namespace, comparison: Any, rerun: Any, uncertain: Any) -> Any:
+    """The chaos floor of a comparison; None where the left side was not run here.
 
     Raises:
         BadInputError: An uncertainty was given, and the left side was not run here.
     """
     if options.no_chaos:
         return None
-    rerun, _ = run.reruns
     if rerun is None:
         says = "--uncertainty runs the left side again, and it is a recorded run"
         refuse((options.uncertainty, says))
         return None
     from ..compare import chaos_floor
-    from ..compare.perturbed import parse_uncertainty
     from ..report.progress import progress
 
     with progress("chaos floor") as told:
-        return chaos_floor(
-            comparison,
-            run.left,
-            run.right,
-            rerun,
-            seed=options.seed,
-            uncertain=parse_uncertainty(options.uncertainty),
-            progress=told,
-        )
+        return chaos_floor(comparison, rerun, seed=options.seed, uncertain=uncertain, progress=told)

@@ -8,7 +8,6 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..installed import DEFAULT
-from . import _compare_pictures as pictures
 from ._common import (
     DEFAULTS,
     ENGINE,
@@ -23,6 +22,7 @@ from ._common import (
     refuse,
     show,
 )
+from ._compare_files import OF_FILM, checked, write_pictures
 from .compare import EXPERIMENTS, experiments, run_options
 
 
@@ -62,7 +62,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         ),
         (
             *("film", "make a film of it: .webp or .mp4"),
-            *(run_pictures, (file, _output("TRACE.webp"), *own, *pictures.OF_FILM)),
+            *(run_pictures, (file, _output("TRACE.webp"), *own, *OF_FILM)),
         ),
     ):
         own_parser = named.add_parser(
@@ -207,7 +207,7 @@ def run_pictures(options: argparse.Namespace) -> int:
     options.plot = options.film = None
     setattr(options, options.picture, Path(options.output or usual))
     trace = read(options.file)
-    pictures.write(pictures.checked(options), options, trace)
+    write_pictures(checked(options), options, [trace])
     return 0
 
 

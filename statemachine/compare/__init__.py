@@ -16,41 +16,29 @@ from __future__ import annotations
 
 from ..runs.rerun import Rerun, rerun_of
 from .agreement import Agreement, Comparison, SideRun, compare
-from .convergence import QuantityLimit, TimestepConvergence, convergence
-from .floor import ChaosFloor, FloorBand, chaos_floor
+from .floor import chaos_floor
 from .labels import Labels, labels_of
-from .one_step import StepComparison, one_step
 from .perturbed import Uncertainty, perturbed_runs
-from .series import Contact, Series, Touch, default_tip, series, touches
+from .series import Series, default_tip, series, touches
 from .sides import Request, Side, parse_sides, split_words
 from .two_sides import SidesRun, prepare_sides, run_sides
-from .witness import Witness, witness
+from .witness import witness
 
 __all__ = [
     "Agreement",
-    "ChaosFloor",
     "Comparison",
-    "Contact",
-    "FloorBand",
     "Labels",
-    "QuantityLimit",
     "Request",
     "Rerun",
     "Series",
     "Side",
     "SideRun",
     "SidesRun",
-    "StepComparison",
-    "TimestepConvergence",
-    "Touch",
     "Uncertainty",
-    "Witness",
     "chaos_floor",
     "compare",
-    "convergence",
     "default_tip",
     "labels_of",
-    "one_step",
     "parse_sides",
     "perturbed_runs",
     "prepare_sides",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -12,12 +12,23 @@ from ..errors import TraceError
 from ..interface import Array
 from ..measures import QUANTITIES, Deviation, Tolerance, common_moments, same_pairs, tolerance_of
 from ..measures.text import on
+from ..page import Figures
 from ..runs import Trace
-from ..runs.provenance import Provenance
 from .labels import labels_of, notes_on
-from .series import Series, at_the_end, series, touches
+from .series import Series, at_the_end, default_tip, series, touches
 
 Verdict = Literal["agrees", "settles", "differs"]
+# Of the header of a run, what the JSON of a comparison has.
+_OF_RUN = [
+    "backend",
+    "label",
+    "experiment",
+    "timestep",
+    "defaults",
+    "recorded",
+    "ended",
+    "provenance",
+]
 
 
 @dataclass(frozen=True)
@@ -59,52 +70,52 @@ class Agreement:
         return np.inf if np.isnan(share) else share
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SideRun:
-    """Whose run it is.
+    """One side of a comparison.
 
     Attributes:
         label: What tells it from the other: engine and version, or file, or options; short:
             the same for tables.
-        engine: Engine, version, and what is unusual; backend: its name alone.
-        experiment: What was done.
-        rows: How many rows it has; timestep: their distance [s].
-        defaults: What `load` was given.
-        recorded: Whether it was read from a file.
-        ended: Why it ended early, or "".
-        provenance: What made it.
+        trace: Its run; rows: how many rows it has; run: what JSON says of it.
     """
 
     label: str
     short: str
-    engine: str
-    backend: str
-    experiment: str
-    rows: int
-    timestep: float
-    defaults: str
-    recorded: bool
-    ended: str
-    provenance: Provenance
+    trace: Trace = field(repr=False, metadata={"json": False})
+
+    @property
+    def run(self) -> Figures:
+        return Figures(**{name: getattr(self.trace.header, name) for name in _OF_RUN})
+
+    @property
+    def rows(self) -> int:
+        return len(self.trace)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """Two traces, compared.
 
     Attributes:
         one, two: The sides; every difference is between them, none is the truth.
+        tip: The site that was compared; "" for none.
         moments: How many moments were compared; until: the last of them [s].
         agreements: One for each quantity.
         notes: What makes the comparison less than one of two engines.
+        touches: One for each pair of bodies that touches on either side.
+        curves: The quantities over time; first touches have none.
     """
 
     one: SideRun
     two: SideRun
+    tip: str
     moments: int
     until: float
     agreements: tuple[Agreement, ...]
     notes: tuple[str, ...]
+    touches: tuple[Figures, ...] = field(metadata={"json": False})
+    curves: list[Series] = field(repr=False, metadata={"json": False})
 
     @property
     def agrees(self) -> bool:
@@ -116,7 +127,7 @@ class Comparison:
     @property
     def ended(self) -> bool:
         """Whether a side ended before its time: nobody knows what it would have done."""
-        return bool(self.one.ended or self.two.ended)
+        return bool(self.one.trace.header.ended or self.two.trace.header.ended)
 
     @property
     def worst(self) -> Agreement | None:
@@ -142,7 +153,8 @@ def compare(
     Raises:
         TraceError: They share no joint, or too few moments.
     """
-    curves = series(one, two, tip)
+    site = default_tip(one.header, two.header) if tip is None else tip
+    curves, pairs = series(one, two, site), touches(one, two)
     if not any(QUANTITIES[curve.kind].own for curve in curves):
         raise TraceError("the traces have no joint in common: nothing can be compared")
     longest = max(one.timestep, two.timestep)
@@ -155,19 +167,22 @@ def compare(
     common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     labels = labels_of(one.header, two.header)
     allowed = tolerance_of("contact", common.time, common.time, 0.0, longest, tolerances)
-    agreements += _first_touches(one, two, float(common.time[-1]), allowed, labels.short)
+    agreements += _first_touches(one, two, pairs, float(common.time[-1]), allowed, labels.short)
     strange = [
         f"{agreement.name}: {agreement.note}, so it cannot agree"
         for agreement in agreements
         if agreement.note.startswith("no number")
     ]
     return Comparison(
-        one=_side(one, labels.long[0], labels.short[0]),
-        two=_side(two, labels.long[1], labels.short[1]),
+        one=SideRun(labels.long[0], labels.short[0], one),
+        two=SideRun(labels.long[1], labels.short[1], two),
+        tip=site,
         moments=len(curves[0].time),
         until=float(curves[0].time[-1]),
         agreements=tuple(agreements),
         notes=tuple(notes_on(one, two, common, strange)),
+        touches=pairs,
+        curves=curves,
     )
 
 
@@ -218,36 +233,20 @@ def _agreement(
 
 
 def _first_touches(
-    one: Trace, two: Trace, until: float, allowed: Tolerance, labels: tuple[str, str]
-) -> list[Agreement]:
+    one: Trace, two: Trace, pairs: Sequence[Figures], until: float, allowed: Tolerance,
+    labels: tuple[str, str],
+) -> list[Agreement]:  # fmt: skip
     """When each pair of bodies first touches, on either side."""
     agreements = []
-    for touch in touches(one, two):
+    for touch in pairs:
         first, note = [touch.one.first, touch.two.first], ""
         known = [time for time in first if time is not None]
         if len(known) == 1:  # as late as can be: it had not touched when the comparison ended
             side = first.index(None)
-            pairs = same_pairs({touch.pair: None}, dict.fromkeys((one, two)[side].touches()))
-            note = f"{'later' if touch.pair in pairs else 'never'} {on(labels[side])}"
+            known_pairs = same_pairs({touch.pair: None}, dict.fromkeys((one, two)[side].touches()))
+            note = f"{'later' if touch.pair in known_pairs else 'never'} {on(labels[side])}"
             known.append(until)
         gap = abs(known[0] - known[1])
         name, at = f"{touch.pair}, first touch", np.array([min(known)])
         agreements.append(_agreement(name, "contact", np.array([gap]), at, gap, allowed, note))
     return agreements
-
-
-def _side(trace: Trace, label: str, short: str) -> SideRun:
-    header = trace.header
-    return SideRun(
-        label=label,
-        short=short,
-        engine=header.label,
-        backend=header.backend,
-        experiment=header.experiment,
-        rows=len(trace),
-        timestep=header.timestep,
-        defaults=header.defaults,
-        recorded=header.recorded,
-        ended=header.ended,
-        provenance=header.provenance,
-    )

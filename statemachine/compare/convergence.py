@@ -8,7 +8,6 @@ law of an engine depends on its timestep, and the runs have no common limit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import EndedEarlyError
 from ..interface import Array, Ints
 from ..measures import common_moments
+from ..page import Figures
 from ..runs import Trace
 from ..runs.drive import Progress, silent
 from .labels import labels_of
@@ -30,70 +30,28 @@ _PART, _MOST = 0.1, 0.75  # of the gap: less is left by chance, more is all of i
 Limit = Literal["rounding", "discretisation", "stays", "in part", "unclear"]
 
 
-@dataclass(frozen=True)
-class QuantityLimit:
-    """One quantity with finer and finer steps.
-
-    Attributes:
-        name: As in an Agreement; kind, unit: likewise.
-        gaps: The largest gap between the sides, with the steps as given, halved and quartered.
-        left: How far the left side's run with the steps as given, and with halved ones, is from
-            its run with the finest; right: the same of the right side.
-        limit: What the gap tends to for steps of no length, on the line through the last two.
-        verdict: "rounding" where there is no gap; "discretisation" if each halving takes away
-            half of it or about that, and nothing is left; "stays" if three quarters or more are
-            there with the finest steps; "in part" if less is left, but some; "unclear" if it does
-            not shrink from run to run.
-    """
-
-    name: str
-    kind: str
-    unit: str
-    gaps: tuple[float, float, float]
-    left: tuple[float, float]
-    right: tuple[float, float]
-    limit: float
-    verdict: Limit
-
-
-@dataclass(frozen=True)
-class TimestepConvergence:
-    """A comparison with finer and finer steps.
-
-    Attributes:
-        labels: The two sides.
-        steps: The engine's steps of the left side and of the right one [s], as given; they are
-            halved and quartered.
-        until: The last moment that is compared [s].
-        touch: When something touches first in any of the runs [s]; None if nothing does.
-        before: Each quantity until then; of a run that begins with a touch there is none.
-        whole: Each quantity over all of the run; the same as `before` if nothing touches.
-    """
-
-    labels: tuple[str, str]
-    steps: tuple[float, float]
-    until: float
-    touch: float | None
-    before: tuple[QuantityLimit, ...]
-    whole: tuple[QuantityLimit, ...]
-
-    @property
-    def vanishes(self) -> bool:
-        """Whether no gap is more than discretisation, over the whole run."""
-        return all(quantity.verdict in ("rounding", "discretisation") for quantity in self.whole)
-
-
 def convergence(
     run: Callable[[int], tuple[Trace, Trace]],
     *,
     progress: Progress = silent,
-) -> TimestepConvergence:
+) -> Figures:
     """Run two sides with their steps as given, halved and quartered.
 
     Args:
         run: Gives the traces of both sides, with rows as far apart as ever and so many times as
             many engine steps between them (`Model.replace(substeps=…)`).
         progress: Told the fraction that is done.
+
+    Returns:
+        labels: The two sides.
+        steps: The engine's steps of the left side and of the right one [s], as given; they are
+            halved and quartered.
+        until: The last moment that is compared [s].
+        touch: When something touches first in any of the runs [s]; None if nothing does.
+        before: Each quantity until then, see `_limit`; of a run that begins with a touch there is
+            none.
+        whole: Each quantity over all of the run; the same as `before` if nothing touches.
+        vanishes: Whether no gap is more than discretisation, over the whole run.
 
     Raises:
         EndedEarlyError: A run ends before its time.
@@ -136,7 +94,7 @@ def convergence(
         tuple(_limit(curve, between, own, chosen) for curve in curves if chosen.any())
         for chosen in (np.ones(len(time), dtype=bool), early)
     )
-    return TimestepConvergence(
+    return Figures(
         labels=labels_of(one.header, two.header).long,
         steps=(
             one.header.timestep / one.header.substeps,
@@ -146,6 +104,7 @@ def convergence(
         touch=touch,
         before=before,
         whole=whole,
+        vanishes=all(limit.verdict in ("rounding", "discretisation") for limit in whole),
     )
 
 
@@ -158,8 +117,20 @@ def _limit(
     between: list[dict[str, Array]],
     own: list[list[dict[str, Array]]],
     chosen: NDArray[np.bool_],
-) -> QuantityLimit:
-    """One quantity at some of the moments (n,)."""
+) -> Figures:
+    """One quantity at some of the moments (n,), with finer and finer steps.
+
+    Returns:
+        name, kind, unit: As of an Agreement.
+        gaps: The largest gap between the sides, with the steps as given, halved and quartered.
+        left: How far the left side's run with the steps as given, and with halved ones, is from
+            its run with the finest; right: the same of the right side.
+        limit: What the gap tends to for steps of no length, on the line through the last two.
+        verdict: "rounding" where there is no gap; "discretisation" if each halving takes away
+            half of it or about that, and nothing is left; "stays" if three quarters or more are
+            there with the finest steps; "in part" if less is left, but some; "unclear" if it does
+            not shrink from run to run.
+    """
     name = curve.name
     gaps = [float(run[name][chosen].max()) for run in between]
     left, right = (
@@ -168,13 +139,13 @@ def _limit(
     values = curve.one[chosen] if curve.one.size else np.ones(1)
     rounding = _ROUNDING * max(1.0, float(np.abs(values).max()))
     limit = max(0.0, 2 * gaps[2] - gaps[1])
-    return QuantityLimit(
+    return Figures(
         name=name,
         kind=curve.kind,
         unit=curve.unit,
-        gaps=(gaps[0], gaps[1], gaps[2]),
-        left=(left[0], left[1]),
-        right=(right[0], right[1]),
+        gaps=gaps,
+        left=left,
+        right=right,
         limit=limit,
         verdict=_verdict(gaps, limit, rounding),
     )

@@ -6,107 +6,61 @@ again with its start and commands perturbed, and what that makes of each quantit
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from ..errors import TraceError
 from ..interface import Array, Ints
 from ..measures import common_moments
+from ..page import Figures
 from ..runs import Trace
 from ..runs.drive import Progress, silent
 from ..runs.rerun import Rerun
 from .agreement import Agreement, Comparison
 from .perturbed import EXACT, ROUNDING, RUNS, Uncertainty, perturbed_runs
-from .series import default_tip, series, touches
+from .series import series, touches
 
 _WINDOW = 0.025  # of the common time, to either side
 
 
-@dataclass(frozen=True, eq=False)
-class FloorBand:
-    """The chaos floor of one quantity.
-
-    Attributes:
-        name: As in the Agreement of the two sides; kind, unit: likewise.
-        most: The largest width of the band; end: the width at the last moment.
-        inside_from: The time from which on the gap between the two sides lies inside [s];
-            None if it does not at the end. Of a first touch 0 or None.
-        beyond: Whether the gap is, at any moment, larger than both the band and the tolerance:
-            only then it is more than chaos.
-        width: (n,) at each moment that the sides have in common; (1,) of a first touch.
-    """
-
-    name: str
-    kind: str
-    unit: str
-    most: float
-    end: float
-    inside_from: float | None
-    beyond: bool
-    width: Array = field(repr=False, metadata={"json": False})
-
-
-@dataclass(frozen=True, eq=False)
-class ChaosFloor:
-    """The chaos floor of a comparison.
-
-    Attributes:
-        runs: How many perturbed runs of the left side it is made of; seed: of what was drawn.
-        rounding: What starts and commands were changed by, relative.
-        uncertain: What the start is uncertain by besides.
-        ended: How many of the runs ended early; from then on the band has no bound.
-        bands: One for each quantity that is compared.
-        time: (n,) the moments of the bands [s from the start].
-    """
-
-    runs: int
-    seed: int
-    rounding: float
-    uncertain: Uncertainty
-    ended: int
-    bands: tuple[FloorBand, ...]
-    time: Array = field(repr=False, metadata={"json": False})
-
-
 def chaos_floor(
     comparison: Comparison,
-    one: Trace,
-    two: Trace,
     rerun: Rerun,
     *,
-    tip: str | None = None,
     runs: int = RUNS,
     seed: int = 0,
     uncertain: Uncertainty = EXACT,
     progress: Progress = silent,
-) -> ChaosFloor:
+) -> Figures:
     """The chaos floor of each quantity of a comparison.
 
-    The band at a moment is the largest distance of a perturbed run from `one`, within 2.5 % of
-    the common time before and after it. It is not a running maximum: a robot whose servos pull it
-    back forgets where it started, and a gap that remains then is a difference although an impact
-    in between was chaotic. And it is not of the moment alone: all perturbed runs part along the
-    one direction that grows fastest, so that they cross `one` at the same time, and an impact
-    that comes a step later is a spike in each of two places.
+    The band at a moment is the largest distance of a perturbed run from the left one, within 2.5 %
+    of the common time before and after it. It is not a running maximum: a robot whose servos pull
+    it back forgets where it started, and a gap that remains then is a difference although an
+    impact in between was chaotic. And it is not of the moment alone: all perturbed runs part along
+    the one direction that grows fastest, so that they cross the left one at the same time, and an
+    impact that comes a step later is a spike in each of two places.
 
     Args:
-        comparison: Of the two traces.
-        one: The left side, as `rerun` runs it.
-        two: The right side.
+        comparison: Of two traces, of which `rerun` makes the left one.
         rerun: How the left side is run.
-        tip: As given to `compare`.
         runs: How many perturbed runs.
         seed: Of what is drawn.
         uncertain: What the start of a real robot is uncertain by.
         progress: Told the fraction that is done.
 
+    Returns:
+        runs: How many perturbed runs of the left side it is made of; seed: of what was drawn.
+        rounding: What starts and commands were changed by, relative.
+        uncertain: What the start is uncertain by besides.
+        ended: How many of the runs ended early; from then on the band has no bound.
+        bands: One for each quantity that is compared; see `_band`.
+
     Raises:
         BadInputError: As `perturbed_runs`.
     """
-    tip = default_tip(one.header, two.header) if tip is None else tip
+    one, two = comparison.one.trace, comparison.two.trace
     common = common_moments(one.time, two.time, (one.timestep, two.timestep))
-    gaps = {curve.name: curve.difference for curve in series(one, two, tip)}
+    gaps = {curve.name: curve.difference for curve in comparison.curves}
     gaps |= {a.name: np.array([a.max]) for a in comparison.agreements if a.kind == "contact"}
     widths = {name: np.zeros(len(gap)) for name, gap in gaps.items()}
     ended = 0
@@ -114,7 +68,8 @@ def chaos_floor(
         rerun, runs=runs, seed=seed, uncertain=uncertain, progress=progress
     ):
         ended += bool(trace.header.ended)
-        for name, far in _distances(one, trace, tip, comparison.until, common.one).items():
+        far_apart = _distances(one, trace, comparison.tip, comparison.until, common.one)
+        for name, far in far_apart.items():
             if name in widths:
                 widths[name] = np.maximum(widths[name], far)
     reach = round(_WINDOW * (len(common.time) - 1))
@@ -127,7 +82,14 @@ def chaos_floor(
             padded = np.pad(width, reach, mode="edge")
             width = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
         bands.append(_band(agreement, gaps[agreement.name], width, time))
-    return ChaosFloor(runs, seed, ROUNDING, uncertain, ended, tuple(bands), common.time)
+    return Figures(
+        runs=runs,
+        seed=seed,
+        rounding=ROUNDING,
+        uncertain=uncertain,
+        ended=ended,
+        bands=tuple(bands),
+    )
 
 
 def _distances(
@@ -153,10 +115,21 @@ def _distances(
     return distances
 
 
-def _band(agreement: Agreement, gap: Array, width: Array, time: Array) -> FloorBand:
+def _band(agreement: Agreement, gap: Array, width: Array, time: Array) -> Figures:
+    """The chaos floor of one quantity.
+
+    Returns:
+        name, kind, unit: Of the Agreement of the two sides.
+        most: The largest width of the band; end: the width at the last moment.
+        inside_from: The time from which on the gap between the two sides lies inside [s];
+            None if it does not at the end. Of a first touch 0 or None.
+        beyond: Whether the gap is, at any moment, larger than both the band and the tolerance:
+            only then it is more than chaos.
+        _width: (n,) at each moment that the sides have in common; (1,) of a first touch.
+    """
     outside = np.flatnonzero(~(gap <= width))
     last = int(outside[-1]) + 1 if len(outside) else 0
-    return FloorBand(
+    return Figures(
         name=agreement.name,
         kind=agreement.kind,
         unit=agreement.unit,
@@ -164,5 +137,5 @@ def _band(agreement: Agreement, gap: Array, width: Array, time: Array) -> FloorB
         end=float(width[-1]),
         inside_from=float(time[last]) if last < len(time) else None,
         beyond=bool((~(gap <= np.maximum(width, agreement.tolerance))).any()),
-        width=width,
+        _width=width,
     )

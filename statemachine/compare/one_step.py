@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..errors import BadInputError, DivergedError, UnsupportedError
 from ..interface import Array, Data, Model, State, get_state, make_data, reset, set_state, step
+from ..page import Figures
 from ..runs.derived import put_row
 from ..runs.drive import Progress, silent
 from ..runs.rerun import Rerun
@@ -29,87 +30,6 @@ _STANDS_OUT = 10.0  # times the median
 _MOST_SPIKES = 5
 
 
-@dataclass(frozen=True)
-class StageGap:
-    """One stage of a step, over all moments.
-
-    Attributes:
-        stage: Its name.
-        told: Whether both engines tell it; reason: why not, or "".
-        unit: Of the figures.
-        scale: Its usual size on the two sides: the median of its largest entry over the moments
-            at which that is at least a thousandth of what it ever is.
-        tolerance: What does not count.
-        null: How far the left side, put back to its own states, gets from its own run.
-        worst: The largest difference; at: when [s from the start].
-        where: The joint, body or pair to look at then.
-        beyond: At how many moments it is beyond the tolerance and beyond the null.
-        leads: At how many of them no earlier stage is, so that it has a cause of its own.
-        first: The first of them [s]; None if there is none.
-    """
-
-    stage: str
-    told: bool
-    reason: str = ""
-    unit: str = ""
-    scale: float = 0.0
-    tolerance: float = 0.0
-    null: float = 0.0
-    worst: float = 0.0
-    at: float | None = None
-    where: str = ""
-    beyond: int = 0
-    leads: int = 0
-    first: float | None = None
-
-
-@dataclass(frozen=True)
-class StepSpike:
-    """A moment at which the accelerations of one step differ far more than they usually do.
-
-    Attributes:
-        at: When [s from the start].
-        size: The difference of accelerations [unit]; joint: whose.
-        stage: The first stage beyond its tolerance there; where: its joint, body or pair.
-    """
-
-    at: float
-    size: float
-    unit: str
-    joint: str
-    stage: str
-    where: str
-
-
-@dataclass(frozen=True)
-class StepComparison:
-    """One step on each side from many states of the left one.
-
-    Attributes:
-        moments: From how many states; every: each so many-th row of the run.
-        until: The time of the last of them [s].
-        relative: The tolerance, relative to the scale of a stage.
-        stages: In the order in which a step computes them.
-        spikes: The moments that stand out, the largest first.
-        primed: What of the step before the right side was given; "" for nothing.
-        notes: What a reader must know.
-    """
-
-    moments: int
-    every: int
-    until: float
-    relative: float
-    stages: tuple[StageGap, ...]
-    spikes: tuple[StepSpike, ...]
-    primed: str
-    notes: tuple[str, ...]
-
-    @property
-    def first(self) -> StageGap | None:
-        """The first stage, in the order of a step, that differs at any moment."""
-        return next((gap for gap in self.stages if gap.beyond), None)
-
-
 def one_step(
     rerun: Rerun,
     right: Model,
@@ -118,7 +38,7 @@ def one_step(
     moments: int = MOMENTS,
     relative: float = RELATIVE,
     progress: Progress = silent,
-) -> StepComparison:
+) -> Figures:
     """Compare one step of two sides from each recorded state of the left one.
 
     Args:
@@ -128,6 +48,16 @@ def one_step(
         moments: From how many states at most; every n-th row is taken.
         relative: What does not count, of the scale of a stage.
         progress: Told the fraction that is done.
+
+    Returns:
+        moments: From how many states; every: each so many-th row of the run.
+        until: The time of the last of them [s].
+        relative: The tolerance, relative to the scale of a stage.
+        stages: In the order in which a step computes them; see `_gap`.
+        first: The first of them that differs at any moment; None if none does.
+        spikes: The moments that stand out, the largest first; see `_spikes`.
+        primed: What of the step before the right side was given; "" for nothing.
+        notes: What a reader must know.
 
     Raises:
         BadInputError: `moments` is less than 1, or the two have no joint in common.
@@ -170,12 +100,14 @@ def one_step(
     progress(1.0)
     measured = measures(reader, readings, relative)
     leading = _leading(measured, len(times))
-    return StepComparison(
+    stages = _gaps(measured, times, Counter(stage for stage, _ in leading))
+    return Figures(
         moments=len(times),
         every=every,
         until=times[-1] if times else 0.0,
         relative=relative,
-        stages=_gaps(measured, times, Counter(stage for stage, _ in leading)),
+        stages=stages,
+        first=next((gap for gap in stages if gap.beyond), None),
         spikes=_spikes(measured, times, leading),
         primed=primed,
         notes=_notes(matched, failed),
@@ -230,33 +162,58 @@ def _leading(measured: Sequence[StageMeasure], moments: int) -> list[tuple[str, 
 
 def _gaps(
     measured: Sequence[StageMeasure], times: Sequence[float], leads: Mapping[str, int]
-) -> tuple[StageGap, ...]:
+) -> tuple[Figures, ...]:
     """Each stage, by that of its units that is farthest beyond its tolerance."""
     gaps = []
     for stage in STAGES:
         by_unit = [_gap(measure, times) for measure in measured if measure.stage == stage]
         if not by_unit:
             reason = "nothing touches" if stage == FOUND else "an engine does not tell it"
-            by_unit = [StageGap(stage, stage == FOUND, reason)]
+            by_unit = [Figures(**_UNTOLD, stage=stage, told=stage == FOUND, reason=reason)]
         # Of the measures of one stage that of pairs comes last, and says more than joints do.
-        gaps.append(replace(max(reversed(by_unit), key=_weight), leads=leads[stage]))
+        gaps.append(max(reversed(by_unit), key=_weight))
+        gaps[-1].leads = leads[stage]
     return tuple(gaps)
 
 
-def _weight(gap: StageGap) -> tuple[bool, float]:
+def _weight(gap: Figures) -> tuple[bool, float]:
     """By what the units of one stage are ranked."""
     if not gap.worst or gap.stage == FORCE:
         return gap.beyond > 0, float(gap.worst > 0)
     return gap.beyond > 0, gap.worst / gap.tolerance if gap.tolerance else np.inf
 
 
-def _gap(measure: StageMeasure, times: Sequence[float]) -> StageGap:
+# Of a stage that cannot be compared.
+_UNTOLD: dict[str, Any] = {
+    **{"unit": "", "where": "", "at": None, "first": None, "beyond": 0},
+    **dict.fromkeys(("scale", "tolerance", "null", "worst"), 0.0),
+}
+
+
+def _gap(measure: StageMeasure, times: Sequence[float]) -> Figures:
+    """One stage of a step, over all moments.
+
+    Returns:
+        stage: Its name.
+        told: Whether both engines tell it; reason: why not, or "".
+        unit: Of the figures.
+        scale: Its usual size on the two sides: the median of its largest entry over the moments
+            at which that is at least a thousandth of what it ever is.
+        tolerance: What does not count.
+        null: How far the left side, put back to its own states, gets from its own run.
+        worst: The largest difference; at: when [s from the start].
+        where: The joint, body or pair to look at then.
+        beyond: At how many moments it is beyond the tolerance and beyond the null.
+        leads: At how many of them no earlier stage is, so that it has a cause of its own.
+        first: The first of them [s]; None if there is none.
+    """
     place = np.unravel_index(int(np.argmax(measure.apart)), measure.apart.shape)
     row, worst = int(place[0]), float(measure.apart[place])
     hits = np.flatnonzero(measure.beyond.any(axis=1))
-    return StageGap(
+    return Figures(
         stage=measure.stage,
         told=True,
+        reason="",
         unit=measure.unit,
         scale=measure.scale,
         tolerance=measure.tolerance,
@@ -271,18 +228,32 @@ def _gap(measure: StageMeasure, times: Sequence[float]) -> StageGap:
 
 def _spikes(
     measured: Sequence[StageMeasure], times: Sequence[float], leading: Sequence[tuple[str, str]]
-) -> tuple[StepSpike, ...]:
-    """The moments at which the accelerations stand out, the largest first."""
-    spikes: list[StepSpike] = []
+) -> tuple[Figures, ...]:
+    """The moments at which the accelerations of a step differ far more than they usually do.
+
+    Returns:
+        at: When [s from the start].
+        size: The difference of accelerations [unit]; joint: whose.
+        stage: The first stage beyond its tolerance there; where: its joint, body or pair.
+    """
+    spikes: list[Figures] = []
     for measure in (measure for measure in measured if measure.stage == AFTER):
         most = measure.apart.max(axis=1)
         stands = measure.beyond.any(axis=1) & (most > _STANDS_OUT * np.median(most))
         padded = np.concatenate([[-np.inf], most, [-np.inf]])
         stands &= (most >= padded[:-2]) & (most > padded[2:])  # no flank of another
         for row in np.flatnonzero(stands).tolist():
-            joint = measure.names[int(np.argmax(measure.apart[row]))]
-            size = float(most[row])
-            spikes.append(StepSpike(times[row], size, measure.unit, joint, *leading[row]))
+            stage, where = leading[row]
+            spikes.append(
+                Figures(
+                    at=times[row],
+                    size=float(most[row]),
+                    unit=measure.unit,
+                    joint=measure.names[int(np.argmax(measure.apart[row]))],
+                    stage=stage,
+                    where=where,
+                )
+            )
     return tuple(sorted(spikes, key=lambda spike: -spike.size)[:_MOST_SPIKES])
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..interface import Array, Ints, JointType, usual_site
 from ..measures import QUANTITIES, SAME, common_moments, distances, same_pairs
+from ..page import Figures
 from ..rotations import angle_between, matrix_from_quat
 from ..runs import Header, Trace
 
@@ -186,11 +187,32 @@ def tell(one: Trace, two: Trace, column: str) -> bool:
     )
 
 
-@dataclass(frozen=True)
-class Contact:
-    """One pair of bodies on one side, over the time that both runs have.
+_NEVER = Figures(
+    first=None, last=None, share=0.0, force=0.0, total=0.0, ends=False, deepest=0.0, deepest_at=0.0
+)
 
-    Attributes:
+
+def touches(one: Trace, two: Trace) -> tuple[Figures, ...]:
+    """Every pair of bodies that touches on either side; none if a trace does not tell.
+
+    Returns:
+        The pair, and `one` and `two`, its contacts on each side; see `_contacts`.
+    """
+    if "contact_row" not in one or "contact_row" not in two:
+        return ()
+    until = float(common_moments(one.time, two.time, (one.timestep, two.timestep)).time[-1])
+    left = _contacts(one, until)
+    right = same_pairs(left, _contacts(two, until))
+    return tuple(
+        Figures(pair=pair, one=left.get(pair, _NEVER), two=right.get(pair, _NEVER))
+        for pair in left | right
+    )
+
+
+def _contacts(trace: Trace, until: float) -> dict[str, Figures]:
+    """Contacts by pair of bodies, up to a moment [s from the start].
+
+    Returns:
         first: When they first touch [s from the start]; None if never.
         last: When they last touch.
         share: Of the moments, in how many they touch, 0 to 1.
@@ -199,42 +221,6 @@ class Contact:
         ends: Whether they touch at the last moment.
         deepest: How far one shape is in the other at most [m]; deepest_at: when [s].
     """
-
-    first: float | None
-    last: float | None
-    share: float
-    force: float
-    ends: bool
-    total: float
-    deepest: float
-    deepest_at: float
-
-
-@dataclass(frozen=True)
-class Touch:
-    """One pair of bodies on both sides."""
-
-    pair: str
-    one: Contact
-    two: Contact
-
-
-def touches(one: Trace, two: Trace) -> tuple[Touch, ...]:
-    """Every pair of bodies that touches on either side; none if a trace does not tell."""
-    if "contact_row" not in one or "contact_row" not in two:
-        return ()
-    until = float(common_moments(one.time, two.time, (one.timestep, two.timestep)).time[-1])
-    sides = [_of(trace, until) for trace in (one, two)]
-    sides[1] = same_pairs(*sides)
-    never = Contact(None, None, 0.0, 0.0, False, 0.0, 0.0, 0.0)
-    return tuple(
-        Touch(pair, sides[0].get(pair, never), sides[1].get(pair, never))
-        for pair in dict.fromkeys([*sides[0], *sides[1]])
-    )
-
-
-def _of(trace: Trace, until: float) -> dict[str, Contact]:
-    """Contacts by pair of bodies, up to a moment [s from the start]."""
     time = trace.time - trace.time[0]
     time = time[time <= until + SAME * trace.header.timestep]
     tail = np.flatnonzero(time >= until * (1 - SETTLED) - SAME * trace.header.timestep)
@@ -248,7 +234,7 @@ def _of(trace: Trace, until: float) -> dict[str, Contact]:
         places = places[trace["contact_row"][places] < len(time)]
         distance = np.nan_to_num(trace["contact_dist"][places])
         deepest = int(np.argmin(distance))
-        contacts[pair] = Contact(
+        contacts[pair] = Figures(
             first=float(time[rows[0]]),
             last=float(time[rows[-1]]),
             share=len(rows) / len(time),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,33 +11,13 @@ from ..errors import StateMachineError
 from ..installed import WITNESS
 from ..kinematics import Kinematics, shared_joints
 from ..measures import distances
+from ..page import Figures
 from ..runs import Header, Trace, model_file
 from ..runs.provenance import model_files
 from .series import default_tip, joint_columns
 
 
-@dataclass(frozen=True)
-class Witness:
-    """How far a site of the traces is from where the witness puts it.
-
-    Attributes:
-        by: The witness and its version.
-        site: Which site.
-        one: Largest distance at any row of the first trace [m]; two: of the second.
-        rows: How many poses were compared.
-        grade: "own reading" if the witness read the model's file with its own parser, "same
-            reading" if it computed from the numbers that the file was compiled to.
-    """
-
-    by: str
-    site: str
-    one: float
-    two: float
-    rows: int
-    grade: str
-
-
-def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
+def witness(one: Trace, two: Trace, path: Path | None = None) -> Figures | None:
     """Pinocchio's forward kinematics of each trace's qpos, against the recorded site.
 
     Args:
@@ -47,6 +26,13 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
         path: The model's file; by default the one that the headers name.
 
     Returns:
+        by: The witness and its version.
+        site: Which site.
+        one: Largest distance at any row of the first trace [m]; two: of the second.
+        rows: How many poses were compared.
+        grade: "own reading" if the witness read the model's file with its own parser, "same
+            reading" if it computed from the numbers that the file was compiled to.
+
         None where Pinocchio is missing, where neither it nor an engine that is here can read
         the model, and where the file that the traces were recorded with is not here.
     """
@@ -66,7 +52,7 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
             return None
     except StateMachineError:
         return None
-    return Witness(
+    return Figures(
         by=f"{WITNESS} {kinematics.version}",
         site=site,
         one=first,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ..errors import UnsupportedError
 from ..interface import Array, Data, forward
 from ..measures.text import NONE, position
+from ..page import Figures
 from ..runs.drive import steps_in
 from ..runs.robot import touching
 from ._robot import carried_by_joint, coordinate
@@ -54,8 +55,7 @@ def summed(forces: Mapping[str, float | None]) -> Forces:
     return {**forces, "total": total}
 
 
-@dataclass(frozen=True, eq=False)
-class Droop:
+class Droop(Figures):
     """One run from the default pose under an untouched ctrl.
 
     Attributes:
@@ -73,19 +73,6 @@ class Droop:
         touching: Those that are there at the end.
         ctrl_untouched: Whether ctrl still is what it was at the start.
     """
-
-    time: Array
-    position: Array
-    path: Array
-    diverged: float | None = None
-    qpos: Array | None = None
-    forces: Forces = field(default_factory=dict[str, float | None])
-    velocity: float = np.nan
-    acceleration: float = np.nan
-    most_acceleration: float = np.nan
-    touches: dict[str, float] = field(default_factory=dict[str, float])
-    touching: tuple[str, ...] = ()
-    ctrl_untouched: bool = True
 
     def at(self, row: int, slide: bool, decimals: int = 2) -> str:
         """A position of the joint as text; a slower engine's run may be shorter."""
@@ -123,6 +110,13 @@ class Droop:
         return PARTS[part] if against[part] > 0 else "nothing"
 
 
+# The rest of a run that ended so.
+_DIVERGED: dict[str, Any] = {
+    **{"qpos": None, "forces": {}, "touches": {}, "touching": (), "ctrl_untouched": True},
+    **dict.fromkeys(("velocity", "acceleration", "most_acceleration"), np.nan),
+}
+
+
 def droop(
     data: Data,
     joint: str,
@@ -148,17 +142,16 @@ def droop(
     rows = np.rint(time / model.timestep).astype(int)
     position = np.full(len(time), np.nan)
     position[rows < len(path)] = path[rows[rows < len(path)]]
+    ways = {"time": time, "position": position, "path": path, "diverged": diverged}
     if diverged is not None:
-        return Droop(time, position, path, diverged)
+        return Droop(**ways, **_DIVERGED)
     forward(model, data)
     pairs_at_end = touching(model, data.contacts, carried_by_joint(model, joint))
     first: dict[str, float] = {}
     for moment, pairs in (*touches, (data.time, pairs_at_end)):
         first |= {pair: moment for pair in pairs if pair not in first}
     return Droop(
-        time=time,
-        position=position,
-        path=path,
+        **ways,
         qpos=data.qpos.copy(),
         forces=forces_on(data, dof),
         velocity=float(data.qvel[dof]),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from ..errors import BadInputError, check_name
 from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
 from ..kinematics import Kind
 from ..measures.quantities import readings
+from ..page import Figures
 from ..runs.commands import farther, is_servo, load_at_start, start_keyframe
 from ..runs.robot import carried_by, scalar_joint
 from ..witness import labels
@@ -22,26 +22,13 @@ _SHIFT = 0.05  # m; of a slide without a range, or up
 FINGERTIP = "gripperframe"
 
 
-@dataclass(frozen=True)
-class Coordinate:
-    """One number of qpos: of a hinge or a slide, or the height of a free body.
+def coordinate(model: Model, joint: str) -> Figures:
+    """The coordinate that a lesson watches of a joint: a hinge, a slide, the height of a free body.
 
-    Attributes:
-        joint: Its joint.
+    Returns:
         place, dof: Where it is in qpos and in qvel.
         slide: Whether it is a length, and no angle.
         slot: How it is typed.
-    """
-
-    joint: str
-    place: int
-    dof: int
-    slide: bool
-    slot: str
-
-
-def coordinate(model: Model, joint: str) -> Coordinate:
-    """The coordinate that a lesson watches of a joint.
 
     Raises:
         UnknownNameError: There is no such joint.
@@ -52,9 +39,10 @@ def coordinate(model: Model, joint: str) -> Coordinate:
     kind = JointType(int(model.jnt_type[number]))
     if kind is JointType.FREE:
         place, dof = int(model.jnt_qposadr[number]) + 2, int(model.jnt_dofadr[number]) + 2
-        return Coordinate(joint, place, dof, True, f"{slot} + 2  # the height of a free body")
-    place, dof = scalar_joint(model, joint)
-    return Coordinate(joint, place, dof, kind is JointType.SLIDE, slot)
+        slot += " + 2  # the height of a free body"
+    else:
+        place, dof = scalar_joint(model, joint)
+    return Figures(place=place, dof=dof, slide=kind is not JointType.HINGE, slot=slot)
 
 
 def carried_by_joint(model: Model, joint: str) -> frozenset[int]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..engines import room
-from ..interface import INPUTS, Array, Data, Model, forward, make_data, step
-from ..page import Pipeline, Table, Traces
+from ..interface import INPUTS, Data, Model, forward, make_data, step
+from ..measures.text import grouped
+from ..page import Figures, Pipeline, Table, Traces
 from ..probes import conventions
 from ..runs.commands import hold_ctrl
 from ..runs.drive import Progress
@@ -21,70 +21,32 @@ _STORED = (*INPUTS, "time")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
 
 
-@dataclass(frozen=True)
-class OwnAnswer:
-    """What an engine itself does, asked of it alone: a question, a part of it, the answer."""
+def own_answers(model: Model, question: str) -> tuple[Figures, ...]:
+    """What the engine behind a Model that emulates some of the contract does itself, asked alone.
 
-    question: str
-    part: str
-    answer: str
-
-
-@dataclass(frozen=True)
-class ArrayChanges:
-    """One array, and whether its bytes changed: by a write to qpos, by forward, by step.
-
-    forward and step are called in two Data, each right after the same write; `same` says whether
-    they left the same bits.
+    Returns:
+        The question, a part of it, and the answer.
     """
-
-    name: str
-    stored: bool
-    write: bool
-    forward: bool
-    step: bool
-    same: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Lag:
-    """Of which moment what is derived is after each of n steps.
-
-    Attributes:
-        time: (n,) of the state that each step started from [s].
-        distance: (n,) between the fingertip that a step leaves, and the one that `forward`
-            computes right after it [m].
-        of_before: For each derived array, after how many of the steps it was bit for bit what
-            `forward` had computed before the step; of_after: what `forward` computes after it.
-        array: Where the fingertip is read: `site_xpos`, or `xpos` of a body.
-        neither: Whether the model's integrator leaves what is derived from a stage of its own.
-    """
-
-    time: Array
-    distance: Array
-    of_before: dict[str, int]
-    of_after: dict[str, int]
-    array: str
-    neither: bool
-
-
-def own_answers(model: Model, question: str) -> tuple[OwnAnswer, ...]:
-    """A convention of the engine behind a Model that emulates some of the contract."""
     if not room(model.backend).emulated:  # the interface is the engine's own
         return ()
     return tuple(
-        OwnAnswer(question, finding.of, finding.answer)
+        Figures(question=question, part=finding.of, answer=finding.answer)
         for finding in conventions.ask(question, model.backend) or ()
     )
 
 
-def changes_by_call(model: Model, place: int, value: float) -> tuple[ArrayChanges, ...]:
+def changes_by_call(model: Model, place: int, value: float) -> tuple[Figures, ...]:
     """Each array of a Data, and what changes it.
 
     Args:
         model: Of the lesson.
         place: What is written in qpos; value: what is written there [rad or m].
         value: See place.
+
+    Returns:
+        The name of each, whether it is stored, and whether its bytes changed: by a write to qpos,
+        by forward, by step. forward and step are called in two Data, each right after the same
+        write; `same` says whether they left the same bits.
     """
 
     def look(data: Data) -> dict[str, bytes]:
@@ -101,20 +63,30 @@ def changes_by_call(model: Model, place: int, value: float) -> tuple[ArrayChange
             looks.append(look(data))
     start, written, computed, _, before, stepped = looks
     return tuple(
-        ArrayChanges(
-            name,
-            name in _STORED,
-            start[name] != written[name],
-            written[name] != computed[name],
-            before[name] != stepped[name],
-            computed[name] == stepped[name],
+        Figures(
+            name=name,
+            stored=name in _STORED,
+            write=start[name] != written[name],
+            forward=written[name] != computed[name],
+            step=before[name] != stepped[name],
+            same=computed[name] == stepped[name],
         )
         for name in start
     )
 
 
-def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Lag:
-    """Compare what each step of a command leaves with a forward before it and one after it."""
+def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Figures:
+    """Compare what each step of a command leaves with a forward before it and one after it.
+
+    Returns:
+        time: (n,) of the state that each step started from [s].
+        distance: (n,) between the fingertip that a step leaves, and the one that `forward`
+            computes right after it [m].
+        of_before: For each derived array, after how many of the steps it was bit for bit what
+            `forward` had computed before the step; of_after: what `forward` computes after it.
+        array: Where the fingertip is read: `site_xpos`, or `xpos` of a body.
+        neither: Whether the model's integrator leaves what is derived from a stage of its own.
+    """
     times: list[float] = []
     distances: list[float] = []
     of_before, of_after = Counter[str](), Counter[str]()
@@ -135,23 +107,33 @@ def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Lag:
             before = after
             if k % 50 == 0:
                 progress(k / steps)
-    neither = model.capabilities.behaviours["stale after a step"].support == "unsupported"
-    return Lag(
-        np.array(times), np.array(distances), dict(of_before), dict(of_after), tip.array, neither
+    return Figures(
+        time=np.array(times),
+        distance=np.array(distances),
+        of_before=dict(of_before),
+        of_after=dict(of_after),
+        array=tip.array,
+        neither=model.capabilities.behaviours["stale after a step"].support == "unsupported",
     )
 
 
-def change_tables(results: Mapping[str, Sequence[ArrayChanges]]) -> list[Any]:
+def change_tables(results: Mapping[str, Sequence[Figures]]) -> list[Any]:
     """Arrays whose bytes a write, forward and step changed, in groups that behave alike."""
-    tables: dict[tuple[ArrayChanges, ...], list[str]] = {}
-    for name, changes in results.items():
-        tables.setdefault(tuple(changes), []).append(name)
-    first = next(iter(tables))
+    first = next(iter(results.values()))
+    tables = grouped((_change_rows(changes), name) for name, changes in results.items())
     stored = [change.name for change in first if change.stored]
     computed = [change.name for change in first if not change.stored and change.forward]
     moved = [change.name for change in first if change.stored and change.step]
     return [
-        *(_change_table(changes, names) for changes, names in tables.items()),
+        *(
+            Table(
+                (", ".join(names), "a write", "forward", "step"),
+                rows,
+                title="Whose bytes change, after a write to qpos[…] and then one call",
+                words=frozenset({0, 1, 2, 3}),
+            )
+            for rows, names in tables.items()
+        ),
         Pipeline(
             "What forward and step cover, as found by comparing bytes",
             (("stored", stored), ("derived", computed), ("integrated", moved)),
@@ -160,26 +142,19 @@ def change_tables(results: Mapping[str, Sequence[ArrayChanges]]) -> list[Any]:
     ]
 
 
-def _change_table(changes: Sequence[ArrayChanges], names: Sequence[str]) -> Table:
-    groups: dict[tuple[bool, ...], list[str]] = {}
-    for change in changes:
-        flags = (change.stored, change.write, change.forward, change.step)
-        groups.setdefault(flags, []).append(change.name)
-    return Table(
-        (", ".join(names), "a write", "forward", "step"),
-        [
-            (
-                f"{'stored' if stored else 'derived'}: {', '.join(members)}",
-                *("changes" if flag else "–" for flag in flags),
-            )
-            for (stored, *flags), members in groups.items()
-        ],
-        title="Whose bytes change, after a write to qpos[…] and then one call",
-        words=frozenset({0, 1, 2, 3}),
+def _change_rows(changes: Sequence[Figures]) -> tuple[tuple[str, ...], ...]:
+    """A row for the arrays that behave alike."""
+    groups = grouped(((c.stored, c.write, c.forward, c.step), c.name) for c in changes)
+    return tuple(
+        (
+            f"{'stored' if stored else 'derived'}: {', '.join(members)}",
+            *("changes" if flag else "–" for flag in flags),
+        )
+        for (stored, *flags), members in groups.items()
     )
 
 
-def lag_tables(results: Mapping[str, Lag]) -> list[Any]:
+def lag_tables(results: Mapping[str, Figures]) -> list[Any]:
     """To which moment belongs what a step leaves behind, by backend."""
     return [
         Table(
@@ -212,7 +187,7 @@ def lag_tables(results: Mapping[str, Lag]) -> list[Any]:
     ]
 
 
-def own_tables(results: Mapping[str, Sequence[OwnAnswer]], question: str) -> list[Table]:
+def own_tables(results: Mapping[str, Sequence[Figures]], question: str) -> list[Table]:
     """What each engine does without us, where some of this is emulated."""
     rows = {
         name: [(f"a {question}", a.part, a.answer) for a in answers if a.question == question]

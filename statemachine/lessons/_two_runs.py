@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..engines.records import WayBack
 from ..interface import Array, Model, make_data, reset
 from ..measures import largest
 from ..measures.text import millimetres
-from ..page import Table, Traces
+from ..page import Figures, Table, Traces
 from ..probes.audit.interface_driver import InterfaceDriver, as_a_state, written
 from .template import where
 
@@ -22,44 +22,37 @@ _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 
 _SHORT = {"extra-step": "one step more", "late-ctrl": "late ctrl"}
 
 
-@dataclass(frozen=True)
-class Broken:
+def broken(way: str, first: Array, second: Array) -> Figures:
     """What became of a second run that was made to differ.
 
-    Attributes:
+    Args:
         way: One of `BREAKS`.
+        first: Qpos after each step (n+1, nq) of the run as it is.
+        second: Of the other.
+
+    Returns:
         close: Whether `np.allclose` calls the ends equal.
         peak, peak_step: The largest |qpos difference| on the way, and after which step.
         end: That at the end.
     """
-
-    way: str
-    close: bool
-    peak: float
-    peak_step: int
-    end: float
-
-    @classmethod
-    def of(cls, way: str, first: Array, second: Array) -> Broken:
-        """From qpos after each step (n+1, nq) of the two runs."""
-        gap = np.abs(first - second).max(axis=1)
-        peak, step = largest(gap)
-        close = bool(np.allclose(first[-1], second[-1]))
-        return cls(way, close, peak, step, float(gap[-1]))
+    gap = np.abs(first - second).max(axis=1)
+    peak, step = largest(gap)
+    close = bool(np.allclose(first[-1], second[-1]))
+    return Figures(way=way, close=close, peak=peak, peak_step=step, end=float(gap[-1]))
 
 
-def broken_table(results: Mapping[str, Sequence[Broken]]) -> list[Table]:
+def broken_table(results: Mapping[str, Sequence[Figures]]) -> list[Table]:
     """What became of the second runs that were made to differ, by backend."""
     rows = [
         (
-            f"{where(results, name)}{_SHORT[broken.way]}",
-            f"{broken.peak:.1e}, step {broken.peak_step}",
-            f"{broken.end:.1e}",
-            "equal" if broken.close else "not equal",
-            "not equal" if broken.end else "equal",
+            f"{where(results, name)}{_SHORT[run.way]}",
+            f"{run.peak:.1e}, step {run.peak_step}",
+            f"{run.end:.1e}",
+            "equal" if run.close else "not equal",
+            "not equal" if run.end else "equal",
         )
         for name, runs in results.items()
-        for broken in runs
+        for run in runs
     ]
     headers = ("broken on purpose", "largest", "at the end", "allclose", "array_equal")
     title = "And if the second run is made to differ by one step"

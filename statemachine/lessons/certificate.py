@@ -8,14 +8,14 @@ from typing import Any
 
 from ..installed import WITNESS
 from ..measures.text import degrees, listed, millimetres, vector
-from ..page import Items, Page, Table
+from ..page import Figures, Items, Page, Table
 from ..witness import OWN_READING
 from . import template
-from .fingertip import Certificate, Offset
+from .fingertip import Offset
 from .template import by_engine, differences
 
 _SHOWN = 12  # rows of a table of tips
-_ROWS: Mapping[str, Callable[[Certificate], str]] = {
+_ROWS: Mapping[str, Callable[[Figures], str]] = {
     "grade": lambda r: r.grade,
     "distance of the two frames": lambda r: _offset(r.frames),
     "default pose [m]": lambda r: vector(r.default_pose),
@@ -26,7 +26,7 @@ _ROWS: Mapping[str, Callable[[Certificate], str]] = {
 }
 
 
-def page(results: Mapping[str, Certificate]) -> Page:
+def page(results: Mapping[str, Figures]) -> Page:
     """Frames first, then the differences."""
     first = next(iter(results.values()))
     single = len(first.tips) == 1
@@ -42,7 +42,7 @@ def page(results: Mapping[str, Certificate]) -> Page:
     return template.page("certificate", results, {n: _slots(r) for n, r in results.items()}, blocks)
 
 
-def _slots(result: Certificate) -> dict[str, Any]:
+def _slots(result: Figures) -> dict[str, Any]:
     frames = result.frames
     return {
         "version": result.provenance.versions[WITNESS],
@@ -66,7 +66,7 @@ def _slots(result: Certificate) -> dict[str, Any]:
     }
 
 
-def _tips(name: str, result: Certificate) -> Table:
+def _tips(name: str, result: Figures) -> Table:
     """The worst gaps; those that are not shown are no larger."""
     rows = [
         (tip.site, _figure(tip.position_worst), _figure(tip.rotation_worst), _offset(tip.frames))

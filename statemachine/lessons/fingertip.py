@@ -19,9 +19,11 @@ from ..installed import WITNESS
 from ..interface import Array, JointType, Model, forward, make_data
 from ..interface.options import as_count
 from ..kinematics import Kind, Kinematics, shared_joints
+from ..measures import largest_or_inf
+from ..page import Figures
 from ..rotations import Placement, angle_between, matrix_from_quat
 from ..runs.drive import Progress, silent
-from ..runs.provenance import Provenance, provenance
+from ..runs.provenance import provenance
 from ..runs.robot import carried_by
 from ..witness import labels
 from ._robot import Tip, tips_of
@@ -45,76 +47,6 @@ class Offset:
         return self.distance <= _SAME_FRAME and self.angle <= _SAME_FRAME
 
 
-@dataclass(frozen=True)
-class TipGap:
-    """How far one site or body is from where the witness puts it.
-
-    Attributes:
-        site: The site or body on the engine; witness_frame: its name for the witness.
-        body: The body that it is, or that carries it, on the engine.
-        frames: Offset between the two frame definitions; None where the files name
-            no common body and the offset between the poses is not steady.
-        position_worst, position_median: Difference in position [m]; None if refused.
-        rotation_worst, rotation_median: Largest entry of the difference of the
-            rotation matrices; None if refused.
-        default_pose: Where it is (3,) at the model's default qpos on the engine [m].
-    """
-
-    site: str
-    witness_frame: str
-    body: str
-    frames: Offset | None
-    position_worst: float | None
-    position_median: float | None
-    rotation_worst: float | None
-    rotation_median: float | None
-    default_pose: tuple[float, float, float]
-
-    @property
-    def agrees(self) -> bool:
-        """Whether frames are the same and every pose is within the tolerance."""
-        return self.worst <= _TOLERANCE
-
-    @property
-    def worst(self) -> float:
-        """The larger of the two worst differences; infinite if refused or no number."""
-        if self.position_worst is None or self.rotation_worst is None:
-            return math.inf
-        worst = max(self.position_worst, self.rotation_worst)
-        return worst if math.isfinite(self.position_worst + self.rotation_worst) else math.inf
-
-
-@dataclass(frozen=True)
-class Certificate(TipGap):
-    """What came out; of several tips, the fields of a TipGap are those of the worst.
-
-    Attributes:
-        poses: How many were compared.
-        tolerance: What both worst differences must not exceed.
-        grade: "own reading" if Pinocchio's parser read the file, "same reading" if it
-            computed from the numbers of the engine's model.
-        reason: Why it is not an own reading; "" if it is.
-        prepared: What was done to the file's text before Pinocchio read it.
-        tips: All that were compared, the worst first.
-        left_out: Tips that the witness's file does not have.
-    """
-
-    witness_file: str
-    poses: int
-    tolerance: float
-    provenance: Provenance
-    grade: str
-    reason: str
-    prepared: tuple[str, ...]
-    tips: tuple[TipGap, ...]
-    left_out: tuple[str, ...]
-
-    @property
-    def agrees(self) -> bool:
-        """Whether all tips do."""
-        return all(tip.agrees for tip in self.tips)
-
-
 def certify(
     model: Model,
     poses: int = 200,
@@ -123,7 +55,7 @@ def certify(
     witness: str | os.PathLike[str] | None = None,
     witness_frame: str | None = None,
     progress: Progress = silent,
-) -> Certificate:
+) -> Figures:
     """Compare poses on an engine with Pinocchio's, at random poses within the limits.
 
     Pinocchio reads the model's file itself where it can. Else it computes from the numbers
@@ -138,6 +70,18 @@ def certify(
         witness: The file that Pinocchio reads; by default the engine's own.
         witness_frame: The frame's name there; by default `site`.
         progress: Told the fraction that is done.
+
+    Returns:
+        What `_gap` gives of the worst tip, and:
+        poses: How many were compared.
+        tolerance: What both worst differences must not exceed.
+        agrees: Whether those of all tips do not.
+        grade: "own reading" if Pinocchio's parser read the file, "same reading" if it
+            computed from the numbers of the engine's model.
+        reason: Why it is not an own reading; "" if it is.
+        prepared: What was done to the file's text before Pinocchio read it.
+        tips: All that were compared, the worst first.
+        left_out: Tips that the witness's file does not have.
 
     Raises:
         MissingEngineError: Pinocchio is not installed here.
@@ -175,8 +119,9 @@ def certify(
         for k, tip in enumerate(asked)
     ]
     gaps.sort(key=lambda gap: -gap.worst)
-    return Certificate(
-        **vars(gaps[0]),
+    return Figures(
+        **{name: figure for name, figure in vars(gaps[0]).items() if name != "worst"}
+        | {"agrees": all(gap.agrees for gap in gaps)},
         witness_file="/".join(known.path.parts[-2:]),
         poses=len(configurations),
         tolerance=_TOLERANCE,
@@ -246,15 +191,29 @@ def _gap(
     name: str,
     ours: Placement,
     qpos: Array,
-) -> TipGap:
+) -> Figures:
+    """How far one site or body is from where the witness puts it.
+
+    Returns:
+        site: The site or body on the engine; witness_frame: its name for the witness.
+        body: The body that it is, or that carries it, on the engine.
+        frames: Offset between the two frame definitions; None where the files name
+            no common body and the offset between the poses is not steady.
+        position_worst, position_median: Difference in position [m]; None if refused.
+        rotation_worst, rotation_median: Largest entry of the difference of the
+            rotation matrices; None if refused.
+        worst: The larger of the two worst differences; infinite if refused or no number.
+        agrees: Whether that is within the tolerance.
+        default_pose: Where it is (3,) at the model's default qpos on the engine [m].
+    """
     kind = _frame(kinematics, name, tip.kind)
     theirs = kinematics.poses(qpos, name, kind)
     offset = _declared_offset(model, tip, kinematics, name, kind) or _steady_offset(ours, theirs)
     moved = np.linalg.norm(ours.pos - theirs.pos, axis=1)
     rotated = np.abs(ours.mat - theirs.mat).max(axis=(1, 2))
     compared = offset is None or offset.same
-    x, y, z = ours.pos[0].tolist()
-    return TipGap(
+    worst = largest_or_inf(np.array([moved.max(), rotated.max()])) if compared else math.inf
+    return Figures(
         site=tip.name,
         witness_frame=name,
         body=labels("body", model.body_names)[tip.body],
@@ -263,7 +222,9 @@ def _gap(
         position_median=float(np.median(moved)) if compared else None,
         rotation_worst=float(rotated.max()) if compared else None,
         rotation_median=float(np.median(rotated)) if compared else None,
-        default_pose=(x, y, z),
+        worst=worst,
+        agrees=worst <= _TOLERANCE,
+        default_pose=tuple(ours.pos[0].tolist()),
     )
 
 

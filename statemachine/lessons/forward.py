@@ -5,24 +5,20 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..interface import Array, Model
+from ..interface import Model
 from ..interface.options import as_scalar
 from ..measures import largest
 from ..measures.text import count, millimetres, short_time, vector
-from ..page import Table
+from ..page import Figures, Table
 from ..runs.drive import Progress, steps_in
 from ..runs.provenance import provenance
 from ._robot import coordinate, tips_of, usual_tip, with_joint
 from ._stages import (
-    ArrayChanges,
-    Lag,
-    OwnAnswer,
     change_tables,
     changes_by_call,
     lag_of_steps,
@@ -30,7 +26,7 @@ from ._stages import (
     own_answers,
     own_tables,
 )
-from .session import CodeRun, LessonResult
+from .session import CodeRun
 from .template import differences, emulated
 
 _SECONDS = 2.0  # under a command, long enough to touch something
@@ -70,21 +66,13 @@ print(4, {read}.round(4))
 """
 
 
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """One reading: what had been done, the fingertip (3,) [m], and the time [s]."""
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Read the fingertip at each print; then what else was asked for.
 
-    after: str
-    fingertip: Array
-    time: float
-
-
-@dataclass(frozen=True, eq=False)
-class Forward(LessonResult):
-    """The four readings.
-
-    Attributes:
+    Returns:
+        joint, value: What was written, and where.
         site: What is read: the fingertip, or another site or body.
+        readings: Of each what had been done after, the fingertip (3,) [m], and the time [s].
         equal: Pairs (i, j), i < j, of readings that are equal bit by bit.
         moved: Distance [m] that the write and the second `forward` moved it.
         contacts: How many were found after the second `forward`; deepest: how far the two
@@ -93,22 +81,6 @@ class Forward(LessonResult):
         changes: What each call changes, and lag: of which moment derived values are after a
             step; of these two and of `itself` what was asked for.
     """
-
-    joint: str
-    site: str
-    value: float
-    readings: tuple[Reading, ...]
-    equal: tuple[tuple[int, int], ...]
-    moved: float
-    contacts: int
-    deepest: float
-    itself: tuple[OwnAnswer, ...]
-    changes: tuple[ArrayChanges, ...]
-    lag: Lag | None
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forward:
-    """Read the fingertip at each print; then what else was asked for."""
     model, joint, value = play.model, options["joint"], options["value"]
     place, tip = coordinate(model, joint).place, tips_of(model, options["site"])[0]
     steps = _steps(model, options)
@@ -121,11 +93,14 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forwar
     labels = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
     places = [place for place, _ in read]
     asked = ["write"] * options["arrays"] + ["step"] * bool(steps)
-    return Forward(
+    return Figures(
         joint=joint,
         site=options["site"],
         value=value,
-        readings=tuple(Reading(label, *at) for label, at in zip(labels, read, strict=True)),
+        readings=tuple(
+            Figures(after=label, fingertip=place, time=time)
+            for label, (place, time) in zip(labels, read, strict=True)
+        ),
         equal=tuple(
             (i, j)
             for i, j in itertools.combinations(range(len(places)), 2)
@@ -149,7 +124,7 @@ def _steps(model: Model, options: Mapping[str, Any]) -> int:
     return 0 if seconds is None else steps_in(model, seconds)
 
 
-def slots(result: Forward) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     derived = [change for change in result.changes if not change.stored]
     same = [change.name for change in derived if change.same]
@@ -185,7 +160,7 @@ def slots(result: Forward) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Forward], first: Forward) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """The four readings; then what was asked for."""
     digits = 3 if len(results) > 1 else 4  # so that two columns fit
     readings = Table(
@@ -218,6 +193,6 @@ def tables(results: Mapping[str, Forward], first: Forward) -> dict[str, Any]:
     }
 
 
-def _apart(reading: int, left: Forward, right: Forward) -> str:
+def _apart(reading: int, left: Figures, right: Figures) -> str:
     gap = math.dist(left.readings[reading].fingertip, right.readings[reading].fingertip)
     return f"{gap:.1e} m"

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..engines import room
-from ..engines.records import LeftAlone
 from ..errors import DivergedError, UnsupportedError
 from ..interface import Model, make_data, reset
 from ..measures.text import NONE, apart, position, signed
-from ..page import Table, Traces
+from ..page import Figures, Table, Traces
 from ..runs.commands import start_keyframe
 from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
 from ..runs.provenance import provenance
@@ -23,7 +21,7 @@ from ..runs.robot import is_the_arm, touching
 from ..runs.scenarios import SCENARIOS
 from ._falling import BALANCE, PARTS, Droop, droop, milestones
 from ._robot import carried_by_joint, check_servos, coordinate, start_line, with_joint
-from .session import CodeRun, LessonResult, stepping_loop
+from .session import CodeRun, stepping_loop
 from .template import differences, emulated, largest_gap, where
 
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
@@ -72,31 +70,16 @@ for variant in (model, limp):
 """
 
 
-@dataclass(frozen=True, eq=False)
-class Gravity(LessonResult):
-    """The same run with the servos on and off.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Watch both runs; then the servos off for longer, with and without anything to touch.
 
-    Attributes:
-        joint: The joint that was watched; slide: whether it is one, and no hinge.
+    Returns:
+        joint: The joint that was watched; slide: whether it is one, and no hinge; unit: of the
+            forces on it.
+        servos_on, servos_off: The same run with them and without.
         longer: The servos off for longer, with "contacts" and with "no contacts".
         alone: The joint on the engine as it comes, where that differs from the contract.
     """
-
-    joint: str
-    slide: bool
-    servos_on: Droop
-    servos_off: Droop
-    longer: dict[str, Droop]
-    alone: tuple[LeftAlone, ...]
-
-    @property
-    def unit(self) -> str:
-        """Of the forces on the joint."""
-        return "N" if self.slide else "N·m"
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravity:
-    """Watch both runs; then the servos off for longer, with and without anything to touch."""
     model, joint, seconds = play.model, options["joint"], options["seconds"]
     variants: dict[str, Model] = {}
     if options["longer"]:
@@ -127,9 +110,11 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
         start = 2 * seconds + number * options["longer"]
         share = part_of(progress, start / total, options["longer"] / total)
         longer[name] = _left_alone(variant, joint, options["longer"], share)
-    return Gravity(
+    slide = coordinate(model, joint).slide
+    return Figures(
         joint=joint,
-        slide=coordinate(model, joint).slide,
+        slide=slide,
+        unit="N" if slide else "N·m",
         servos_on=servos_on,
         servos_off=servos_off,
         longer=longer,
@@ -153,7 +138,7 @@ def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) ->
         return droop(data, joint, seconds, ctrl, np.array(path), diverged=diverged)
 
 
-def slots(result: Gravity) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     on, off, unit = result.servos_on, result.servos_off, result.unit
     sagged = abs(float(on.position[-1]))
@@ -173,7 +158,7 @@ def slots(result: Gravity) -> dict[str, Any]:
     }
 
 
-def _caught(result: Gravity) -> dict[str, Any]:
+def _caught(result: Figures) -> dict[str, Any]:
     """Whether it is the contact that catches the joint, and whether it stays there."""
     then, runs = float(result.servos_off.position[-1]), list(result.longer.values())
     both = len(runs) == 2 and all(run.diverged is None for run in runs)
@@ -193,7 +178,7 @@ def _caught(result: Gravity) -> dict[str, Any]:
     }
 
 
-def _own_motors(result: Gravity) -> dict[str, Any]:
+def _own_motors(result: Figures) -> dict[str, Any]:
     """What the engine without our adapter, at its own defaults, does to the joint."""
     if not result.alone:
         return {"own_motors": False, "flails": False}
@@ -212,7 +197,7 @@ def _own_motors(result: Gravity) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Gravity], first: Gravity) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """The course of the joint, the balance of forces at its end, and the longer runs."""
     runs = {
         f"{where(results, name)}{state}": run
@@ -265,7 +250,7 @@ def _course(runs: Mapping[str, Droop], title: str, slide: bool) -> Table:
     )
 
 
-def _forces(runs: Mapping[str, Droop], first: Gravity) -> Table:
+def _forces(runs: Mapping[str, Droop], first: Figures) -> Table:
     """Each part of the forces at the end, their sum, and who carries the load."""
 
     def row(label: str, part: str, sign: float = 1.0) -> tuple[str, ...]:
@@ -290,7 +275,7 @@ def _forces(runs: Mapping[str, Droop], first: Gravity) -> Table:
     )
 
 
-def _curves(runs: Mapping[str, Droop], first: Gravity) -> Traces:
+def _curves(runs: Mapping[str, Droop], first: Figures) -> Traces:
     """The longer runs, every 20th step of them."""
     scale, unit = (1.0, "m") if first.slide else (np.degrees(1.0), "angle [°]")
     timestep = first.provenance.timestep
@@ -308,7 +293,7 @@ def _curves(runs: Mapping[str, Droop], first: Gravity) -> Traces:
     )
 
 
-def _alone(name: str, result: Gravity) -> Table:
+def _alone(name: str, result: Figures) -> Table:
     return Table(
         (f"{name} itself", result.joint, "its own motor"),
         [
@@ -320,7 +305,7 @@ def _alone(name: str, result: Gravity) -> Table:
     )
 
 
-def _apart(runs: str, touched: bool | None, left: Gravity, right: Gravity) -> str:
+def _apart(runs: str, touched: bool | None, left: Figures, right: Figures) -> str:
     """The largest distance between two runs, before or after the first touch of either."""
     pair: list[Droop] = [getattr(result, runs) for result in (left, right)]
     steps, timestep = len(pair[0].path), left.provenance.timestep
@@ -332,7 +317,7 @@ def _apart(runs: str, touched: bool | None, left: Gravity, right: Gravity) -> st
     return largest_gap(*paths, [left.slide], [""], time[rows])
 
 
-def _ends_apart(label: str, left: Gravity, right: Gravity) -> str:
+def _ends_apart(label: str, left: Figures, right: Figures) -> str:
     """The ends of two longer runs, as far as both go."""
     if label not in left.longer or label not in right.longer:
         return NONE

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from ..installed import DEFAULT
 from ..interface import Array, Data, Ints, JointType, Model, forward, make_data, reset, step
 from ..measures import largest, together
 from ..measures.text import position, short_time
-from ..page import Table, Traces
+from ..page import Figures, Table, Traces
 from ..releases import is_here, version_of
 from ..runs import record_scenario, shipped
 from ..runs.commands import hold_ctrl, is_servo, start_keyframe
@@ -23,7 +22,7 @@ from ..runs.provenance import model_digest, provenance
 from ..runs.robot import command, touching, trees_of_actuators
 from ..runs.scenarios import SCENARIOS
 from ._robot import check_servos, start_line
-from .session import CodeRun, LessonResult, stepping_loop
+from .session import CodeRun, stepping_loop
 from .template import differences, largest_gap, where
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -52,34 +51,15 @@ data = sm.make_data(model)
 """
 
 
-@dataclass(frozen=True)
-class OlderRelease:
-    """The same run on a release that is older than the installed one.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Watch the way to the command; then the same with nothing to touch.
 
-    Attributes:
-        version: Of that release.
-        gap: The largest distance between the same joint on the two [rad].
-        joint: Which.
-        at: When [s].
-        recorded: Whether it is the recorded run that comes with the package.
-    """
-
-    version: str
-    gap: float
-    joint: str
-    at: float
-    recorded: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Hold(LessonResult):
-    """The response to one command from the start, of the k joints that position servos drive.
-
-    Attributes:
-        target: (k,) what the servos are told [rad; of a slide, m].
+    Returns:
+        target: (k,) what the servos are told, of the k joints that they drive [rad; of a slide, m].
         goal: (k,) the same within ctrlrange, which is what the servos see.
         time: (n+1,) [s].
         qpos: (n+1, k) the joints.
+        error: (n+1,) the worst joint's distance to the goal [rad; of a slide, m].
         first_contact: When the robot first touched something, or itself [s], or None.
         touched: What touched what then; contact_steps: how many steps found a contact.
         touching: What it touches at the end.
@@ -90,30 +70,6 @@ class Hold(LessonResult):
         keyframe: Where the run starts, None for the default state.
         older: The same run on an older release; None for another run than the course's.
     """
-
-    target: Array
-    goal: Array
-    time: Array
-    qpos: Array
-    first_contact: float | None
-    touched: tuple[str, ...]
-    contact_steps: int
-    touching: tuple[str, ...]
-    speed: Array
-    without_contacts: Array | None
-    joints: tuple[str, ...]
-    slides: tuple[bool, ...]
-    keyframe: str | None
-    older: OlderRelease | None
-
-    @property
-    def error(self) -> Array:
-        """(n+1,) the worst joint's distance to the goal [rad; of a slide, m]."""
-        return np.abs(self.qpos - self.goal).max(axis=1)
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
-    """Watch the way to the command; then the same with nothing to touch."""
     model = play.model
     servos = np.flatnonzero(is_servo(model))
     joints = model.actuator_jntid[servos]
@@ -130,11 +86,14 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
     touches = [(time, pairs) for time, pairs in zip(course.time, looks, strict=True) if pairs]
     first_contact, first_pairs = touches[0] if touches else (None, ())
     ctrl, gear = data.ctrl.copy(), model.actuator_gear[servos]
-    return Hold(
+    goal = np.clip(ctrl, *model.actuator_ctrlrange.T)[servos] / gear
+    qpos = np.array(course.qpos)
+    return Figures(
         target=ctrl[servos] / gear,
-        goal=np.clip(ctrl, *model.actuator_ctrlrange.T)[servos] / gear,
+        goal=goal,
         time=np.array(course.time),
-        qpos=np.array(course.qpos)[:, places],
+        qpos=qpos[:, places],
+        error=np.abs(qpos[:, places] - goal).max(axis=1),
         first_contact=first_contact,
         touched=first_pairs,
         contact_steps=sum(map(bool, course.looks)),
@@ -144,15 +103,20 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
         joints=tuple(model.joint_names[joint] or f"joint {joint}" for joint in joints),
         slides=tuple((model.jnt_type[joints] == JointType.SLIDE).tolist()),
         keyframe=start_keyframe(model),
-        older=_on_older_release(model, ctrl, np.array(course.qpos), model.joint_names),
+        older=_on_older_release(model, ctrl, qpos),
         provenance=provenance(model),
     )
 
 
-def _on_older_release(
-    model: Model, ctrl: Array, qpos: Array, joints: Sequence[str]
-) -> OlderRelease | None:
-    """The run (n, nq) of the course on another release of its engine; joints: names, of qpos."""
+def _on_older_release(model: Model, ctrl: Array, qpos: Array) -> Figures | None:
+    """The run (n, nq) of the course on a release that is older than the installed one.
+
+    Returns:
+        version: Of that release.
+        gap: The largest distance between the same joint on the two [rad]; joint: which; at: when
+            [s].
+        recorded: Whether it is the recorded run that comes with the package.
+    """
     if model.backend != DEFAULT:
         return None
     known, here = shipped("hold", OLDER), is_here(OLDER)
@@ -167,7 +131,13 @@ def _on_older_release(
             here = False
     gap, place = largest(np.abs(known.qpos - qpos).ravel())
     moment, joint = divmod(place, qpos.shape[1])
-    return OlderRelease(version_of(OLDER), gap, joints[joint], float(known.time[moment]), not here)
+    return Figures(
+        version=version_of(OLDER),
+        gap=gap,
+        joint=model.joint_names[joint],
+        at=float(known.time[moment]),
+        recorded=not here,
+    )
 
 
 def _freely(model: Model, ctrl: Array, steps: int, places: Ints) -> Array | None:
@@ -183,7 +153,7 @@ def _freely(model: Model, ctrl: Array, steps: int, places: Ints) -> Array | None
         return None
 
 
-def slots(result: Hold) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     gaps, free = np.abs(result.qpos[-1] - result.goal), result.without_contacts
     away, worst = int((gaps > _THERE).sum()), largest(gaps)[1]
@@ -215,12 +185,12 @@ def slots(result: Hold) -> dict[str, Any]:
     }
 
 
-def _farthest(result: Hold, gaps: Array) -> str:
+def _farthest(result: Figures, gaps: Array) -> str:
     gap, joint = largest(gaps)
     return f"{result.joints[joint]}, by {position(gap, result.slides[joint])}"
 
 
-def tables(results: Mapping[str, Hold], first: Hold) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """The worst joint over time, the pose at the end, and the way of each joint."""
     end = float(first.time[-1])
     clipped = not np.array_equal(first.target, first.goal)
@@ -258,7 +228,7 @@ def tables(results: Mapping[str, Hold], first: Hold) -> dict[str, Any]:
     }
 
 
-def _row(results: Mapping[str, Hold], time: float) -> tuple[str, ...]:
+def _row(results: Mapping[str, Figures], time: float) -> tuple[str, ...]:
     cells = [f"{time:.3f} s"]
     for result in results.values():
         k = int(np.argmin(np.abs(result.time - time)))
@@ -267,7 +237,7 @@ def _row(results: Mapping[str, Hold], time: float) -> tuple[str, ...]:
     return tuple(cells)
 
 
-def _curves(results: Mapping[str, Hold], slide: bool, scale: float) -> dict[str, Any]:
+def _curves(results: Mapping[str, Figures], slide: bool, scale: float) -> dict[str, Any]:
     """How far each joint is from its goal; those that are slides, or the others."""
     return {
         f"{where(results, name)}{joint}": (
@@ -280,19 +250,19 @@ def _curves(results: Mapping[str, Hold], slide: bool, scale: float) -> dict[str,
     }
 
 
-def _touch(left: Hold, right: Hold) -> int:
+def _touch(left: Figures, right: Figures) -> int:
     """The row after that in which one of two runs first touches something."""
     times = [run.first_contact for run in (left, right) if run.first_contact is not None]
     return round(min(times) / left.provenance.timestep) + 1 if times else len(left.time)
 
 
-def _apart(left: Hold, right: Hold, rows: slice) -> str:
+def _apart(left: Figures, right: Figures, rows: slice) -> str:
     """The largest gap of a joint in some rows of two runs."""
     paths = left.qpos[rows], right.qpos[rows]
     return largest_gap(*paths, left.slides, left.joints, left.time[rows])
 
 
-def _apart_freely(left: Hold, right: Hold) -> str:
+def _apart_freely(left: Figures, right: Figures) -> str:
     """That of the ends without contacts."""
     free = [r.qpos[-1] if r.without_contacts is None else r.without_contacts for r in (left, right)]
     return largest_gap(free[0][None], free[1][None], left.slides, left.joints, np.array([]))

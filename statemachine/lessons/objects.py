@@ -5,7 +5,6 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,11 @@ from ..errors import BadInputError
 from ..interface import Array, Data, Model, make_data, step
 from ..interface.options import as_count
 from ..measures.text import count, duration
+from ..page import Figures
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import provenance
 from .in_turns import in_turns
-from .session import CodeRun, LessonResult
+from .session import CodeRun
 from .template import by_engine, differences
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
@@ -44,13 +44,13 @@ print(round(data.time, 6), round(other.time, 6))
 """
 
 
-@dataclass(frozen=True)
-class Objects(LessonResult):
-    """Costs, and who shares what.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Time the parts, then let several Data of the Model step in turn.
 
-    Attributes:
+    Returns:
         loading, making, stepping: Median wall time of `load`, of `make_data` and of
             one `step` [s]; of a step within a bulk of `nstep`.
+        ratio: How many steps one `load` costs.
         worlds: How many Data stepped in turn, each under a ctrl of its own.
         nstep: Steps of each.
         alone: Whether each ended bit for bit where it ends when it runs alone.
@@ -59,26 +59,6 @@ class Objects(LessonResult):
             whether all of them are unchanged.
         shared: Whether each Data's engine object names the Model's as its own.
     """
-
-    loading: float
-    making: float
-    stepping: float
-    worlds: int
-    nstep: int
-    alone: bool
-    different: int
-    arrays: int
-    constant: bool
-    shared: bool
-
-    @property
-    def ratio(self) -> float:
-        """How many steps one `load` costs."""
-        return self.loading / self.stepping
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Objects:
-    """Time the parts, then let several Data of the Model step in turn."""
     model, worlds = play.model, options["worlds"]
     before = _arrays(model)
     play()
@@ -99,10 +79,11 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
     singly = [_in_turn(model, [k], worlds, shares[k])[0] for k in range(worlds)]
     together = _in_turn(model, range(worlds), worlds, part_of(progress, 0.75, 0.25))
     after = _arrays(model)
-    return Objects(
+    return Figures(
         loading=costs["load"],
         making=costs["make"],
         stepping=costs["step"] / _STEPS,
+        ratio=_STEPS * costs["load"] / costs["step"],
         worlds=worlds,
         nstep=_STEPS,
         alone=all(map(np.array_equal, singly, together)),
@@ -142,7 +123,7 @@ def _arrays(model: Model) -> dict[str, bytes]:
     }
 
 
-def slots(result: Objects) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     return {
         "right": 0 if result.alone else 1,
@@ -152,7 +133,7 @@ def slots(result: Objects) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Objects], _first: Objects) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
     """What each part costs."""
     costs = {
         "load: the file, once": lambda r: duration(r.loading),

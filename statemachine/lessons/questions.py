@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from ..errors import BadInputError
 from ..interface import Model
 from ..measures.text import degrees, duration
+from ..page import Figures
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import provenance
 from ..runs.robot import is_the_arm
 from . import LESSONS, module
-from .session import CodeRun, LessonResult, take
+from .session import CodeRun, take
 
 # The lessons that answer, one for each question, with options for little to do.
 ASKED: dict[str, dict[str, Any]] = {
@@ -26,13 +26,6 @@ ASKED: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Answers(LessonResult):
-    """What the lessons that answer measured, by their names."""
-
-    answers: dict[str, Any]
-
-
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """None: the code of the lessons has been shown."""
     if not is_the_arm(model):
@@ -40,17 +33,17 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     return ""
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Answers:
-    """Take each of the lessons that answer."""
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Take each of the lessons that answer: what they measured, by their names."""
     play()
     model, answers = play.model, {}
     for number, (name, values) in enumerate(ASKED.items()):
         share = part_of(progress, number / len(ASKED), 1 / len(ASKED))
         answers[name] = take(LESSONS[name], model, model.backend, values, progress=share).result
-    return Answers(answers, provenance=provenance(model))
+    return Figures(answers=answers, provenance=provenance(model))
 
 
-def slots(result: Answers) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """Those of each lesson under its name, and whether its run bears out the right choice."""
     slots = {
         name: vars(answer) | module(name).slots(answer) for name, answer in result.answers.items()

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..engines import room
-from ..engines.records import WayBack
 from ..errors import UnsupportedError, check_name
-from ..interface import Array, Ints, JointType, Model, get_state
+from ..interface import Array, JointType, Model, get_state
 from ..interface.options import as_count
 from ..measures import largest
 from ..measures.text import count, degrees, millimetres
+from ..page import Figures
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import provenance
 from ..runs.robot import body_pairs, command, is_the_arm
-from ._two_runs import BREAKS, Broken, broken_table, growth, of_its_own, through_us, ways_back
-from .session import CodeRun, Course, LessonResult
+from ._two_runs import BREAKS, broken, broken_table, growth, of_its_own, through_us, ways_back
+from .session import CodeRun
 from .template import by_engine, differences
 
 
@@ -69,27 +68,12 @@ print(np.array_equal(first, second), abs(first - second).max())
 """
 
 
-@dataclass(frozen=True)
-class Finer:
-    """The same movement with half the timestep, twice.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Watch both runs; then play the code that breaks them, and theirs with half the timestep.
 
-    Attributes:
-        timestep: Of these runs [s].
-        identical: Whether the two of them end in the same bits.
-        difference: Largest |qpos difference| of their end to that of the usual timestep.
-    """
-
-    timestep: float
-    identical: bool
-    difference: float
-
-
-@dataclass(frozen=True, eq=False)
-class Replay(LessonResult):
-    """Two runs, step by step.
-
-    Attributes:
+    Returns:
         ctrl: (nu,) the command of both runs.
+        broken_by: How the second run was made to differ; None if it was not.
         identical: Whether the last qpos are equal, `np.array_equal`.
         close: Whether `np.allclose` calls them equal.
         difference: (n+1,) largest |qpos difference| after each step.
@@ -103,34 +87,13 @@ class Replay(LessonResult):
         pairs: For each pair of bodies, in how many steps it touched.
         keyframe: Name of the keyframe, its time was set to zero; None for the default state.
         breaks: Second runs that were made to differ, if this one was not.
-        finer: The same with half the timestep; None where the backend cannot set it.
+        finer: The same with half the timestep, twice: that timestep [s], whether the two end in
+            the same bits, and the largest |qpos difference| of their end to that of the usual
+            timestep; None where the backend cannot set it.
         state: What a State of this engine holds.
         ways: Ways to go back through this interface, tried.
         own_ways: The engine's own ways, tried on the raw engine where that differs.
     """
-
-    ctrl: Array
-    broken_by: str | None
-    identical: bool
-    close: bool
-    difference: Array
-    apart: Array | None
-    qpos: Array
-    hinges: tuple[int, ...]
-    free: tuple[int, int, int] | None
-    travel: float
-    contacts: Ints
-    pairs: dict[str, int]
-    keyframe: str | None
-    breaks: tuple[Broken, ...]
-    finer: Finer | None
-    state: tuple[str, ...]
-    ways: tuple[WayBack, ...]
-    own_ways: tuple[WayBack, ...]
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay:
-    """Watch both runs; then play the code that breaks them, and theirs with half the timestep."""
     model, nstep, way = play.model, options["steps"], options["break"]
     shares = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
     runs = play.follow(
@@ -139,19 +102,19 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
         progress if way else shares[0],
     )
     first, second = _poses(runs, nstep)
-    broken, finer = [], None
+    breaks, finer = [], None
     if way is None:
         for fault, share in zip(BREAKS, shares[1:], strict=True):
             with CodeRun(code(model, {**options, "break": fault}, "sm.load()"), model) as other:
                 courses = other.follow(lambda _model, _data: None, 2 * nstep, share)
-            broken.append(Broken.of(fault, *_poses(courses, nstep)))
+            breaks.append(broken(fault, *_poses(courses, nstep)))
         finer = _finer(model, options, first[-1])
     touches = runs[0].looks
     gap = first - second
     free = model.jnt_qposadr[model.jnt_type == int(JointType.FREE)].tolist()
     hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
     _, data = play.worlds[0]
-    return Replay(
+    return Figures(
         ctrl=data.ctrl.copy(),
         broken_by=way,
         identical=bool(np.array_equal(first[-1], second[-1])),
@@ -165,7 +128,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
         contacts=np.array([pairs.total() for pairs in touches], dtype=np.int64),
         pairs=dict(Counter(pair for pairs in touches for pair in pairs)),
         keyframe=model.keyframes[0].name if model.keyframes else None,
-        breaks=tuple(broken),
+        breaks=tuple(breaks),
         finer=finer,
         state=tuple(name for name, size in get_state(model, data).layout if size),
         ways=ways_back(model, data.ctrl),
@@ -174,12 +137,12 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
     )
 
 
-def _poses(runs: Sequence[Course], nstep: int) -> list[Array]:
+def _poses(runs: Sequence[Figures], nstep: int) -> list[Array]:
     """Qpos after each counted step (n+1, nq) of each run; one step more is not counted."""
     return [np.array(course.qpos[-nstep - 1 :]) for course in runs]
 
 
-def _finer(model: Model, options: Mapping[str, Any], end: Array) -> Finer | None:
+def _finer(model: Model, options: Mapping[str, Any], end: Array) -> Figures | None:
     """Determinism is not truth: half the timestep replays as exactly, and ends elsewhere."""
     try:
         finer = model.replace(timestep=model.timestep / 2)
@@ -188,11 +151,14 @@ def _finer(model: Model, options: Mapping[str, Any], end: Array) -> Finer | None
     twice = {**options, "steps": 2 * options["steps"]}
     with CodeRun(code(finer, twice, "sm.load()"), finer) as play:
         ends = play()
-    apart = float(np.abs(ends["first"] - end).max())
-    return Finer(finer.timestep, bool(np.array_equal(ends["first"], ends["second"])), apart)
+    return Figures(
+        timestep=finer.timestep,
+        identical=bool(np.array_equal(ends["first"], ends["second"])),
+        difference=float(np.abs(ends["first"] - end).max()),
+    )
 
 
-def slots(result: Replay) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     (peak, row), end = largest(result.difference), float(result.difference[-1])
     steps, finer = len(result.contacts), result.finer
@@ -213,7 +179,7 @@ def slots(result: Replay) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Replay], first: Replay) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """Equal or not, what touched on the way, and the ways back."""
     gaps = {name: result.difference for name, result in results.items()}
     bodies = {name: result.apart for name, result in results.items()}
@@ -255,16 +221,16 @@ def tables(results: Mapping[str, Replay], first: Replay) -> dict[str, Any]:
     }
 
 
-def _touched(pair: str, result: Replay) -> str:
+def _touched(pair: str, result: Figures) -> str:
     return f"{result.pairs.get(pair, 0)} of {len(result.contacts)} steps"
 
 
-def _hinges_apart(left: Replay, right: Replay) -> str:
+def _hinges_apart(left: Figures, right: Figures) -> str:
     gaps = np.abs(left.qpos - right.qpos)[list(left.hinges)]
     return degrees(float(gaps.max()), 3) if len(gaps) else "there are none"
 
 
-def _bodies_apart(left: Replay, right: Replay) -> str:
+def _bodies_apart(left: Figures, right: Figures) -> str:
     if left.free is None:
         return "there is none"
     return millimetres(float(np.linalg.norm((left.qpos - right.qpos)[list(left.free)])))

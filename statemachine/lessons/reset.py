@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -11,12 +10,12 @@ import numpy as np
 
 from ..interface import INPUTS, Data, JointType, Model, forward, make_data, reset, step
 from ..measures.text import count, millimetres
-from ..page import Table
+from ..page import Figures, Table
 from ..runs.drive import Progress
 from ..runs.provenance import provenance
 from ..runs.robot import body_pairs, carried_by, moved_by_actuators
 from ._robot import read_derived, read_stored
-from .session import CodeRun, LessonResult
+from .session import CodeRun
 from .template import differences, emulated
 
 _STEPS = 100  # before the reset, and after it
@@ -42,66 +41,17 @@ print(data.time, data.qpos[1:3])
 {to_keyframe if model.keyframes else ""}"""
 
 
-@dataclass(frozen=True)
-class KeyframeScene:
-    """What a keyframe shows, and what becomes of it under its own ctrl.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Look at the Data after each line; go on with it from each keyframe, and after a reset.
 
-    Attributes:
-        name, time: Of the keyframe [s].
-        exact: Inputs and time that the reset took over bit for bit.
-        body: The free body that it is about; None without one.
-        contacts: How many contacts each pair of bodies has at the keyframe.
-        on_robot, on_world: How many of the body's are with the robot, with the world.
-        nstep: Steps taken then, under the keyframe's ctrl.
-        robot_steps: In how many of them the robot touched the body; world_steps: the world did.
-        rise: How much the body's origin rose in them [m].
-    """
-
-    name: str
-    time: float
-    exact: tuple[str, ...]
-    body: str | None
-    contacts: dict[str, int]
-    on_robot: int
-    on_world: int
-    nstep: int
-    robot_steps: int
-    world_steps: int
-    rise: float
-
-    @property
-    def held(self) -> bool:
-        """Whether the robot alone holds the body, from the first step to the last."""
-        alone = self.on_world == self.world_steps == 0
-        return alone and self.on_robot > 0 and self.robot_steps == self.nstep
-
-
-@dataclass(frozen=True)
-class Reset(LessonResult):
-    """What a reset takes back.
-
-    Attributes:
+    Returns:
         restored: Inputs and time that are, after a reset, bit for bit those of a fresh
             Data, although all of them had been changed.
         empty: Whether every derived array is zero then, until `forward`.
         same_future: Whether the next `steps` are bit for bit those of a fresh Data.
-        scenes: The keyframes.
+        steps, simulated: Before the reset; the latter in simulated time [s].
+        scenes: The keyframes; see `_scene`.
     """
-
-    restored: tuple[str, ...]
-    empty: bool
-    same_future: bool
-    steps: int
-    scenes: tuple[KeyframeScene, ...]
-
-    @property
-    def simulated(self) -> float:
-        """Time that was simulated before the reset [s]."""
-        return self.steps * self.provenance.timestep
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
-    """Look at the Data after each line; go on with it from each keyframe, and after a reset."""
     model = play.model
     lines = {  # what is stored and derived after each
         source: (read_stored(play.names["data"]), read_derived(play.names["data"]))
@@ -122,7 +72,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
         step(model, data, _STEPS)
         step(model, fresh, _STEPS)
         same = read_stored(data) == read_stored(fresh)
-    return Reset(
+    return Figures(
         restored=tuple(  # an array without entries could not be changed
             name
             for name, bits in start.items()
@@ -131,13 +81,26 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
         empty=derived == blank and not any(map(any, blank.values())),
         same_future=same,
         steps=_STEPS,
+        simulated=_STEPS * model.timestep,
         scenes=tuple(scenes),
         provenance=provenance(model),
     )
 
 
-def _scene(model: Model, data: Data, key: int) -> KeyframeScene:
-    """What a Data that was just reset to a keyframe shows, and what becomes of it."""
+def _scene(model: Model, data: Data, key: int) -> Figures:
+    """What a Data that was just reset to a keyframe shows, and what becomes of it.
+
+    Returns:
+        name, time: Of the keyframe [s].
+        exact: Inputs and time that the reset took over bit for bit.
+        body: The free body that it is about; None without one.
+        contacts: How many contacts each pair of bodies has at the keyframe.
+        on_robot, on_world: How many of the body's are with the robot, with the world.
+        nstep: Steps taken then, under the keyframe's ctrl.
+        robot_steps: In how many of them the robot touched the body; world_steps: the world did.
+        held: Whether the robot alone holds the body, from the first step to the last.
+        rise: How much the body's origin rose in them [m].
+    """
     frame, now = model.keyframes[key], read_stored(data)
     wanted = {name: getattr(frame, name).tobytes() for name in INPUTS}
     wanted["time"] = np.array(frame.time).tobytes()
@@ -153,7 +116,7 @@ def _scene(model: Model, data: Data, key: int) -> KeyframeScene:
         robot, world = _touches(model, data, body)
         robot_steps += robot > 0
         world_steps += world > 0
-    return KeyframeScene(
+    return Figures(
         name=frame.name,
         time=frame.time,
         exact=tuple(name for name in wanted if now[name] == wanted[name]),
@@ -164,6 +127,7 @@ def _scene(model: Model, data: Data, key: int) -> KeyframeScene:
         nstep=_WATCHED,
         robot_steps=robot_steps,
         world_steps=world_steps,
+        held=on_world == world_steps == 0 < on_robot and robot_steps == _WATCHED,
         rise=float(data.qpos[height].sum() - start),
     )
 
@@ -176,7 +140,7 @@ def _touches(model: Model, data: Data, body: int | None) -> tuple[int, int]:
     return sum(bool(pair & robot) for pair in others), sum(not pair <= moving for pair in others)
 
 
-def slots(result: Reset) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     frame = result.scenes[0] if result.scenes else None
     public = result.provenance.model_file.startswith("robotstudio_so101")
@@ -195,7 +159,7 @@ def slots(result: Reset) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Reset], first: Reset) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """What each keyframe shows, and what becomes of it."""
     rises = {
         f"rise of the {scene.body}, {scene.name}": partial(_rise, k)
@@ -211,7 +175,7 @@ def tables(results: Mapping[str, Reset], first: Reset) -> dict[str, Any]:
     }
 
 
-def _keyframe(number: int, scenes: Mapping[str, KeyframeScene]) -> Table:
+def _keyframe(number: int, scenes: Mapping[str, Figures]) -> Table:
     columns, first = list(scenes.values()), next(iter(scenes.values()))
     pairs = dict.fromkeys(pair for scene in columns for pair in scene.contacts)
     rows = [
@@ -232,6 +196,6 @@ def _keyframe(number: int, scenes: Mapping[str, KeyframeScene]) -> Table:
     )
 
 
-def _rise(number: int, left: Reset, right: Reset) -> str:
+def _rise(number: int, left: Figures, right: Figures) -> str:
     rises = [millimetres(result.scenes[number].rise, 3) for result in (right, left)]
     return " instead of ".join(rises)

@@ -16,29 +16,12 @@ from typing import Any
 import statemachine
 
 from ..backends import backend_engine
-from ..interface import Array, Data, Model, make_data, step
-from ..page import Code, Page, Printed
-from ..probes.calls import CallRecording, record, recorded_engines, statements
+from ..interface import Data, Model, make_data, step
+from ..page import Code, Figures, Page, Printed
+from ..probes.calls import record, recorded_engines, statements
 from ..runs.drive import Progress, silent, steps_in
-from ..runs.provenance import Provenance
 from ..runs.robot import is_the_arm
 from . import Lesson, module, template
-
-
-@dataclass(frozen=True, eq=False)
-class Course:
-    """What became of a Data, timestep by timestep.
-
-    Attributes:
-        ctrl: (nu,) its command before the first.
-        time: (n+1) times of the states that it went through [s]; qpos: (nq,) in each.
-        looks: (n) what was looked at after each step.
-    """
-
-    ctrl: Array
-    time: list[float]
-    qpos: list[Array]
-    looks: list[Any]
 
 
 class CodeRun(ExitStack):
@@ -119,7 +102,7 @@ class CodeRun(ExitStack):
 
     def follow(
         self, look: Callable[[Model, Data], Any], steps: int, progress: Progress
-    ) -> list[Course]:
+    ) -> list[Figures]:
         """Run the code; where each Data that it stepped went.
 
         Args:
@@ -127,13 +110,18 @@ class CodeRun(ExitStack):
                 that the step began from.
             steps: How many there are.
             progress: Told the fraction that is done.
+
+        Returns:
+            ctrl: (nu,) its command before the first step.
+            time: (n+1) times of the states that it went through [s]; qpos: (nq,) in each.
+            looks: (n) what was looked at after each step.
         """
-        courses: dict[Data, Course] = {}
+        courses: dict[Data, Figures] = {}
         numbers = itertools.count()
 
         def note(data: Data) -> None:
             if data not in courses:
-                courses[data] = Course(data.ctrl.copy(), [], [], [])
+                courses[data] = Figures(ctrl=data.ctrl.copy(), time=[], qpos=[], looks=[])
             courses[data].time.append(data.time)
             courses[data].qpos.append(data.qpos.copy())
 
@@ -150,29 +138,22 @@ class CodeRun(ExitStack):
         return list(courses.values())
 
 
-@dataclass(frozen=True, kw_only=True)
-class LessonResult:
-    """What any lesson measures on one backend; `provenance`: what that was computed with."""
-
-    provenance: Provenance
-
-
 @dataclass(frozen=True)
 class Taken:
     """A lesson on one backend.
 
     Attributes:
-        result: What its module measured.
+        result: What its module measured, and its provenance.
         code: As it was typed; printed: what it printed.
         arm: Whether it was taken on an SO-101, which is what its text is about.
         calls: What the engine was made to do by it, if that was to be recorded and can be.
     """
 
-    result: Any
+    result: Figures
     code: str
     printed: str
     arm: bool
-    calls: CallRecording | None = None
+    calls: Figures | None = None
 
 
 def take(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from ..backends import load as load_model
@@ -11,10 +10,11 @@ from ..engines import room
 from ..interface import Data, Model
 from ..interface.options import as_count
 from ..measures.text import count, duration
+from ..page import Figures
 from ..runs.drive import Progress
 from ..runs.provenance import provenance
 from .in_turns import Ratio, in_turns
-from .session import CodeRun, LessonResult
+from .session import CodeRun
 from .template import by_engine, differences
 
 _ROUNDS = 20
@@ -54,48 +54,21 @@ for name, seconds in (
 """
 
 
-@dataclass(frozen=True)
-class Speed(LessonResult):
-    """Wall-clock times of the same simulated time, its rounds taken in turns.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Measure the same steps again with the code's own functions, in rounds, the ways in turns.
 
-    Attributes:
+    Returns:
         nstep: Steps of each run; simulated: their simulated time [s].
         bulk: Wall time of `step(model, data, n)`, once a round [s].
         one_by_one: Wall time of as many single calls from a Python loop [s].
+        bulk_factor, one_by_one_factor: Simulated over wall time of both.
         as_it_comes: Wall time in bulk of the engine without the emulated servo, as its own
             users drive it [s]; None where nothing is emulated.
         loop: Cost of single calls over that of one call, round by round.
         null: Cost of one call over that of the same call once more: the noise.
+        told_apart: Whether the two differ by more than the noise.
         bulk_rounds: Wall time of each round in bulk [s].
     """
-
-    nstep: int
-    simulated: float
-    bulk: float
-    one_by_one: float
-    as_it_comes: float | None
-    loop: Ratio
-    null: Ratio
-    bulk_rounds: tuple[float, ...]
-
-    @property
-    def bulk_factor(self) -> float:
-        """Simulated over wall time, in bulk."""
-        return self.simulated / self.bulk
-
-    @property
-    def one_by_one_factor(self) -> float:
-        """Simulated over wall time, step by step."""
-        return self.simulated / self.one_by_one
-
-    @property
-    def told_apart(self) -> bool:
-        """Whether single calls and one call differ by more than the noise."""
-        return self.loop.differs_from(self.null)
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Speed:
-    """Measure the same steps again with the code's own functions, in rounds, the ways in turns."""
     model, total = play.model, options["steps"]
     names = play()
     size = max(1, min(total // _ROUNDS, _MOST))
@@ -109,14 +82,19 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Speed:
         for name, variant in models.items()
     }
     walls = in_turns(ways, len(rounds), progress)
-    return Speed(
+    simulated, seconds = total * model.timestep, {way: sum(times) for way, times in walls.items()}
+    loop, null = (Ratio.of(way, walls[way], walls[_BULK]) for way in (_LOOP, _AGAIN))
+    return Figures(
         nstep=total,
-        simulated=total * model.timestep,
-        bulk=sum(walls[_BULK]),
-        one_by_one=sum(walls[_LOOP]),
-        as_it_comes=sum(walls[_OWN]) if _OWN in walls else None,
-        loop=Ratio.of(_LOOP, walls[_LOOP], walls[_BULK]),
-        null=Ratio.of(_AGAIN, walls[_AGAIN], walls[_BULK]),
+        simulated=simulated,
+        bulk=seconds[_BULK],
+        bulk_factor=simulated / seconds[_BULK],
+        one_by_one=seconds[_LOOP],
+        one_by_one_factor=simulated / seconds[_LOOP],
+        as_it_comes=seconds.get(_OWN),
+        loop=loop,
+        null=null,
+        told_apart=loop.differs_from(null),
         bulk_rounds=tuple(walls[_BULK]),
         provenance=provenance(model),
     )
@@ -129,25 +107,26 @@ def _way(
     return (wall(model, data, [n] if bulk else [1] * n) for n in rounds).__next__
 
 
-def slots(result: Speed) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
-    slower = result.told_apart and result.loop.median > 1
+    told_apart = result.loop.differs_from(result.null)
     return {
-        "right": 0 if not slower else 1 if result.loop.median <= 2 else 2,
+        "right": 0 if not told_apart or result.loop.median <= 1 else 1 + (result.loop.median > 2),
         "simulated": f"{result.simulated:g}",
         "steps": count(result.nstep, "step"),
         "timestep": f"{result.provenance.timestep:g} s",
         "rounds": count(result.loop.rounds, "round"),
-        "told_apart": result.told_apart,
+        "told_apart": told_apart,
         "loop_cost": f"{result.loop.median:.2f}",
+        "noise": f"{result.null.median:.2f}",
         "step_cost": duration(result.bulk / result.nstep),
         "emulated": result.as_it_comes is not None,
     }
 
 
-def tables(results: Mapping[str, Speed], _first: Speed) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
     """Times and factors; they are this machine's, now."""
-    times: dict[str, Callable[[Speed], str]] = {
+    times: dict[str, Callable[[Figures], str]] = {
         "in bulk": lambda r: _cell(r, r.bulk),
         "step by step": lambda r: _cell(r, r.one_by_one),
         "one step, in bulk": lambda r: f"{r.bulk / r.nstep * 1e6:.1f} µs",
@@ -167,7 +146,7 @@ def tables(results: Mapping[str, Speed], _first: Speed) -> dict[str, Any]:
     }
 
 
-def _against(left: Speed, right: Speed) -> str:
+def _against(left: Figures, right: Figures) -> str:
     """How much longer a step takes on another engine; the engines were measured one by one."""
     ratio = Ratio.of("", right.bulk_rounds, left.bulk_rounds)
     if not (ratio.differs_from(left.null) and ratio.differs_from(right.null)):
@@ -175,7 +154,7 @@ def _against(left: Speed, right: Speed) -> str:
     return ratio.spread(" ×", 1)
 
 
-def _cell(result: Speed, wall: float | None) -> str:
+def _cell(result: Figures, wall: float | None) -> str:
     """A wall time [s], and how much faster that is than real time; None is as the rest."""
     if wall is None:
         return "the same"

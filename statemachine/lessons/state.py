@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from ..engines import room
-from ..engines.records import Term
 from ..interface import JointType, Model, make_data, reset
-from ..measures.text import listed
-from ..page import Slots, Table
+from ..measures.text import grouped, listed
+from ..page import Figures, Slots, Table
 from ..runs.drive import Progress
 from ..runs.provenance import provenance
-from .session import CodeRun, LessonResult
+from .session import CodeRun
 from .template import differences
 
 NO_NAME = "(no name)"
@@ -32,42 +30,17 @@ for j, name in enumerate(model.joint_names):
 """
 
 
-@dataclass(frozen=True)
-class Joint:
-    """One joint's slots: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop]."""
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Read the layout off the Model, and the time off a Data at keyframe 0.
 
-    name: str
-    type: str
-    qpos_start: int
-    qpos_stop: int
-    qvel_start: int
-    qvel_stop: int
-
-
-@dataclass(frozen=True)
-class Layout(LessonResult):
-    """Sizes and addresses of a model's state.
-
-    Attributes:
-        keyframe_time: `data.time` after a reset to keyframe 0; None without one.
-        keyframe: Its name.
+    Returns:
+        nq, nv, nu, nbody: Sizes of the Model.
+        joints: The slots of each: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop].
         fresh_time: `data.time` of a fresh Data.
+        keyframe: Name of keyframe 0; keyframe_time: `data.time` after a reset to it; None without
+            one.
         terms: What the engine itself calls all this, where that differs.
     """
-
-    nq: int
-    nv: int
-    nu: int
-    nbody: int
-    joints: tuple[Joint, ...]
-    fresh_time: float
-    keyframe: str | None
-    keyframe_time: float | None
-    terms: tuple[Term, ...]
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout:
-    """Read the layout off the Model, and the time off a Data at keyframe 0."""
     play()
     model = play.model
     rows = zip(
@@ -78,7 +51,14 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout
         strict=True,
     )
     joints = tuple(
-        Joint(name, kind.name.lower(), place, place + kind.nq, dof, dof + kind.nv)
+        Figures(
+            name=name,
+            type=kind.name.lower(),
+            qpos_start=place,
+            qpos_stop=place + kind.nq,
+            qvel_start=dof,
+            qvel_stop=dof + kind.nv,
+        )
         for name, kind, place, dof in rows
     )
     with make_data(model) as data:
@@ -86,7 +66,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout
         if model.keyframes:
             reset(model, data, keyframe=0)
             name, time = model.keyframes[0].name, data.time
-    return Layout(
+    return Figures(
         nq=model.nq,
         nv=model.nv,
         nu=model.nu,
@@ -100,7 +80,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout
     )
 
 
-def slots(result: Layout) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     shifted = [
         joint.name or NO_NAME
@@ -113,14 +93,12 @@ def slots(result: Layout) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Layout], first: Layout) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """Sizes, and who owns which slots; engines that say the same share a table."""
     sizes = [
         (name, *(str(getattr(layout, size)) for size in _SIZES)) for name, layout in results.items()
     ]
-    owners: dict[tuple[Joint, ...], list[str]] = {}
-    for name, layout in results.items():
-        owners.setdefault(layout.joints, []).append(name)
+    owners = grouped((tuple(map(_row, layout.joints)), name) for name, layout in results.items())
     return {
         "sizes": Table(
             ("", *_SIZES),
@@ -130,19 +108,11 @@ def tables(results: Mapping[str, Layout], first: Layout) -> dict[str, Any]:
         "owners": [
             Table(
                 ("joint", "type", "qpos", "qvel"),
-                [
-                    (
-                        joint.name or NO_NAME,
-                        joint.type,
-                        _slots(joint.qpos_start, joint.qpos_stop),
-                        _slots(joint.qvel_start, joint.qvel_stop),
-                    )
-                    for joint in joints
-                ],
+                rows,
                 title=f"Which slots are whose, on {listed(names)}",
                 words=frozenset({0, 1}),
             )
-            for joints, names in owners.items()
+            for rows, names in owners.items()
         ],
         "picture": Slots(
             "Which slots are whose",
@@ -165,7 +135,12 @@ def tables(results: Mapping[str, Layout], first: Layout) -> dict[str, Any]:
     }
 
 
-def _compared(left: Layout, right: Layout) -> str:
+def _row(joint: Figures) -> tuple[str, ...]:
+    places = (joint.qpos_start, joint.qpos_stop), (joint.qvel_start, joint.qvel_stop)
+    return (joint.name or NO_NAME, joint.type, *(_slots(*ends) for ends in places))
+
+
+def _compared(left: Figures, right: Figures) -> str:
     same = all(getattr(left, name) == getattr(right, name) for name in (*_SIZES, "joints"))
     return "none" if same else "they differ: see above"
 

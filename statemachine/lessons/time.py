@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,10 @@ import numpy as np
 from ..errors import BadInputError
 from ..interface import Data, Model, step
 from ..measures.text import count, duration
+from ..page import Figures
 from ..runs.drive import Progress, steps_in
 from ..runs.provenance import provenance
-from .session import CodeRun, LessonResult
+from .session import CodeRun
 from .template import by_engine
 
 _NAP = 0.2  # s
@@ -67,50 +67,22 @@ print(f"{{data.time:.3f}} s simulated in {{wall:.3f}} s")
 """
 
 
-@dataclass(frozen=True)
-class Pace(LessonResult):
-    """The same steps, as fast as they come, and paced by a clock.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Watch the loop that is typed, and the other of the two on another Data.
 
-    Attributes:
+    Returns:
         nstep: Steps of each run; simulated: their simulated time [s].
-        free: Wall time of the run that does not wait [s].
-        paced: Wall time of the run that waits [s]; realtime: whether that one was typed.
+        free: Wall time of the run that does not wait [s]; factor: simulated over wall time.
+        paced: Wall time of the run that waits [s]; paced_factor: simulated over wall time.
+        realtime: Whether the run that waits was typed.
         waited: How much of it was waiting [s].
         latest: How far behind the clock a step was at worst, after its waiting [s].
         identical: Whether both runs end in the same bits.
-        nap: For how long nothing was called [s]; passed: how far `data.time` and the
-            state moved in it (0 and False).
+        nap: For how long nothing was called [s]; passed, moved: how far `data.time`, and whether
+            the state, moved in it (0 and False).
         end: `data.time` at the end of a run [s].
         exact: Whether `data.time` is the running sum of the timestep, bit for bit.
     """
-
-    nstep: int
-    simulated: float
-    free: float
-    paced: float
-    realtime: bool
-    waited: float
-    latest: float
-    identical: bool
-    nap: float
-    passed: float
-    moved: bool
-    end: float
-    exact: bool
-
-    @property
-    def factor(self) -> float:
-        """Simulated over wall time of the run that does not wait."""
-        return self.simulated / self.free
-
-    @property
-    def paced_factor(self) -> float:
-        """Simulated over wall time of the run that waits."""
-        return self.simulated / self.paced
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
-    """Watch the loop that is typed, and the other of the two on another Data."""
     model, total = play.model, _steps(play.model, options)
     also = (_free if options["realtime"] else _paced)(total, "sm.load()")
     waits: list[tuple[float, float]] = []  # of each step: its waiting, and how late it was then
@@ -136,11 +108,14 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
         (_, data), (_, other) = free.worlds[0], paced.worlds[0]
         note(other)  # after the last step
         began, stepped, printed, slept, _ = moments
-        return Pace(
+        simulated, wall = total * model.timestep, stepped[0] - began[0]
+        return Figures(
             nstep=total,
-            simulated=total * model.timestep,
-            free=stepped[0] - began[0],
+            simulated=simulated,
+            free=wall,
+            factor=simulated / wall,
             paced=paced.names["wall"],
+            paced_factor=simulated / paced.names["wall"],
             realtime=options["realtime"],
             waited=sum(wait for wait, _ in waits),
             latest=max(0.0, *(late for _, late in waits)),
@@ -155,7 +130,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
         )
 
 
-def slots(result: Pace) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     still = result.passed == 0 and not result.moved
     return {
@@ -171,7 +146,7 @@ def slots(result: Pace) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Pace], first: Pace) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """Both loops by the clock."""
     rows = {
         "not waiting": lambda r: f"{duration(r.free)}, {r.factor:.3g} × real time",

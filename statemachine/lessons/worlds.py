@@ -6,7 +6,6 @@ import math
 import statistics
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from ..backends import load as load_model
@@ -15,13 +14,13 @@ from ..interface import reset as reset_data
 from ..interface import step as step_data
 from ..interface.options import as_count
 from ..measures.text import count, duration
-from ..page import Table, Traces
+from ..page import Figures, Table, Traces
 from ..processes import free_memory, resident_memory
 from ..runs.drive import Progress, part_of
 from ..runs.provenance import provenance
 from ..worlds import make_worlds, reset, step
 from .in_turns import Ratio, in_turns
-from .session import CodeRun, LessonResult
+from .session import CodeRun
 from .template import by_engine
 
 _ROUNDS = 5
@@ -56,53 +55,18 @@ for n in (1, 4):
 """
 
 
-@dataclass(frozen=True)
-class WorldsCost:
-    """What n worlds cost.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Measure what is made, then the steps of more and more worlds.
 
-    Attributes:
-        n: Number of worlds; workers: threads or processes that step them.
-        made: Wall time of `make_worlds` [s].
-        step: Wall time of one step of one world [s].
-        faster: Cost of a step of one Data, in bulk, over that of a step of one world.
-    """
-
-    n: int
-    workers: int
-    made: float
-    step: float
-    faster: Ratio
-
-
-@dataclass(frozen=True)
-class WorldsSpeed(LessonResult):
-    """What is made once, what for each world, and what a step of a world costs.
-
-    Attributes:
-        load: Wall time of `load` [s]; make_data: of `make_data` [s].
+    Returns:
+        load: Wall time of `load` [s]; make_data: of `make_data` [s]; ratio: Data that are made in
+            the time of a load.
         data_bytes, world_bytes: Memory of one Data and of one of many worlds; None where it
             cannot be measured.
         shared: Whether several Data share one compiled model.
-        costs: By number of worlds.
+        costs: What some numbers of worlds cost; see `_cost`.
         limit: Why there are no more worlds; "" if nothing limits them here.
     """
-
-    load: float
-    make_data: float
-    data_bytes: float | None
-    world_bytes: float | None
-    shared: bool
-    costs: tuple[WorldsCost, ...]
-    limit: str
-
-    @property
-    def ratio(self) -> float:
-        """Data that are made in the time of a load."""
-        return self.load / self.make_data
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> WorldsSpeed:
-    """Measure what is made, then the steps of more and more worlds."""
     model, most = play.model, options["most"]
     shared = model.capabilities.shared_model
     world_bytes = _world_bytes(model, most) if shared else None  # first: freed memory is used again
@@ -126,9 +90,11 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Worlds
             _cost(model, data, n, part_of(progress, k / len(sizes), 1 / len(sizes)))
             for k, n in enumerate(sizes)
         ]
-    return WorldsSpeed(
-        load=statistics.median(loads),
-        make_data=statistics.median(makes),
+    of_load, of_make = statistics.median(loads), statistics.median(makes)
+    return Figures(
+        load=of_load,
+        make_data=of_make,
+        ratio=of_load / of_make,
         data_bytes=data_bytes,
         world_bytes=world_bytes if shared else data_bytes,
         shared=shared,
@@ -167,8 +133,15 @@ def _limit(most: int, data_bytes: float | None) -> tuple[int, str]:
     return most, reason
 
 
-def _cost(model: Model, data: Data, n: int, progress: Progress) -> WorldsCost:
-    """Make n worlds, and step them and one Data in turns."""
+def _cost(model: Model, data: Data, n: int, progress: Progress) -> Figures:
+    """Make n worlds, and step them and one Data in turns.
+
+    Returns:
+        n: Number of worlds; workers: threads or processes that step them.
+        made: Wall time of `make_worlds` [s].
+        step: Wall time of one step of one world [s].
+        faster: Cost of a step of one Data, in bulk, over that of a step of one world.
+    """
     began = time.perf_counter()
     with make_worlds(model, n) as worlds:
         made = time.perf_counter() - began
@@ -186,7 +159,7 @@ def _cost(model: Model, data: Data, n: int, progress: Progress) -> WorldsCost:
             progress,
         )
         of_one = [wall / (n * rows) for wall in walls["worlds"]]
-        return WorldsCost(
+        return Figures(
             n=n,
             workers=worlds.workers,
             made=made,
@@ -200,7 +173,7 @@ def _walls(call: Callable[[], object], times: int) -> list[float]:
     return in_turns({"": call}, times)[""]
 
 
-def slots(result: WorldsSpeed) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     costs = result.costs
     gains = [k for k in range(len(costs)) if all(cost.faster.low > 1 for cost in costs[k:])]
@@ -218,7 +191,7 @@ def slots(result: WorldsSpeed) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, WorldsSpeed], _first: WorldsSpeed) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
     """What is made once, what each world costs, and how that goes with their number."""
     made = {
         "load a model": lambda r: duration(r.load),
@@ -247,7 +220,7 @@ def tables(results: Mapping[str, WorldsSpeed], _first: WorldsSpeed) -> dict[str,
     }
 
 
-def _costs(name: str, result: WorldsSpeed) -> Table:
+def _costs(name: str, result: Figures) -> Table:
     return Table(
         ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
         [

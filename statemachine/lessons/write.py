@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,11 +22,11 @@ from ..interface import (
 )
 from ..interface.options import as_scalar
 from ..measures.text import count, position
-from ..page import Table
+from ..page import Figures, Table
 from ..runs.drive import Progress
 from ..runs.provenance import provenance
 from ._robot import coordinate, read_derived, with_joint
-from .session import CodeRun, LessonResult
+from .session import CodeRun
 from .template import emulated
 
 fit = with_joint  # a joint of this robot, and a value in its range
@@ -51,11 +50,10 @@ print(data.qpos[slot], copy[slot], view is data.qpos)
 """
 
 
-@dataclass(frozen=True)
-class Write(LessonResult):
-    """What a write does, and what it does not.
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+    """Look who notices the write; then go on with the Data that was written.
 
-    Attributes:
+    Returns:
         joint, place, value: qpos[place] of the joint was written [rad; of a slide, m].
         slide: Whether the joint is one.
         view, copy: What a name for the array, and a copy made before, say afterwards.
@@ -69,24 +67,6 @@ class Write(LessonResult):
             the velocity of that joint [rad/s or m/s].
         contacts: How many that step found; contacts_without: how many the other.
     """
-
-    joint: str
-    slide: bool
-    place: int
-    value: float
-    view: float
-    copy: float
-    same_arrays: bool
-    in_engine: float | None
-    changed: tuple[str, ...]
-    refused: tuple[tuple[str, str], ...]
-    speed_change: float
-    contacts: int
-    contacts_without: int
-
-
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
-    """Look who notices the write; then go on with the Data that was written."""
     model, joint = play.model, options["joint"]
     at = coordinate(model, joint)
     before, after, _ = (  # after the copy, the write and the print
@@ -106,7 +86,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
         call(model, data)
         same_arrays &= all(getattr(data, name) is arrays[name] for name in INPUTS)
     data.qpos = copy
-    return Write(
+    return Figures(
         joint=joint,
         slide=at.slide,
         place=at.place,
@@ -148,7 +128,7 @@ def _refused(data: Data) -> tuple[tuple[str, str], ...]:
     return tuple(refused)
 
 
-def slots(result: Write) -> dict[str, Any]:
+def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     return {
         "right": 0 if result.view == result.value else 1,
@@ -164,7 +144,7 @@ def slots(result: Write) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Write], first: Write) -> dict[str, Any]:
+def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """What is refused."""
     words = frozenset({0, 1})
     return {

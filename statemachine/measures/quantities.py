@@ -98,7 +98,7 @@ def tolerance_of(
     if kind == "tip":
         return Tolerance(
             COUNT * reach,
-            f"what one count of a 12-bit encoder moves it, {reach:.2f} m from the arm's foot",
+            f"what one count of a 12-bit encoder moves it, at a reach of {reach:.2f} m",
         )
     if kind == "energy":
         changes = max(float(np.ptp(v[np.isfinite(v)])) if np.isfinite(v).any() else 0.0

@@ -14,7 +14,6 @@ import linecache
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout
-from dataclasses import dataclass
 from typing import Any
 
 from ..engines import room, rooms_with
@@ -22,73 +21,7 @@ from ..engines.call_watch import NEW, CallWatch, WatchedObject
 from ..errors import BadInputError, StateMachineError, check_name
 from ..installed import engine_version, require
 from ..interface import Model
-
-
-@dataclass(frozen=True)
-class Call:
-    """One function of an engine, as often as a statement made it run on one thing.
-
-    Attributes:
-        function: Its name; a method after its class.
-        on: What it was called on: the variable that leads there, or a role; "" for nothing.
-        count: How often.
-        changed: What differs, bit by bit, after at least one of the calls from before it.
-            All of the engine's own names; `NEW` or `CLOSED` for the thing as a whole.
-        engine: Whose function it is.
-    """
-
-    function: str
-    on: str
-    count: int
-    changed: tuple[str, ...]
-    engine: str
-
-
-@dataclass(frozen=True)
-class Statement:
-    """One statement of the code and what it made the engine do.
-
-    Attributes:
-        source: As it was typed; several lines for a loop.
-        line: Its first line, from 1.
-        calls: In the order of their first appearance.
-        changed: What changed outside any call, as code would spell it: "data.qpos[1]". Where
-            the interface has arrays of its own, theirs are here too. Writes into objects that
-            no variable leads to are left out; arrays of a model beyond 64 kB (meshes,
-            pictures) are compared at the statement's ends only, and so end up here.
-        printed: What it printed.
-        due: Each Data of which all that is derived now belongs to another moment, and is
-            computed when it is read.
-    """
-
-    source: str
-    line: int
-    calls: tuple[Call, ...]
-    changed: tuple[str, ...]
-    printed: str
-    due: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class CallRecording:
-    """A run of a few lines of code.
-
-    Attributes:
-        engine: Whose calls were recorded.
-        version: The engine's.
-        statements: Those that ran, the failed one included.
-        error: What the library had to say where it refused to go on, in one line.
-    """
-
-    engine: str
-    version: str
-    statements: tuple[Statement, ...]
-    error: str | None = None
-
-    @property
-    def printed(self) -> str:
-        """All that was printed."""
-        return "".join(statement.printed for statement in self.statements)
+from ..page import Figures
 
 
 class CallRecorder:
@@ -138,8 +71,29 @@ class CallRecorder:
         self._written = defaultdict[tuple[WatchedObject, str], set[str]](set)
         self._listening = True
 
-    def end(self, source: str, line: int, printed: str, namespace: Mapping[str, Any]) -> Statement:
-        """A statement has run, and printed something: what it did."""
+    def end(self, source: str, line: int, printed: str, namespace: Mapping[str, Any]) -> Figures:
+        """A statement of the code has run, and printed something.
+
+        Returns:
+            source: As it was typed, several lines for a loop; line: its first line, from 1.
+            calls: What it made the engine do, in the order of their first appearance: each
+                function of an engine, as often as it ran on one thing; see below.
+            changed: What changed outside any call, as code would spell it: "data.qpos[1]". Where
+                the interface has arrays of its own, theirs are here too. Writes into objects that
+                no variable leads to are left out; arrays of a model beyond 64 kB (meshes,
+                pictures) are compared at the statement's ends only, and so end up here.
+            printed: What it printed.
+            due: Each Data of which all that is derived now belongs to another moment, and is
+                computed when it is read.
+
+            Of a call:
+            function: Its name; a method after its class.
+            on: What it was called on: the variable that leads there, or a role; "" for nothing.
+            count: How often.
+            changed: What differs, bit by bit, after at least one of the calls from before it.
+                All of the engine's own names; `NEW` or `CLOSED` for the thing as a whole.
+            engine: Whose function it is.
+        """
         self._listening = False
         due: list[str] = []
         for watch in self._watches.values():
@@ -158,7 +112,13 @@ class CallRecorder:
             for watched, field in self._changed[called]:
                 names[titled][field if watched is on else watched.spelled(field)] = None
         calls = tuple(
-            Call(function, title, count, tuple(names[engine, function, title]), engine)
+            Figures(
+                function=function,
+                on=title,
+                count=count,
+                changed=tuple(names[engine, function, title]),
+                engine=engine,
+            )
             for (engine, function, title), count in counts.items()
         )
         changed = tuple(
@@ -166,7 +126,9 @@ class CallRecorder:
             for (watched, field), entries in self._written.items()
             if watched.named
         )
-        return Statement(source, line, calls, changed, printed, tuple(due))
+        return Figures(
+            source=source, line=line, calls=calls, changed=changed, printed=printed, due=tuple(due)
+        )
 
     def _call(
         self, engine: str, function: str, bare: Callable[..., Any], args: Any, kwargs: Any
@@ -207,7 +169,7 @@ def recorded_engines() -> list[str]:
     return rooms_with("call_watch")
 
 
-def record(code: str, engine: str) -> CallRecording:
+def record(code: str, engine: str) -> Figures:
     """Run code in a fresh namespace and record the calls that it makes to an engine.
 
     What is recorded are calls of functions in the engine's Python module, of methods of its
@@ -217,6 +179,12 @@ def record(code: str, engine: str) -> CallRecording:
     Args:
         code: Statements, as they are typed; they name their backend themselves.
         engine: One of `recorded_engines()`, the engine of that backend.
+
+    Returns:
+        engine: Whose calls were recorded; version: its.
+        statements: Those that ran, the failed one included; see `CallRecorder.end`.
+        printed: All that was printed.
+        error: What the library had to say where it refused to go on, in one line.
 
     Raises:
         UnknownNameError: No recorder knows this engine.
@@ -230,7 +198,7 @@ def record(code: str, engine: str) -> CallRecording:
     watch = room(engine).call_watch()
     helpers = {helper: room(helper).call_watch() for helper in watch.words.helpers}
     namespace: dict[str, Any] = {"__name__": "__main__"}
-    done: list[Statement] = []
+    done: list[Figures] = []
     error = None
     recorder = CallRecorder({engine: watch, **helpers})
     with recorder.replaced():
@@ -250,7 +218,13 @@ def record(code: str, engine: str) -> CallRecording:
             raise BadInputError(
                 f"the code's {name} is on {value.backend}, and {engine} was to be recorded"
             )
-    return CallRecording(engine, engine_version(engine), tuple(done), error)
+    return Figures(
+        engine=engine,
+        version=engine_version(engine),
+        statements=tuple(done),
+        printed="".join(statement.printed for statement in done),
+        error=error,
+    )
 
 
 def statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]], None]]]:

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from ..engines import room
 from ..engines.measured import Phrases
+from ..page import Figures
 from ..silence import silence
 from .conventions import check_engine, versions
 
@@ -33,45 +33,24 @@ CONCEPTS = (
 )
 
 
-@dataclass(frozen=True)
-class Phrase:
-    """A cell that was run.
-
-    Attributes:
-        concept: One of `CONCEPTS`.
-        code: What was typed.
-        works: Whether it ran, and the concept happened.
-        said: What was wrong.
-    """
-
-    concept: str
-    code: str
-    works: bool
-    said: str
-
-
-@dataclass(frozen=True)
-class Phrasebook:
-    """The phrases of each engine, and the versions that took them."""
-
-    versions: dict[str, str]
-    engines: dict[str, tuple[Phrase, ...]]
-
-
 def run(
     engines: Sequence[str], progress: Callable[[float], None] = lambda _fraction: None
-) -> Phrasebook:
+) -> Figures:
     """Run every cell of some engines.
 
     Args:
         engines: Keys of `installed.ENGINES`.
         progress: Told the fraction that is done.
 
+    Returns:
+        versions: That were asked.
+        engines: The phrases of each; see `_phrase`.
+
     Raises:
         MissingEngineError: An engine is not installed here.
         UnknownNameError: There is no such engine.
     """
-    phrases: dict[str, tuple[Phrase, ...]] = {}
+    phrases: dict[str, tuple[Figures, ...]] = {}
     for done, engine in enumerate(engines):
         check_engine(engine)
         own = room(engine).phrases()
@@ -81,11 +60,16 @@ def run(
             said.append(_phrase(own, concepts[:count]))
             progress((done + count / len(concepts)) / len(engines))
         phrases[engine] = tuple(said)
-    return Phrasebook(versions(engines), phrases)
+    return Figures(versions=versions(engines), engines=phrases)
 
 
-def _phrase(own: Phrases, concepts: Sequence[str]) -> Phrase:
-    """Run the cells up to the last concept, so that its check may do what it likes."""
+def _phrase(own: Phrases, concepts: Sequence[str]) -> Figures:
+    """Run the cells up to the last concept, so that its check may do what it likes.
+
+    Returns:
+        concept: The last one; code: what was typed for it.
+        works: Whether it ran, and the concept happened; said: what was wrong.
+    """
     cell = own.cells[concepts[-1]]
     said = ""
     with tempfile.TemporaryDirectory() as folder, silence():
@@ -101,4 +85,4 @@ def _phrase(own: Phrases, concepts: Sequence[str]) -> Phrase:
             said = f"{type(error).__name__}: {error}"
         finally:
             own.close(SimpleNamespace(**names))
-    return Phrase(concepts[-1], cell.code, not said, said)
+    return Figures(concept=concepts[-1], code=cell.code, works=not said, said=said)

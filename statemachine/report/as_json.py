@@ -1,8 +1,7 @@
-"""Results as JSON: the fields of the dataclasses, properties of figures included."""
+"""Results as JSON: their figures and the fields of dataclasses, properties included."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from enum import Enum
@@ -10,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from ..page import Figures
 
 
 def dumps(value: Any) -> str:
@@ -19,9 +20,10 @@ def dumps(value: Any) -> str:
 
 def plain(value: Any) -> Any:
     """A result as dicts, lists, strings and numbers."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = dataclasses.fields(value)
+    fields = getattr(type(value), "__dataclass_fields__", {}).values()
+    if fields or isinstance(value, Figures):
         names = [field.name for field in fields if field.metadata.get("json", True)]
+        names = names or [name for name in vars(value) if not name.startswith("_")]
         names += [name for name, kind in vars(type(value)).items() if isinstance(kind, property)]
         return {name: plain(getattr(value, name)) for name in names}
     if isinstance(value, dict):

@@ -7,8 +7,7 @@ from typing import Any
 
 from ..engines.futures import FutureGap, worst
 from ..measures.text import NONE, grouped, milliseconds, rough
-from ..page import Block, Page, Table
-from ..probes.audit import Audit, Audited
+from ..page import Block, Figures, Page, Table
 from ..probes.audit.trials import (
     AGAIN,
     BOXES,
@@ -29,7 +28,7 @@ _OF_THE_STATE = (RESTORE, WITHOUT, FORGETS, NO_CONTACTS)
 _AT_REST = 1e-2  # of the fastest joint or body [rad/s or m/s]
 
 
-def page(results: Mapping[str, Audit]) -> Page:
+def page(results: Mapping[str, Figures]) -> Page:
     """What was tried, engine by engine, and last what follows from it.
 
     Args:
@@ -51,7 +50,7 @@ def page(results: Mapping[str, Audit]) -> Page:
     )
 
 
-def _tables(backend: str, result: Audit) -> list[Block]:
+def _tables(backend: str, result: Figures) -> list[Block]:
     """What was found of one backend."""
     first = result.audited[0]
     places = Table.of(
@@ -77,7 +76,7 @@ def _tables(backend: str, result: Audit) -> list[Block]:
     )
 
 
-def _of_driver(driver: Audited) -> list[Block]:
+def _of_driver(driver: Figures) -> list[Block]:
     """What was found of the state of one driver, and of what should change nothing."""
     candidates = grouped(
         (f"all but {finding.case}" if finding.experiment == WITHOUT else finding.case, finding)
@@ -96,7 +95,7 @@ def _of_driver(driver: Audited) -> list[Block]:
     )
 
 
-def _by_point(driver: Audited, candidates: Mapping[str, Sequence[AuditFinding]]) -> Table:
+def _by_point(driver: Figures, candidates: Mapping[str, Sequence[AuditFinding]]) -> Table:
     points = [seen.point for seen in driver.points]
     rows = [
         (
@@ -111,7 +110,7 @@ def _by_point(driver: Audited, candidates: Mapping[str, Sequence[AuditFinding]])
     return Table(("what is restored", *points), rows, f"{driver.name}: restored, against going on")
 
 
-def _by_target(driver: Audited, candidates: Mapping[str, Sequence[AuditFinding]]) -> Table:
+def _by_target(driver: Figures, candidates: Mapping[str, Sequence[AuditFinding]]) -> Table:
     targets = {
         "run itself": "the run itself",
         "fresh": "a fresh one",
@@ -131,7 +130,7 @@ def _by_target(driver: Audited, candidates: Mapping[str, Sequence[AuditFinding]]
     return Table(("what is restored", *targets, "from step"), rows, title)
 
 
-def _forgotten(driver: Audited) -> Table | None:
+def _forgotten(driver: Figures) -> Table | None:
     """What is changed after a save and not brought back."""
     findings = [finding for finding in driver.findings if finding.experiment == FORGETS]
     if not findings:
@@ -150,7 +149,7 @@ def _forgotten(driver: Audited) -> Table | None:
     return Table(("restored by", *cases), rows, title, words=frozenset(range(len(cases) + 1)))
 
 
-def _touching(driver: Audited) -> Table | None:
+def _touching(driver: Figures) -> Table | None:
     """What contacts have to do with what is not restored."""
     gaps = driver.conclusion.touching
     case = next(
@@ -164,7 +163,7 @@ def _touching(driver: Audited) -> Table | None:
     return Table((f"restored: {case}", *gaps), rows, title) if gaps else None
 
 
-def _promises(driver: Audited) -> dict[str, Any]:
+def _promises(driver: Figures) -> dict[str, Any]:
     """What should change nothing: slots of `audit_driver.md`."""
     tried = grouped(
         ((finding.case, finding.into, finding.promised), finding)
@@ -221,7 +220,7 @@ def _worst(findings: Iterable[AuditFinding]) -> str:
     return cell(worst(gaps)) if gaps else NONE
 
 
-def _conclusion(driver: Audited) -> list[Block]:
+def _conclusion(driver: Figures) -> list[Block]:
     """What follows; all of it from the findings."""
     of = driver.conclusion
     again = [finding.gap.exact for finding in driver.findings if finding.experiment == AGAIN]
@@ -253,7 +252,7 @@ def _conclusion(driver: Audited) -> list[Block]:
     )
 
 
-def _where(points: Sequence[str], driver: Audited) -> str:
+def _where(points: Sequence[str], driver: Figures) -> str:
     """Save points where the run itself needs a field; without one, only a used run does."""
     if len(points) == len(driver.points):
         return "all"

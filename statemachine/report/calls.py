@@ -9,8 +9,7 @@ from ..engines import room
 from ..engines.call_watch import CallWords
 from ..interface import DERIVED
 from ..measures.text import NONE, few, grouped
-from ..page import Block, Code, Table, Text
-from ..probes.calls import Call, CallRecording, Statement
+from ..page import Block, Code, Figures, Table, Text
 from . import template
 from .template import if_true
 
@@ -18,7 +17,7 @@ _NAMES_SHOWN = 8  # of what a call changed
 _ROWS_SHOWN = 6  # of the calls on one thing, before those that changed nothing share one
 
 
-def blocks(recordings: Mapping[str, CallRecording]) -> list[Block]:
+def blocks(recordings: Mapping[str, Figures]) -> list[Block]:
     """Blocks for the recordings of one code, by engine; the code's backend may differ."""
     prefix = {name: f"{name}: " if len(recordings) > 1 else "" for name in recordings}
     looks = [
@@ -52,7 +51,7 @@ def not_asked(backend: str) -> Text:
     return Text(f"{backend}: not asked which of its own functions it ran.")
 
 
-def _answers(ran: Mapping[str, Statement]) -> list[Block]:
+def _answers(ran: Mapping[str, Figures]) -> list[Block]:
     """What a line made each engine do; once, if nothing and the same of all."""
     silent = {name: _unheard(statement) for name, statement in ran.items() if not statement.calls}
     if len(silent) == len(ran) and len({*silent.values()}) == 1:
@@ -63,7 +62,7 @@ def _answers(ran: Mapping[str, Statement]) -> list[Block]:
     ]
 
 
-def _unheard(statement: Statement) -> str:
+def _unheard(statement: Figures) -> str:
     """What a line did that ran nothing of the engine."""
     changed = ", ".join(statement.changed) or None
     (text,) = template.texts(
@@ -76,7 +75,7 @@ def _unheard(statement: Statement) -> str:
     return text
 
 
-def _table(engine: str, statement: Statement) -> Table:
+def _table(engine: str, statement: Figures) -> Table:
     """The calls, those on one thing under its name; then what changed outside of them."""
     rows: list[tuple[str, str, str]] = []
     titles: set[int] = set()
@@ -98,7 +97,7 @@ def _table(engine: str, statement: Statement) -> Table:
     )
 
 
-def _rows(calls: Sequence[Call]) -> list[tuple[str, str, str]]:
+def _rows(calls: Sequence[Figures]) -> list[tuple[str, str, str]]:
     """The calls on one thing; where they are many, those without effect in one row."""
     idle = [call for call in calls if not call.changed]
     if len(calls) <= _ROWS_SHOWN or len(idle) < 2:
@@ -124,7 +123,7 @@ def _words(engine: str) -> CallWords:
     return room(engine).call_watch().words
 
 
-def _legend(recording: CallRecording) -> list[Text]:
+def _legend(recording: Figures) -> list[Text]:
     """What the roles are that appear, with what this run says of them."""
     words = _words(recording.engine)
     calls = [call for statement in recording.statements for call in statement.calls]

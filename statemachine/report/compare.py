@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..compare import (
     Agreement,
-    ChaosFloor,
     Comparison,
-    Series,
     SidesRun,
-    Witness,
-    default_tip,
-    series,
-    touches,
 )
-from ..compare.why import Explanation
 from ..measures import QUANTITIES
 from ..measures.text import NONE, grouped, milliseconds, quantity, sentence
-from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
-from ..runs import Trace
+from ..page import Block, Code, Figures, Items, Page, Section, Table, TableCell, Text, Verdict
 from ..witness import SAME_READING
 from . import template, why
 from .finding import (
-    Event,
     events_of,
     events_table,
     floor_words,
@@ -38,7 +29,7 @@ from .finding import (
     subject,
     window,
 )
-from .over_time import BothRuns, QuantityChart, charts_of
+from .over_time import BothRuns, charts_of
 from .sides import (
     also_open,
     commanded,
@@ -51,33 +42,30 @@ from .sides import (
 )
 from .template import if_true
 
+if TYPE_CHECKING:
+    from ..compare.why import Explanation
+
 _ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
 _EMULATED = ("emulated", "What is emulated")
 
 
 def page(
     comparison: Comparison,
-    one: Trace,
-    two: Trace,
     *,
-    tip: str | None = None,
     said: Sequence[str] = (),
-    witness: Witness | None = None,
+    witness: Figures | None = None,
     explanation: Explanation | None = None,
     why_not: str = "",
     models: Page | None = None,
     command: str = "",
     run: SidesRun | None = None,
     played: Comparison | None = None,
-    floor: ChaosFloor | None = None,
+    floor: Figures | None = None,
 ) -> Page:
     """What was found in comparing two runs.
 
     Args:
         comparison: The figures.
-        one: The first run.
-        two: The second.
-        tip: The site that was compared, as given to `compare`.
         said: What stood in for a run, line by line.
         witness: What a third party says of both sides' fingertips, if asked.
         explanation: What two sides differ in, and what each of it explains, if that was asked.
@@ -88,72 +76,59 @@ def page(
         played: The comparison of their open loop, where it is not that of the closed one.
         floor: The chaos floor, if it was looked for.
     """
-    labels = long_labels(comparison)
-    curves = series(one, two, tip)
-    touching = touches(one, two)
-    events = events_of(comparison, touching)
+    events, says = events_of(comparison), comparison.one.trace.header.says
     notes = [sentence(line) for line in (*said, *comparison.notes)]
-    both = _over_time(comparison, one, two, curves, events, explanation, tip, floor)
+    both = _over_time(comparison, events, explanation, floor)
     reasons: list[Block] = [Text(why_not)] if why_not else []
     if explanation is not None:
         reasons = [*why.causes(explanation), *why.three_parts(explanation)]
     emulated_parts = emulated(comparison)
     agree = why.steps(explanation) if explanation is not None else []
     made_by = [Text("This page was made by:"), Code([command])] if command else []
-    origin = [provenance((one.header, two.header), comparison), *made_by]
     sections = [
         Section("why", "What causes it", reasons),
-        Section(
-            "curves", "How far apart, over time", _sorted(both.charts, len(curves)), detail=True
-        ),
+        Section("curves", "How far apart, over time", _sorted(both), detail=True),
         Section("figures", "The figures", _figures(comparison, witness, floor)),
-        Section("events", "What happens when", [events_table(events, labels)], detail=True),
+        Section("events", "What happens when", [events_table(comparison)], detail=True),
         *([_models(models, bool(emulated_parts))] if models is not None else []),
         Section(*_EMULATED, emulated_parts),
         Section("agree", "To make them agree", agree),
-        Section("origin", "Where this comes from", origin, detail=True),
+        Section("origin", "Where this comes from", [provenance(comparison), *made_by], detail=True),
     ]
     blocks: list[Block] = [
         *unmatched(run),
-        *([Text(one.header.says)] if one.header.says else []),
+        *([Text(says)] if says else []),
         *loop_note(run),
-        *commanded(one, two, labels),
+        *commanded(comparison),
         *in_words(comparison),
-        *([] if comparison.ended or not touching else [contact_words(comparison, touching)]),
+        *([contact_words(comparison)] if comparison.touches and not comparison.ended else []),
         *([Items(notes)] if notes else []),
         both,
         *loops(comparison, played),
         *(section for section in sections if section.blocks),
     ]
     return Page(
-        f"{one.header.experiment}: {comparison.one.label} and {comparison.two.label}",
+        f"{both.title}: {' and '.join(long_labels(comparison))}",
         _origin(comparison),
         blocks,
-        also_open(headline(comparison, events, explanation, curves), played),
+        also_open(headline(comparison, events, explanation), played),
     )
 
 
 def _over_time(
     comparison: Comparison,
-    one: Trace,
-    two: Trace,
-    curves: Sequence[Series],
-    events: Sequence[Event],
+    events: Sequence[Figures],
     explanation: Explanation | None,
-    tip: str | None,
-    floor: ChaosFloor | None,
+    floor: Figures | None,
 ) -> BothRuns:
     """The scene and a chart for each quantity that is a number throughout."""
-    charts = charts_of(comparison, one, two, curves, floor)
+    charts = charts_of(comparison, floor)
     _, _, at, _ = subject(comparison, explanation)
     lead = [k for k, c in enumerate(charts) if c.curve.name == leading(comparison).name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
     return BothRuns(
-        comparison.one.experiment,
-        one,
-        two,
+        comparison.one.trace.header.experiment,
         comparison,
-        default_tip(one.header, two.header) if tip is None else tip,
         at,
         tuple(events),
         charts,
@@ -161,21 +136,22 @@ def _over_time(
     )
 
 
-def _sorted(charts: Sequence[QuantityChart], total: int) -> list[Block]:
+def _sorted(runs: BothRuns) -> list[Block]:
     """Charts, those that differ first; those that agree folded away if they are not all."""
     order = {"differs": 0, "settles": 1, "agrees": 2}
-    ranked = sorted(charts, key=lambda c: (order[c.agreement.verdict], -c.agreement.tolerances()))
+    more = len(runs.comparison.curves) - len(runs.charts)
+    ranked = sorted(
+        runs.charts, key=lambda c: (order[c.agreement.verdict], -c.agreement.tolerances())
+    )
     beyond: list[Block] = [chart for chart in ranked if chart.agreement.verdict != "agrees"]
     within: list[Block] = [*ranked[len(beyond) :]]
     if beyond and within:
         within = [Section("", f"Those that agree: {len(within)}", within, folded=True)]
-    text = f"Quantities without a chart, nearer to agreement or not finite: {total - len(charts)}."
-    return [*beyond, *within, *([Text(text)] if total > len(charts) else [])]
+    text = f"Quantities without a chart, nearer to agreement or not finite: {more}."
+    return [*beyond, *within, *([Text(text)] if more else [])]
 
 
-def _figures(
-    comparison: Comparison, witness: Witness | None, floor: ChaosFloor | None
-) -> list[Block]:
+def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | None) -> list[Block]:
     """Figures and verdicts, the floor, the reasons of tolerances, what a third party says."""
     one, two = short_labels(comparison)
     agreements, checked = comparison.agreements, list[Block]()
@@ -245,7 +221,7 @@ def _figures(
     )
 
 
-def _floor_columns(floor: ChaosFloor) -> dict[str, Callable[[Agreement], str]]:
+def _floor_columns(floor: Figures) -> dict[str, Callable[[Agreement], str]]:
     """How high the chaos floor is, and from when on the gap is inside."""
     bands = {band.name: band for band in floor.bands}
     return {
@@ -277,13 +253,16 @@ def _models(models: Page, has_emulated: bool) -> Section:
 
 
 def _origin(comparison: Comparison) -> str:
-    sides = (comparison.one, comparison.two)
-    made_by = [side.provenance for side in sides]
+    headers, labels = (
+        (comparison.one.trace.header, comparison.two.trace.header),
+        long_labels(comparison),
+    )
+    made_by = [header.provenance for header in headers]
     files = dict.fromkeys(f"{source.model_file} ({source.model_sha256[:8]})" for source in made_by)
-    engine = [] if sides[0].engine in sides[0].label else [f"both on {sides[0].engine}"]
+    engine = [] if headers[0].label in labels[0] else [f"both on {headers[0].label}"]
     seeds = ["" if source.seed is None else f", seed {source.seed}" for source in made_by]
     words = [
-        f"{side.label}, {milliseconds(side.timestep)}{seed}"
-        for side, seed in zip(sides, seeds, strict=True)
+        f"{label}, {milliseconds(header.timestep)}{seed}"
+        for label, header, seed in zip(labels, headers, seeds, strict=True)
     ]
     return "; ".join([*files, *engine, *words])

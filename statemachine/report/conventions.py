@@ -7,9 +7,8 @@ from itertools import chain
 
 from ..engines.measured import Measurement
 from ..measures.text import capital, reading, significant
-from ..page import Block, Code, Page, Section, Table, Text, Verdict
-from ..probes.conventions import Answered, Conventions
-from ..probes.phrasebook import CONCEPTS, Phrasebook
+from ..page import Block, Code, Figures, Page, Section, Table, Text, Verdict
+from ..probes.phrasebook import CONCEPTS
 from . import template
 from .template import versions_of
 
@@ -17,7 +16,7 @@ _ZERO = 1e-12
 _NOT_ASKED = "not asked"
 
 
-def page(result: Conventions) -> Page:
+def page(result: Figures) -> Page:
     """One table for each question, and why it matters."""
     answers = [(_table(answered), Text(answered.question.why)) for answered in result.questions]
     return template.page(
@@ -25,7 +24,7 @@ def page(result: Conventions) -> Page:
     )
 
 
-def calls_page(result: Phrasebook) -> Page:
+def calls_page(result: Figures) -> Page:
     """For each concept what to type on each engine, and whether all of it did what it should."""
     calls = [(engine, call) for engine, those in result.engines.items() for call in those]
     wrong = [f"{engine}, {call.concept}: {call.said}" for engine, call in calls if not call.works]
@@ -40,7 +39,7 @@ def calls_page(result: Phrasebook) -> Page:
     )
 
 
-def _concept(concept: str, result: Phrasebook) -> Section:
+def _concept(concept: str, result: Figures) -> Section:
     """What to type for a concept, engine by engine."""
     shown: list[Block] = []
     for engine, calls in result.engines.items():
@@ -51,11 +50,11 @@ def _concept(concept: str, result: Phrasebook) -> Section:
     return Section("", capital(concept), shown)
 
 
-def _table(answered: Answered) -> Table:
+def _table(answered: Figures) -> Table:
     """Answers by engine, with a column for the parts of the question if it has any."""
     rows = []
     for engine, findings in answered.findings.items():
-        for k, finding in enumerate(findings or ()):
+        for k, finding in enumerate(findings or []):
             measured = ", ".join(_text(figure) for figure in finding.figures)
             rows.append(("" if k else engine, finding.of, finding.answer, measured))
         rows += [] if findings is not None else [(engine, "", _NOT_ASKED, "")]
@@ -69,21 +68,15 @@ def _table(answered: Answered) -> Table:
     )
 
 
-def _number(value: float) -> str:
-    return significant(value, 3 if abs(value) >= 1e-3 else 2)
-
-
 def _text(figure: Measurement) -> str:
     values = figure.value if isinstance(figure.value, tuple) else (figure.value,)
     numbers = [value for value in values if not isinstance(value, str)]
     most = max(map(abs, numbers), default=0.0)
     factor, unit = reading(figure.unit)
+    # Beside a large number, one that is only rounding is nothing.
+    scaled = [v if isinstance(v, str) else factor * v * (abs(v) > _ZERO * most) for v in values]
     words = [
-        # Beside a large number, one that is only rounding is nothing.
-        value
-        if isinstance(value, str)
-        else _number(factor * value if abs(value) > _ZERO * most else 0)
-        for value in values
+        v if isinstance(v, str) else significant(v, 3 if abs(v) >= 1e-3 else 2) for v in scaled
     ]
     shown = (" " if numbers else ", ").join(words) or "nothing"
     return f"{figure.name} {shown}{unit}".strip()
@@ -116,7 +109,7 @@ REMEMBER = (
 )
 
 
-def cheat_sheet(table: Phrasebook) -> str:
+def cheat_sheet(table: Figures) -> str:
     """The page as Markdown, with a table in HTML.
 
     Args:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from ..engines import room
 from ..installed import DEFAULT, ENGINES, engine_version, wheel_here
-from ..page import Page, Table, Text
+from ..page import Figures, Page, Table, Text
 from . import template
 
 _PATIENCE = 60  # seconds for an import
@@ -27,66 +27,50 @@ class HealthCheck:
     optional: bool = False
 
 
-@dataclass(frozen=True)
-class OptionalPackage:
-    """A package that nothing needs but what an extra of this library is for.
-
-    Attributes:
-        name: As pip calls it.
-        role: What it is for.
-        extras: Those that bring it.
-        version: That is here; None without it.
-    """
-
-    name: str
-    role: str
-    extras: tuple[str, ...]
-    version: str | None = None
-
-
-# pyproject.toml names the same, which a test compares; `viser` is imported, see `_viewer`.
+# A package that nothing needs but what an extra of this library is for: as pip calls it, what it
+# is for, and the extras that bring it. pyproject.toml names the same, which a test compares;
+# `viser` is imported, see `_viewer`.
 _PACKAGES = (
-    OptionalPackage("pillow", "pictures and films", ("render", "mp4")),
-    OptionalPackage("imageio-ffmpeg", "films as mp4", ("mp4",)),
-    OptionalPackage("matplotlib", "plots", ("plot", "docs", "notebook")),
-    OptionalPackage("pyarrow", "parquet traces, sweeps", ("parquet", "sweep")),
-    OptionalPackage("joblib", "sweeps", ("sweep",)),
-    OptionalPackage("scipy", "sweeps", ("sweep",)),
-    OptionalPackage("distributed", "sweeps through Dask", ("cluster",)),
-    OptionalPackage("gymnasium", "reinforcement learning", ("gym",)),
-    OptionalPackage("mujoco-menagerie", "public robots", ("menagerie",)),
-    OptionalPackage("robot_descriptions", "public robots", ("robots",)),
-    OptionalPackage("pytest", "check --mutants", ("mutants",)),
-    OptionalPackage("jupyterlab", "the path as a notebook", ("notebook",)),
-    OptionalPackage("sphinx", "pages (make docs)", ("docs",)),
-    OptionalPackage("furo", "pages (make docs)", ("docs",)),
-    OptionalPackage("myst-parser", "pages (make docs)", ("docs",)),
+    ("pillow", "pictures and films", ("render", "mp4")),
+    ("imageio-ffmpeg", "films as mp4", ("mp4",)),
+    ("matplotlib", "plots", ("plot", "docs", "notebook")),
+    ("pyarrow", "parquet traces, sweeps", ("parquet", "sweep")),
+    ("joblib", "sweeps", ("sweep",)),
+    ("scipy", "sweeps", ("sweep",)),
+    ("distributed", "sweeps through Dask", ("cluster",)),
+    ("gymnasium", "reinforcement learning", ("gym",)),
+    ("mujoco-menagerie", "public robots", ("menagerie",)),
+    ("robot_descriptions", "public robots", ("robots",)),
+    ("pytest", "check --mutants", ("mutants",)),
+    ("jupyterlab", "the path as a notebook", ("notebook",)),
+    ("sphinx", "pages (make docs)", ("docs",)),
+    ("furo", "pages (make docs)", ("docs",)),
+    ("myst-parser", "pages (make docs)", ("docs",)),
 )
 
 
-@dataclass(frozen=True)
-class Diagnosis:
-    """All findings, and what optional packages are here."""
+def examine() -> Figures:
+    """Look at Python, the engines, rendering, the viewer, the import name and the extras.
 
-    findings: tuple[HealthCheck, ...]
-    packages: tuple[OptionalPackage, ...] = ()
-
-    @property
-    def healthy(self) -> bool:
-        """Whether everything that is not optional works."""
-        return all(finding.works or finding.optional for finding in self.findings)
-
-
-def examine() -> Diagnosis:
-    """Look at Python, the engines, rendering, the viewer, the import name and the extras."""
+    Returns:
+        findings: A HealthCheck each.
+        packages: The optional ones: name, role, extras, and the version that is here.
+        healthy: Whether everything that is not optional works.
+    """
     python = HealthCheck("python", True, f"{platform.python_version()}, {sys.executable}")
     drawing = HealthCheck("rendering", *room(DEFAULT).drawing_diagnosis(), optional=True)
     findings = [python, *map(_engine, ENGINES), drawing, _viewer(), _clash()]
-    packages = (replace(package, version=_version(package.name)) for package in _PACKAGES)
-    return Diagnosis(tuple(findings), tuple(packages))
+    return Figures(
+        findings=tuple(findings),
+        packages=tuple(
+            Figures(name=name, role=role, extras=extras, version=_version(name))
+            for name, role, extras in _PACKAGES
+        ),
+        healthy=all(finding.works or finding.optional for finding in findings),
+    )
 
 
-def page(diagnosis: Diagnosis) -> Page:
+def page(diagnosis: Figures) -> Page:
     """The diagnosis as a page."""
     findings, packages = diagnosis.findings, diagnosis.packages
     machine = [(f.name, "works" if f.works else "no", f.found) for f in findings]

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..compare import Comparison, labels_of, series
+from ..compare import Comparison, labels_of
 from ..drawing import drawing_of
 from ..drawing.scene import Camera, Motion, Pixels, camera_for, poses_through
 from ..engines.pictures import Renderer, drawn
@@ -24,6 +24,7 @@ from ..errors import BadInputError, EngineError, TraceError
 from ..installed import require_extra
 from ..interface import Array, Model
 from ..measures import nearest
+from ..page import Figures
 from ..processes.pipes import last_line
 from ..runs import Trace
 from ..runs.drive import Progress, silent
@@ -37,25 +38,6 @@ _LONGEST = 5000  # pictures of one film
 _SMALLEST, _LARGEST = (240, 180), (1920, 1440)  # in the least the strip and the text have room
 _WEBP: dict[str, Any] = {"format": "WEBP", "save_all": True, "loop": 0, "quality": 70, "method": 3}
 _WEBP |= {"kmin": 30, "kmax": 60}  # pictures between those that stand alone
-
-
-@dataclass(frozen=True)
-class Film:
-    """A film that was written.
-
-    Attributes:
-        path: Where.
-        pictures: How many.
-        seconds: How long it takes to watch [s].
-        size: Bytes.
-        renderer: What drew it.
-    """
-
-    path: Path
-    pictures: int
-    seconds: float
-    size: int
-    renderer: str
 
 
 @dataclass(frozen=True)
@@ -128,7 +110,7 @@ def write_film(
     fps: float = 30.0,
     slow: float = 1.0,
     progress: Progress = silent,
-) -> Film:
+) -> Figures:
     """Write a film of one trace, or of two and how far apart they are.
 
     Args:
@@ -142,6 +124,12 @@ def write_film(
         slow: How many times as long as simulated time it takes.
         progress: Told the fraction that is done.
 
+    Returns:
+        path: Where it was written.
+        pictures: How many; seconds: how long it takes to watch [s].
+        size: Bytes.
+        renderer: What drew it.
+
     Raises:
         BadInputError: See `check_film`; or there would be too many pictures.
         MissingEngineError: An extra is missing.
@@ -149,7 +137,7 @@ def write_film(
     """
     check_film(path, size, fps, slow)
     timing = timing_of(traces, fps, slow)
-    header, strip = traces[0].header, _strip(traces, comparison)
+    header, strip = traces[0].header, _strip(comparison)
     labels = labels_of(header, traces[1].header).long if len(traces) > 1 else [header.label]
     overlay = Overlay(size, timing.times, slow, header.experiment, labels, strip)
     shots = frames(traces, models, overlay.inner, timing, renderer)
@@ -168,7 +156,13 @@ def write_film(
             replace_file(path, lambda out: write_webp(out, pictures(), timing.milliseconds))
     finally:
         shots.close()
-    return Film(path, timing.count, seconds, path.stat().st_size, str(renderer))
+    return Figures(
+        path=path,
+        pictures=timing.count,
+        seconds=seconds,
+        size=path.stat().st_size,
+        renderer=str(renderer),
+    )
 
 
 def timing_of(traces: Sequence[Trace], fps: float, slow: float) -> Timing:
@@ -241,14 +235,10 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
     return Motion(drawing_of(model), xpos, xquat)
 
 
-def _strip(traces: Sequence[Trace], comparison: Comparison | None) -> QuantityChart | None:
+def _strip(comparison: Comparison | None) -> QuantityChart | None:
     """How far apart the fingertips are; without one, what is farthest beyond its tolerance."""
-    if comparison is None:
-        return None
-    one, two = traces
-    charts = charts_of(comparison, one, two, series(one, two), None)
     return max(
-        charts,
+        charts_of(comparison) if comparison else (),
         key=lambda chart: (chart.curve.kind == "tip", chart.agreement.tolerances()),
         default=None,
     )

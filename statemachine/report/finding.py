@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..compare import Agreement, ChaosFloor, Comparison, Series, Touch
+from ..compare import Agreement, Comparison, Series
 from ..compare.series import SETTLED, at_the_end
-from ..compare.why import Explanation
 from ..measures import QUANTITIES
 from ..measures.text import capital, grouped, listed, quantity, rounded, short_time
-from ..page import Block, Headline, Table, TableCell
+from ..page import Block, Figures, Headline, Table, TableCell
+from ..runs import Trace
 from . import template
 from .template import if_true
 from .why import answer, proofs
+
+if TYPE_CHECKING:
+    from ..compare.why import Explanation
 
 _STEADY = 0.1  # share by which a difference may change in the end and be called settled
 
@@ -43,30 +45,10 @@ ENDS = {
 }
 
 
-@dataclass(frozen=True)
-class Event:
-    """Something that happens.
-
-    Attributes:
-        time: Since the start [s].
-        kind: "touch", "part", "largest" or "end".
-        text: What, in a few words.
-        side: 0 or 1, or None for both.
-        what: What touches what; empty otherwise.
-    """
-
-    time: float
-    kind: Literal["touch", "part", "largest", "end"]
-    text: str
-    side: int | None
-    what: str = ""
-
-
 def headline(
     comparison: Comparison,
-    events: Sequence[Event],
+    events: Sequence[Figures],
     explanation: Explanation | None = None,
-    curves: Sequence[Series] = (),
 ) -> Headline:
     """The largest difference, what explains it, and what is left of it in the end."""
     agreements, until = comparison.agreements, comparison.until
@@ -74,7 +56,7 @@ def headline(
         same = all(agreement.max == 0 for agreement in agreements)
         return Headline(LEADS["same" if same else "agree"].format(until=until))
     if comparison.ended:
-        sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
+        sides = [s.label for s in (comparison.one, comparison.two) if s.trace.header.ended]
         lead = LEADS["ended"].format(
             sides=" and ".join(sides),
             until=until,
@@ -94,15 +76,15 @@ def headline(
         parting=_parting(comparison, events),
     )
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
-    return Headline(capital(lead), causes, _in_the_end(comparison, curves), holds=False)
+    return Headline(capital(lead), causes, _in_the_end(comparison), holds=False)
 
 
-def _parting(comparison: Comparison, events: Sequence[Event]) -> str:
+def _parting(comparison: Comparison, events: Sequence[Figures]) -> str:
     """When the runs part; of moments farther apart than timesteps, which is the first."""
     at = parting(comparison)
     if at is None:
         return ""
-    step = max(comparison.one.timestep, comparison.two.timestep)
+    step = max(trace.timestep for trace in traces_of(comparison))
     spacing = comparison.until / max(1, comparison.moments - 1)
     kind = "at the start" if at == 0 else "exact"
     if at and spacing > 1.5 * step:
@@ -125,12 +107,17 @@ def long_labels(comparison: Comparison) -> tuple[str, str]:
     return comparison.one.label, comparison.two.label
 
 
+def traces_of(comparison: Comparison) -> tuple[Trace, Trace]:
+    """The runs of both sides."""
+    return comparison.one.trace, comparison.two.trace
+
+
 def window(comparison: Comparison) -> str:
     """What the figures of the end are a mean over."""
     return f"the last {SETTLED * comparison.until:.3g} s"
 
 
-def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
+def _in_the_end(comparison: Comparison) -> str:
     """What of the motion is still apart, as a mean over the end, and whether it still changes."""
     motion = [a for a in comparison.agreements if QUANTITIES[a.kind].moves]
     differ = [a for a in motion if a.verdict == "differs"]
@@ -139,7 +126,7 @@ def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
     if not known:
         return ENDS["within"].format(window=over) if motion and not differ else ""
     most = max(known, key=lambda a: a.settled / (a.tolerance or 1e-300))
-    last = next((_last(curve, most) for curve in curves if curve.name == most.name), None)
+    last = next(_last(curve, most) for curve in comparison.curves if curve.name == most.name)
     return ENDS["settled" if last is None else "changing"].format(
         window=over,
         what=named(most),
@@ -243,7 +230,7 @@ def in_words(comparison: Comparison) -> list[Block]:
     )
 
 
-def floor_words(comparison: Comparison, floor: ChaosFloor) -> list[Block]:
+def floor_words(comparison: Comparison, floor: Figures) -> list[Block]:
     """How the floor was made, how high it is, and what lies inside it."""
     largest = [
         max((band for band in floor.bands if band.unit == unit), key=lambda b: b.most, default=None)
@@ -278,7 +265,7 @@ def floor_words(comparison: Comparison, floor: ChaosFloor) -> list[Block]:
     )
 
 
-def changed_by(floor: ChaosFloor) -> str:
+def changed_by(floor: Figures) -> str:
     """What was changed in the runs that it is made of."""
     size = floor.uncertain
     sizes = [rounded(v, unit) for v, unit in ((size.length, "m"), (size.angle, "rad")) if v > 0]
@@ -286,41 +273,51 @@ def changed_by(floor: ChaosFloor) -> str:
     return f"start and commands changed by rounding ({floor.rounding:g}){start}"
 
 
-def events_of(comparison: Comparison, touches: Sequence[Touch]) -> list[Event]:
-    """First touches on each side, where each quantity parts, largest differences, early ends."""
+def events_of(comparison: Comparison) -> list[Figures]:
+    """First touches on each side, where each quantity parts, largest differences, early ends.
+
+    Returns:
+        time: Since the start [s].
+        kind: "touch", "part", "largest" or "end".
+        text: What happens, in a few words.
+        side: 0 or 1, or None for both.
+        what: What touches what; empty otherwise.
+    """
     parted = [
         (agreement.since, agreement.at, agreement.name.replace(", ", " "))
         for agreement in comparison.agreements
         if agreement.kind != "contact" and agreement.since is not None
     ]
-    events = [
+    rows: list[tuple[float, str, str, int | None, str]] = [
         *(
-            Event(contact.first, "touch", f"first touch: {touch.pair}", side, touch.pair)
-            for touch in touches
+            (contact.first, "touch", f"first touch: {touch.pair}", side, touch.pair)
+            for touch in comparison.touches
             for side, contact in enumerate((touch.one, touch.two))
             if contact.first is not None
         ),
         *(
-            Event(since, "part", f"beyond tolerance from here: {'; '.join(names)}", None)
+            (since, "part", f"beyond tolerance from here: {'; '.join(names)}", None, "")
             for since, names in grouped((since, name) for since, _, name in parted).items()
         ),
         *(
-            Event(at, "largest", f"largest difference: {'; '.join(names)}", None)
+            (at, "largest", f"largest difference: {'; '.join(names)}", None, "")
             for at, names in grouped((at, name) for _, at, name in parted).items()
         ),
         *(
-            Event((side.rows - 1) * side.timestep, "end", f"ends early: {side.ended}", number)
-            for number, side in enumerate((comparison.one, comparison.two))
-            if side.ended
+            ((len(trace) - 1) * trace.timestep, "end", f"ends early: {ended}", number, "")
+            for number, trace in enumerate(traces_of(comparison))
+            if (ended := trace.header.ended)
         ),
     ]
+    names = ("time", "kind", "text", "side", "what")
+    events = [Figures(**dict(zip(names, row, strict=True))) for row in rows]
     return sorted(events, key=lambda event: event.time)
 
 
-def events_table(events: Sequence[Event], labels: tuple[str, str]) -> Table:
+def events_table(comparison: Comparison) -> Table:
     """What happens when; the same on both sides at the same time is one row."""
-    sides = grouped(((event.time, event.text), event.side) for event in events)
-    where = {None: "between them", 0: labels[0], 1: labels[1]}
+    sides = grouped(((event.time, event.text), event.side) for event in events_of(comparison))
+    where = {None: "between them", **dict(enumerate(long_labels(comparison)))}
     return Table.of(
         sides,
         {

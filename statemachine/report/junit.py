@@ -17,7 +17,7 @@ def junit(comparisons: Sequence[Comparison]) -> str:
     root = ElementTree.Element("testsuites")
     for comparison in comparisons:
         sides = comparison.one, comparison.two
-        name = f"{comparison.one.experiment}: {comparison.one.label}, {comparison.two.label}"
+        name = f"{sides[0].trace.header.experiment}: {sides[0].label}, {sides[1].label}"
         failures = {
             agreement.name: FAILED.format(
                 largest=quantity(agreement.max, agreement.unit),
@@ -28,7 +28,8 @@ def junit(comparisons: Sequence[Comparison]) -> str:
             for agreement in comparison.agreements
             if agreement.verdict != "agrees"
         }
-        failures |= {f"end of {s.label}": ENDED.format(why=s.ended) for s in sides if s.ended}
+        ended = {side.label: side.trace.header.ended for side in sides if side.trace.header.ended}
+        failures |= {f"end of {label}": ENDED.format(why=why) for label, why in ended.items()}
         names = dict.fromkeys(
             [agreement.name for agreement in comparison.agreements] + list(failures)
         )

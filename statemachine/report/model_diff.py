@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from ..compare.models import AgreedFigures, Compared, DescribedFile, Difference
 from ..compare.models.ledger import SUBJECTS, Value
 from ..lessons.template import by_engine
 from ..measures.text import after, capital, grouped, reading, rounded, sentence, significant
-from ..page import Block, Items, Page, Table, Text
+from ..page import Block, Figures, Items, Page, Table, Text
 from . import template
 from .template import if_true, versions_of
 
@@ -39,6 +38,16 @@ _LAST = {
     "settings": "",
     "structure": "",
 }
+# Words of a subject's table that want a legend, by its slot.
+_EXPLAINED = {
+    "zero": ("places", "zero position"),
+    "armature": ("armature", "M_ii"),
+    "sags": ("drive", "sags"),
+    "ratio": ("drive", "damping ratio"),
+    "slows": ("damping", "slows in"),
+    "load": ("centre of mass", "load"),
+    "felt": ("inertia", "M_ii"),
+}
 # Figures that say no more than the name of their difference.
 _SAID_BY_ITS_NAME = {
     *("ctrlrange", "forcerange", "gear", "range", "axis", "origin", "moments", "stiffness"),
@@ -58,24 +67,23 @@ _SAID_BY_ITS_NAME = {
 }
 
 
-def page(result: Compared, everything: bool = False) -> Page:
+def page(result: Figures, everything: bool = False) -> Page:
     """What differs, the weightiest first; then what is equal, and how well.
 
     Args:
         result: Of `compare`.
         everything: Whether every figure has a row of its own.
     """
-    ledger, sides = result.found, {"left": result.one, "right": result.two}
-    rows, posed = ledger.differences, ledger.posed
+    named, rows, posed = {"left": result.one, "right": result.two}, result.differences, result.posed
     matter = [row for row in rows if row.matters]
     able = dict.fromkeys(name for row in rows for name in row.causes if not row.refused)
     refused = {row.causes[0]: row.refused for row in rows if row.refused}
-    notes = [f"{name}: {note}" for name, side in sides.items() for note in side.notes]
+    notes = [f"{name}: {note}" for name, side in named.items() for note in side.notes]
     return template.page(
         "model_diff",
-        **{f"{name}_name": _name(side) for name, side in sides.items()},
+        **{f"{name}_name": _name(side) for name, side in named.items()},
         origin=versions_of(result.versions),
-        sides=_sides(result),
+        sides=_sides(named),
         none_differ=None if matter or result.skipped else True,
         digits=result.digits,
         not_all_compared=False if result.skipped and not matter else None,
@@ -92,44 +100,43 @@ def page(result: Compared, everything: bool = False) -> Page:
         command="" if able else None,
         refused_too=if_true(refused),
         refused=Items([f"{capital(name)}: {why}." for name, why in refused.items()]),
-        equal=_equal(ledger.agreements),
+        equal=_equal(result.agreements),
         joints=posed.joints or None,
         distance=_tiny(posed.distance, "m"),
         angle=_tiny(posed.angle, "rad"),
         poses=posed.poses,
         seed=posed.seed,
         furthest=posed.link if posed.joints and posed.distance > 1e-5 else None,
-        notes=[Text(sentence(note)) for note in (*notes, *ledger.notes, *result.skipped)],
+        notes=[Text(sentence(note)) for note in (*notes, *result.notes, *result.skipped)],
     )
 
 
-def _name(side: DescribedFile) -> str:
+def _name(side: Figures) -> str:
     """A file, and of one that an engine has read the engine."""
     return f"{side.file} on {side.reader.split()[0]}" if side.format == "engine" else side.file
 
 
-def _sides(result: Compared) -> Table:
+def _sides(sides: Mapping[str, Figures]) -> Table:
     """How each side was read, and what it has."""
-    left, right = zip((result.one, result.two), result.found.mass, strict=True)
     return by_engine(
-        {"left": left, "right": right},
+        sides,
         {
-            "file": lambda side: side[0].file,
+            "file": lambda side: side.file,
             "read": lambda side: (
-                f"loaded into {side[0].reader}"
-                if side[0].format == "engine"
-                else f"{side[0].format}, by {side[0].reader}"
+                f"loaded into {side.reader}"
+                if side.format == "engine"
+                else f"{side.format}, by {side.reader}"
             ),
-            "links": lambda side: str(side[0].links),
-            "joints": lambda side: str(side[0].joints),
-            "shapes": lambda side: str(side[0].shapes),
-            "mass": lambda side: rounded(side[1], "kg", 4),
+            "links": lambda side: str(side.links),
+            "joints": lambda side: str(side.joints),
+            "shapes": lambda side: str(side.shapes),
+            "mass": lambda side: rounded(side._mass, "kg", 4),
         },
         "",
     )
 
 
-def _subject(subject: str, differences: list[Difference], everything: bool) -> list[Block]:
+def _subject(subject: str, differences: list[Figures], everything: bool) -> list[Block]:
     """What differs in a subject, what the figures mean, and of armature what its lack does."""
     alike = grouped(((d.figure, d.one, d.two, d.size, d.unit), d) for d in differences).values()
     # Where three places or more have one figure with the same values, one row is for all.
@@ -142,13 +149,14 @@ def _subject(subject: str, differences: list[Difference], everything: bool) -> l
     rows = [_row(subject, group) for group in shown]
     headers = ("figure", "left", "right", "apart", _LAST.get(subject, ""))
     columns = [k for k in range(5) if k < 3 or any(row[k] for row in rows)]
+    headers = [headers[k] for k in columns]
     worst = max(differences, key=lambda row: row.share)
     times = 1 / (1 - worst.share) if worst.share < 1 else math.inf
     lacks = subject == "armature" and 0 < worst.share < 1 and not (worst.one and worst.two)
     return template.blocks(
         "model_diff_subject",
         table=Table(
-            [headers[k] for k in columns],
+            headers,
             [[row[k] for k in columns] for row in rows],
             SUBJECTS[subject] + ("" if any(d.matters for d in differences) else _FOR_THE_RECORD),
             frozenset(range(len(columns))),
@@ -157,11 +165,15 @@ def _subject(subject: str, differences: list[Difference], everything: bool) -> l
         times=(f"{times:,.0f}" if times >= 100 else f"{times:.3g}") if lacks else None,
         joint=worst.where,
         side="left" if worst.two else "right",
-        **{name: if_true(name == subject) for name in SUBJECTS},
+        **{name: if_true(name == subject) for name in SUBJECTS}
+        | {
+            slot: if_true(subject == of and word in str((headers, rows)))
+            for slot, (of, word) in _EXPLAINED.items()
+        },
     )
 
 
-def _row(subject: str, group: Sequence[Difference]) -> list[str]:
+def _row(subject: str, group: Sequence[Figures]) -> list[str]:
     first, last = group[0], group[-1]
     unit = _MOMENT if subject == "inertia" and first.unit == "kg m²" else first.unit
     effect = first.effect
@@ -175,7 +187,7 @@ def _row(subject: str, group: Sequence[Difference]) -> list[str]:
     return [_label(first, len(group) - 1), *values, apart, effect]
 
 
-def _label(row: Difference, more: int) -> str:
+def _label(row: Figures, more: int) -> str:
     """What a row is called: as its difference is, with the figure that it is of it."""
     if len(row.causes) != 1:
         where = f"{row.where} + {more} more:" if more else row.where
@@ -201,7 +213,7 @@ def _number(value: float, unit: str, units: dict[str, tuple[float, str]]) -> str
     return f"{significant(value * factor)}{shown}"
 
 
-def _equal(agreements: Sequence[AgreedFigures]) -> Table:
+def _equal(agreements: Sequence[Figures]) -> Table:
     """A row for each subject: how well both sides agree in it, at the worst in each unit."""
     groups = grouped((figures.subject, figures) for figures in agreements)
     digits = {name: min(figures.digits for figures in group) for name, group in groups.items()}
@@ -217,7 +229,7 @@ def _equal(agreements: Sequence[AgreedFigures]) -> Table:
     )
 
 
-def _worst(figures: AgreedFigures) -> str:
+def _worst(figures: Figures) -> str:
     unit = _MOMENT if figures.subject == "inertia" else figures.unit
     factor, shown = _APART.get(unit, (1.0, after(unit)))
     return f"{figures.worst * factor:.1e}{shown}" if figures.worst else ""

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compare import Agreement, ChaosFloor, Comparison, Series
+from ..compare import Agreement, Comparison, Series
 from ..compare.series import NORMAL, normal_forces, total_forces
 from ..interface import Array
 from ..measures import same_pairs
 from ..measures.text import figure, quantity, reading, short_time
-from ..page import Interactive, Traces
-from ..runs import Trace
+from ..page import Figures, Interactive, Traces
 from . import template
-from .finding import Event, name_of
+from .finding import long_labels, name_of, traces_of
 
 CHARTS_SHOWN = 20  # of a page or a figure
 GAP = "how far apart"
@@ -99,38 +97,25 @@ class BothRuns(Interactive):
     """Two runs in one picture, moment by moment.
 
     Attributes:
-        one: The run that is drawn solid.
-        two: The run that is drawn as a ghost over it.
-        comparison: Of the two: what they are called, and until when they are shown.
-        site: The site whose way is drawn; "" for none.
+        comparison: Of the two: the left one is drawn solid, the right one as a ghost over it.
         start: The moment to begin at [s].
         events: First touches among them are marked.
         charts: What is followed.
         lead: Of these, the ones that are spoken, by number.
     """
 
-    one: Trace
-    two: Trace
     comparison: Comparison
-    site: str
     start: float
-    events: tuple[Event, ...]
+    events: tuple[Figures, ...]
     charts: tuple[QuantityChart, ...]
     lead: tuple[int, ...]
 
 
-def charts_of(
-    comparison: Comparison,
-    one: Trace,
-    two: Trace,
-    curves: Sequence[Series],
-    floor: ChaosFloor | None,
-) -> tuple[QuantityChart, ...]:
+def charts_of(comparison: Comparison, floor: Figures | None = None) -> tuple[QuantityChart, ...]:
     """A chart for each quantity that is a number throughout; of many, those most beyond."""
-    labels = comparison.one.label, comparison.two.label
     agreements = {agreement.name: agreement for agreement in comparison.agreements}
-    bands = {} if floor is None else {band.name: band.width for band in floor.bands}
-    drawn = [curve for curve in curves if np.isfinite(curve.difference).all()]
+    bands = {} if floor is None else {band.name: band._width for band in floor.bands}
+    drawn = [curve for curve in comparison.curves if np.isfinite(curve.difference).all()]
     ranked = sorted(
         drawn, key=lambda curve: (curve.kind != "tip", -agreements[curve.name].tolerances())
     )
@@ -139,8 +124,8 @@ def charts_of(
             name_of(curve.name),
             curve,
             agreements[curve.name],
-            labels,
-            foot_of(curve, one, two, labels),
+            long_labels(comparison),
+            foot_of(curve, comparison),
             bands.get(curve.name),
         )
         for curve in drawn
@@ -148,16 +133,17 @@ def charts_of(
     )
 
 
-def foot_of(curve: Series, one: Trace, two: Trace, labels: tuple[str, str]) -> str:
+def foot_of(curve: Series, comparison: Comparison) -> str:
     """Under a chart of the energy by what it was computed; of a force its other figure."""
-    by = dict.fromkeys(trace.header.energy_by or trace.header.backend for trace in (one, two))
+    (left_label, right_label), traces = long_labels(comparison), traces_of(comparison)
+    by = dict.fromkeys(trace.header.energy_by or trace.header.backend for trace in traces)
     slots: dict[str, Any] = {"by": " and ".join(by) if curve.kind == "energy" else None}
-    slots |= {"left": labels[0] if curve.kind == "force" else None, "right": labels[1]}
+    slots |= {"left": left_label if curve.kind == "force" else None, "right": right_label}
     if curve.kind == "force":
         pair = curve.name.removesuffix(NORMAL)
         for name, forces_of in (("normal", normal_forces), ("whole", total_forces)):
-            left = forces_of(one)
-            for side, forces in (("left", left), ("right", same_pairs(left, forces_of(two)))):
+            left, right = map(forces_of, traces)
+            for side, forces in (("left", left), ("right", same_pairs(left, right))):
                 strongest = float(forces[pair].max()) if pair in forces else 0.0
                 slots[f"{side}_{name}"] = figure(strongest)
     return " ".join(template.texts("over_time", **slots))

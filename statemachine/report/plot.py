@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import itertools
 import textwrap
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..compare import ChaosFloor, Comparison, default_tip, series
+from ..compare import Comparison, default_tip
 from ..interface import Array, JointType
 from ..measures import COUNT, distances
 from ..measures.text import few, milliseconds, reading, short_time
-from ..page import Traces
+from ..page import Figures, Traces
 from ..runs import Trace
 from ..runs.whole import replace_bytes
 from . import template
 from .figures import SETTINGS, SIDES, check_suffix, draw_picture, saved
-from .finding import changed_by, long_labels, parting
+from .finding import changed_by, long_labels, parting, traces_of
 from .over_time import CHARTS_SHOWN, charts_of, spans
 from .template import if_true
 
@@ -48,11 +47,10 @@ COMMAND = "the command"
 Spans = Sequence[Sequence[Sequence[float]]]
 
 
-@dataclass(frozen=True, eq=False)
-class Plot:
-    """All of a figure.
+def of_comparison(comparison: Comparison, floor: Figures | None = None) -> Figures:
+    """The figure of two traces: a row for each quantity, and who touches when.
 
-    Attributes:
+    Returns:
         title: The experiment.
         lines: What made it, in short lines.
         labels: Names of the sides, in the order of the styles.
@@ -62,47 +60,31 @@ class Plot:
         part: When they part [s], or None.
         notes: What the reader must know, below.
     """
-
-    title: str
-    lines: Sequence[str]
-    labels: Sequence[str]
-    rows: Sequence[Sequence[Traces]]
-    touches: Mapping[str, Spans]
-    seconds: float
-    part: float | None
-    notes: Sequence[str]
-
-
-def of_comparison(
-    one: Trace, two: Trace, comparison: Comparison, floor: ChaosFloor | None = None
-) -> Plot:
-    """The figure of two traces: a row for each quantity, and who touches when."""
-    curves = series(one, two)
-    charts = charts_of(comparison, one, two, curves, floor)
+    charts, traces = charts_of(comparison, floor), traces_of(comparison)
     first = parting(comparison)
     names = few(
         [a.name for a in comparison.agreements if first is not None and a.since == first], 1
     )
-    return Plot(
-        one.header.experiment,
-        _origin(one, two),
-        long_labels(comparison),
-        [list(filter(None, (chart.values(), chart.gap()))) for chart in charts],
-        _touches([one, two], comparison.until),
-        comparison.until,
-        first,
-        _notes(
+    return Figures(
+        title=traces[0].header.experiment,
+        lines=_origin(*traces),
+        labels=long_labels(comparison),
+        rows=[list(filter(None, (chart.values(), chart.gap()))) for chart in charts],
+        touches=_touches(traces, comparison.until),
+        seconds=comparison.until,
+        part=first,
+        notes=_notes(
             two=if_true(True),
             changed=changed_by(floor) if floor else None,
             at=None if first is None else short_time(first),
             names=names,
-            fewer=len(curves) - len(charts) or None,
+            fewer=len(comparison.curves) - len(charts) or None,
         ),
     )
 
 
-def of_trace(trace: Trace) -> Plot:
-    """The figure of one trace: fingertip, joints and what they were told, energy, touches."""
+def of_trace(trace: Trace) -> Figures:
+    """The same of one trace: fingertip, joints and what they were told, energy, touches."""
     header, time = trace.header, trace.time - trace.time[0]
     charts: list[Traces] = []
 
@@ -131,15 +113,15 @@ def of_trace(trace: Trace) -> Plot:
         )
     if "energy" in trace and np.isfinite(trace["energy"]).all():
         add("energy [J]", trace["energy"].sum(axis=1))
-    return Plot(
-        header.experiment,
-        _origin(trace),
-        [header.label, COMMAND] if servos else [header.label],
-        [charts[k : k + 2] for k in range(0, len(charts), 2)],
-        _touches([trace], float(time[-1])),
-        float(time[-1]),
-        None,
-        _notes(not_shown=len(joints[CHARTS_SHOWN:]) or None),
+    return Figures(
+        title=header.experiment,
+        lines=_origin(trace),
+        labels=[header.label, COMMAND] if servos else [header.label],
+        rows=[charts[k : k + 2] for k in range(0, len(charts), 2)],
+        touches=_touches([trace], float(time[-1])),
+        seconds=float(time[-1]),
+        part=None,
+        notes=_notes(not_shown=len(joints[CHARTS_SHOWN:]) or None),
     )
 
 
@@ -189,7 +171,7 @@ def _origin(*traces: Trace) -> list[str]:
     ]
 
 
-def drawn(plot: Plot, form: str) -> bytes:
+def drawn(plot: Figures, form: str) -> bytes:
     """A figure as svg, png or pdf; the same figure gives the same bytes.
 
     Raises:
@@ -198,7 +180,7 @@ def drawn(plot: Plot, form: str) -> bytes:
     return saved(lambda: draw(plot), form, FIGURE_SETTINGS, _DOTS)
 
 
-def write_plot(plot: Plot, path: Path) -> int:
+def write_plot(plot: Figures, path: Path) -> int:
     """Write a figure to a file .svg, .png or .pdf, whole or not at all; its bytes.
 
     Raises:
@@ -208,7 +190,7 @@ def write_plot(plot: Plot, path: Path) -> int:
     return replace_bytes(path, drawn(plot, check_suffix(path)))
 
 
-def draw(plot: Plot) -> Any:
+def draw(plot: Figures) -> Any:
     """The figure as matplotlib's, 80 mm wide."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -246,7 +228,7 @@ def draw(plot: Plot) -> Any:
     return figure
 
 
-def _draw_touches(axes: Any, plot: Plot) -> None:
+def _draw_touches(axes: Any, plot: Figures) -> None:
     """Bars while two bodies touch: above of the first side, below, hatched, of the second."""
     axes.set_title("who touches when")
     least = plot.seconds / 300  # a touch of one step is seen too

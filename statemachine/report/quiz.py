@@ -60,8 +60,9 @@ class Reader:
         lines = text.splitlines(keepends=True)
         if self._rows and self._rows + sum(map(_rows, lines)) > _room():
             self.go_on()
-        for line in lines:
-            if self._rows and self._rows + _rows(line) > _room():
+        for k, line in enumerate(lines):
+            end = len(lines) if k == len(lines) - 2 else k + 1  # the last line is not left alone
+            if self._rows and self._rows + sum(map(_rows, lines[k:end])) > _room():
                 self.go_on()
             self._rows += _rows(line)
             sys.stdout.write(line)

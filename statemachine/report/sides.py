@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..compare import Agreement, Comparison, Contact, SidesRun, Touch
+from ..compare import Agreement, Comparison, SidesRun
 from ..interface import Array, JointType
 from ..measures.text import (
     NONE,
@@ -19,10 +18,10 @@ from ..measures.text import (
     sentence,
     short_time,
 )
-from ..page import Block, Headline, Items, Section, Table, TableCell, Text
+from ..page import Block, Figures, Headline, Items, Section, Table, TableCell, Text
 from ..runs import Header, Trace
 from . import template
-from .finding import moment, name_of, short_labels, window
+from .finding import long_labels, moment, name_of, short_labels, traces_of, window
 from .template import if_true
 from .why import missing
 
@@ -38,8 +37,9 @@ PHYSICS = {
 }
 
 
-def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> list[Block]:
+def commanded(comparison: Comparison) -> list[Block]:
     """What each actuator was told, at the start and in the end; empty without actuators."""
+    (one, two), labels = traces_of(comparison), long_labels(comparison)
     actuators = one.header.actuators
     if not actuators or actuators != two.header.actuators:
         return []
@@ -85,9 +85,9 @@ def _ends(trace: Trace) -> Array:
     return misses
 
 
-def contact_words(comparison: Comparison, touches: Sequence[Touch]) -> Table:
+def contact_words(comparison: Comparison) -> Table:
     """How hard each pair of bodies presses in the end on each side, and how deep it overlaps."""
-    labels = short_labels(comparison)
+    labels, touches = short_labels(comparison), comparison.touches
     hardest = sorted(
         touches,
         key=lambda t: (max(t.one.force, t.two.force), max(t.one.deepest, t.two.deepest)),
@@ -107,7 +107,7 @@ def contact_words(comparison: Comparison, touches: Sequence[Touch]) -> Table:
     )
 
 
-def _contact_cells(contact: Contact) -> tuple[str, ...]:
+def _contact_cells(contact: Figures) -> tuple[str, ...]:
     if contact.first is None:
         return NONE, NONE, NONE, NONE, "never touches"
     return (
@@ -180,9 +180,9 @@ def _cells(agreement: Agreement | None) -> tuple[str, str]:
 def emulated(comparison: Comparison) -> list[Block]:
     """What of the model a backend keeps instead of its engine."""
     sides = {
-        side.engine: side.provenance.emulated
+        side.trace.header.label: side.trace.header.provenance.emulated
         for side in (comparison.one, comparison.two)
-        if side.provenance.emulated and side.defaults == "model"
+        if side.trace.header.provenance.emulated and side.trace.header.defaults == "model"
     }
     blocks: list[Block] = []
     for engine, promises in sides.items():
@@ -199,8 +199,9 @@ def emulated(comparison: Comparison) -> list[Block]:
     return blocks
 
 
-def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
+def provenance(comparison: Comparison) -> Table:
     """What made both sides."""
+    headers = comparison.one.trace.header, comparison.two.trace.header
     left, right = (header.provenance.versions for header in headers)
     a, b = (facts_of(header) for header in headers)
     ran = ["recorded, opened here" if h.recorded else "run for this page" for h in headers]
@@ -210,8 +211,8 @@ def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
         ("rows", f"{comparison.one.rows}", f"{comparison.two.rows}"),
         *((name, a[name], b[name]) for name in a if a[name] or b[name]),
     ]
-    labels = comparison.one.label, comparison.two.label
-    return Table(("what", *labels), rows, "What made the two runs", words=frozenset({0, 1, 2}))
+    heads = ("what", *long_labels(comparison))
+    return Table(heads, rows, "What made the two runs", words=frozenset({0, 1, 2}))
 
 
 def facts_of(header: Header) -> dict[str, str]:

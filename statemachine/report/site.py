@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..backends import load
-from ..compare import Request, compare, run_sides, series, witness
+from ..compare import Request, compare, run_sides, witness
 from ..compare.why import explain
 from ..errors import MissingEngineError
 from ..installed import available
@@ -89,12 +89,11 @@ def make_comparisons(folder: Path) -> list[Path]:
         print(f"comparing: {name} ...")
         run = run_sides(Request((name,)))
         one, two = run.traces
-        page = comparison.page(
-            compare(one, two), one, two, said=run.said, witness=witness(one, two)
-        )
+        compared = compare(one, two)
+        page = comparison.page(compared, said=run.said, witness=witness(one, two))
         curves = {
             curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())
-            for curve in series(one, two)
+            for curve in compared.curves
             if curve.kind == "joint"
         }
         apart = Traces("How far apart", "time [s]", "difference [°]", curves, log=True)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..compare import Comparison, QuantityLimit, Request, StepComparison, TimestepConvergence
-from ..compare.one_step import StageGap
+from ..compare import Comparison, Request
 from ..compare.stages import FORCES
 from ..measures.text import (
     NONE,
@@ -18,7 +17,7 @@ from ..measures.text import (
     sentence,
     short_time,
 )
-from ..page import Bars, Code, Headline, Items, Page, Table
+from ..page import Bars, Code, Figures, Headline, Items, Page, Table
 from . import template
 from .finding import leading, moment, name_of
 from .template import if_true
@@ -36,7 +35,10 @@ TOUCH = {
 }
 
 
-def convergence(result: TimestepConvergence, experiment: str) -> Page:
+_STAGE_HEADS = ("differs", "first", "largest", "at, s", "where", "from, s", "null", "tolerance")
+
+
+def convergence(result: Figures, experiment: str) -> Page:
     """What vanishes with the timestep, and what does not.
 
     Args:
@@ -62,7 +64,7 @@ def convergence(result: TimestepConvergence, experiment: str) -> Page:
     )
 
 
-def _limits(limits: Sequence[QuantityLimit], title: str) -> Table:
+def _limits(limits: Sequence[Figures], title: str) -> Table:
     return Table.of(
         limits,
         {
@@ -82,7 +84,7 @@ def _limits(limits: Sequence[QuantityLimit], title: str) -> Table:
     )
 
 
-def _of_the_limit(result: TimestepConvergence, touch: str) -> Headline:
+def _of_the_limit(result: Figures, touch: str) -> Headline:
     if all(limit.verdict == "rounding" for limit in result.whole):
         return Headline(LEADS["rounding"])
     if result.vanishes:
@@ -100,14 +102,14 @@ def _of_the_limit(result: TimestepConvergence, touch: str) -> Headline:
     return Headline(lead, end=end, holds=False)
 
 
-def _own(limits: Sequence[QuantityLimit], side: str) -> str | None:
+def _own(limits: Sequence[Figures], side: str) -> str | None:
     """How far a side moves itself at most when its steps get finer, and in what."""
     known = [limit for limit in limits if limit.unit == limits[0].unit]
     most = max(known, key=lambda limit: getattr(limit, side)[0], default=None)
     return most and f"{quantity(getattr(most, side)[0], most.unit)} ({name_of(most.name)})"
 
 
-def one_step(result: StepComparison, labels: tuple[str, str], experiment: str) -> Page:
+def one_step(result: Figures, labels: tuple[str, str], experiment: str) -> Page:
     """What each stage of a step gives on both sides: what parts first, and where.
 
     Args:
@@ -135,7 +137,14 @@ def one_step(result: StepComparison, labels: tuple[str, str], experiment: str) -
         until=result.until,
         every=result.every,
         primed=result.primed or "nothing",
-        stages=_stages(result),
+        stages=Table(
+            ("stage", *_STAGE_HEADS),
+            [(gap.stage, *_stage_cells(gap)) for gap in result.stages],
+            "The stages of a step, in their order",
+            words=frozenset({0, 5}),
+            emphasis=frozenset(k for k, gap in enumerate(result.stages) if gap is result.first),
+            wide=frozenset({7, 8}),
+        ),
         relative=figure(result.relative),
         null=quantity(null.null, null.unit),
         stage=null.stage,
@@ -164,19 +173,7 @@ def one_step(result: StepComparison, labels: tuple[str, str], experiment: str) -
     )
 
 
-def _stages(result: StepComparison) -> Table:
-    heads = ("differs", "first", "largest", "at, s", "where", "from, s", "null", "tolerance")
-    return Table(
-        ("stage", *heads),
-        [(gap.stage, *_stage_cells(gap)) for gap in result.stages],
-        "The stages of a step, in their order",
-        words=frozenset({0, 5}),
-        emphasis=frozenset(k for k, gap in enumerate(result.stages) if gap is result.first),
-        wide=frozenset({7, 8}),
-    )
-
-
-def _stage_cells(gap: StageGap) -> tuple[str, ...]:
+def _stage_cells(gap: Figures) -> tuple[str, ...]:
     if not gap.told or not gap.unit:
         return NONE, NONE, NONE, NONE, gap.reason or NONE, NONE, NONE, NONE
     return (
@@ -196,8 +193,8 @@ def versions(comparisons: Sequence[Comparison], request: Request) -> Page:
     what, model = request.what[0], request.model or request.scenario().model
     rows, changed, bars = [], [], []
     for comparison in comparisons:
-        both = comparison.one, comparison.two
-        left, right = (side.provenance.versions[side.backend] for side in both)
+        both = comparison.one.trace.header, comparison.two.trace.header
+        left, right = (header.provenance.versions[header.backend] for header in both)
         cells, worst = ("nothing differs", NONE, NONE, NONE), leading(comparison)
         bars.append((worst.max / worst.tolerance if worst.tolerance else 0.0, None))
         if worst.max:

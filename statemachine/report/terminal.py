@@ -86,6 +86,7 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
     views = [block.view for block in page.blocks if isinstance(block, RobotPicture)]
     predicted: list[Block] = []  # what became of a prediction, until the run has said its part
     answered: list[bool] = []
+    headings: list[Block] = []  # which stay with what is under them
     for block, following in zip(blocks, [*blocks[1:], None], strict=True):
         if isinstance(block, Question):
             choice = reader.ask(block) if reader else None
@@ -97,7 +98,11 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
                 asked = [] if reader else [Text(block.text)]
                 _write(tell, [*asked, Text(f"Answer: {right}. {block.because}")])
             continue
-        _write(tell, [block])
+        if isinstance(block, Heading):
+            headings.append(block)
+            continue
+        _write(tell, [*headings, block])
+        headings.clear()
         if reader and predicted:
             _write(tell, predicted)
             predicted = []

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..compare.labels import lacking
-from ..compare.why import ADDS_UP, CauseShare, Explanation, Located
 from ..measures.text import NONE, capital, percent, quantity, sentence, short_time, significant
-from ..page import Block, Items, Page, Section, Table, TableCell, Text
+from ..page import Block, Figures, Items, Page, Section, Table, TableCell, Text
 from . import template
 from .template import if_true
+
+if TYPE_CHECKING:
+    from ..compare.why import Explanation
 
 _SHOWN = 12  # rows; the rest is folded away
 _WIDE = 15  # characters of a value
@@ -21,7 +24,7 @@ _NO_PART = 1e-3  # of the gap: causes below that are one row
 _MASKED = 2.0  # of the gap: a cause with more has others against it
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 _OFF = ("place", "anchor", "com", "axis")
-_HEADS = ("what", "left", "right", "explains", "alone", "last")
+_HEADS = ("what", "left", "right", "part", "alone", "last")
 _SINGULAR = {"joints": "worst joint", "slides": "worst slide", "ball joints": "worst ball joint"}
 _MEASURES = {"worst": "at its largest", "end": "in the end", "rms": "as a root mean square"}
 
@@ -131,6 +134,8 @@ def proofs(result: Explanation) -> tuple[str, ...]:
 
 def causes(result: Explanation) -> list[Block]:
     """How far apart the sides are, and how much of it each difference explains."""
+    from ..compare.why import ADDS_UP
+
     able = [row for row in result.shares if not row.note]
     refused = [f"{capital(row.name)}: {row.note}." for row in result.shares if row.note]
     small, floor = result.gap <= result.negligible, _amount(result, result.floor)
@@ -171,11 +176,12 @@ def causes(result: Explanation) -> list[Block]:
         impossible=len(result.impossible) or None,
         such_as=", ".join(next(iter(result.impossible), ())),
         noise=floor if noisy else None,
+        quiet=floor if result.floor and not (noisy or result.is_rounding) else None,
         noise_part=percent(result.floor / result.gap) if noisy else None,
     )
 
 
-def _located_note(place: Located) -> list[Block]:
+def _located_note(place: Figures) -> list[Block]:
     """How a feature that was left out on both sides, or an integrator, was found."""
     return template.blocks(
         "why_located",
@@ -209,7 +215,7 @@ def three_parts(result: Explanation) -> list[Block]:
     return [] if result.is_rounding else template.blocks("why_parts", parts=parts(result))
 
 
-def _table(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
+def _table(result: Explanation, able: Sequence[Figures]) -> list[Block]:
     """The differences, the largest share first; those without an effect folded away."""
     small = [
         row
@@ -241,7 +247,7 @@ def _table(result: Explanation, able: Sequence[CauseShare]) -> list[Block]:
     return [Table(_HEADS, rows[:most], title, words=words), *folded] if rows else []
 
 
-def _row(result: Explanation, row: CauseShare) -> tuple[str, ...]:
+def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
     what, figure = capital(row.name), row.values[0][0] if row.values else ""
     if len({repr(value[1:]) for value in row.values}) > 1:
         what += f" ({len(row.values)} figures)"
@@ -259,7 +265,7 @@ def _row(result: Explanation, row: CauseShare) -> tuple[str, ...]:
     return what, *_values(row), TableCell(explains, share=share), alone, last
 
 
-def _values(row: CauseShare) -> tuple[str, str]:
+def _values(row: Figures) -> tuple[str, str]:
     """The left's and the right's value of the figure that differs most.
 
     Of a place, or a direction, how far the right one is off.

@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,18 +29,14 @@ from ...engines.description.tree import GroupTree
 from ...errors import StateMachineError, UnsupportedError, unknown_name
 from ...installed import DEFAULT
 from ...models import SUFFIXES, resolve
+from ...page import Figures
 from ...probes import conventions
 from ...releases import engine_of, is_release
 from .compiled import compiled, enter_rest
-from .diff import Posed, diff
-from .ledger import AgreedFigures, Difference, Ledger
+from .diff import diff
+from .ledger import Ledger
 
 __all__ = [
-    "AgreedFigures",
-    "Compared",
-    "DescribedFile",
-    "Difference",
-    "Found",
     "Robot",
     "compare",
     "read",
@@ -49,71 +45,6 @@ __all__ = [
 
 # Of the conventions, those that stand between a description and what comes of it.
 _ASKED = ("actuation", "damping", "friction")
-
-
-@dataclass(frozen=True)
-class DescribedFile:
-    """One of the two descriptions, for the record.
-
-    Attributes:
-        file: With its folder.
-        format: URDF, MJCF, MJB, or the engine that it was loaded into.
-        reader: What read it.
-        links, joints, shapes: How many.
-        notes: What the reader had to say.
-    """
-
-    file: str
-    format: str
-    reader: str
-    links: int
-    joints: int
-    shapes: int
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Found:
-    """All that two readings differ and agree in.
-
-    Attributes:
-        differences: The weightiest subjects first, and in each the weightiest difference.
-        agreements: How well the rest agrees.
-        posed: Whether the same positions give the same poses.
-        mass: Of each robot in all [kg], what stands still in the world apart.
-        notes: What a reader should know, in sentences.
-    """
-
-    differences: tuple[Difference, ...]
-    agreements: tuple[AgreedFigures, ...]
-    posed: Posed
-    mass: tuple[float, float]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Compared:
-    """What came out; `found` holds the differences.
-
-    Attributes:
-        one, two: The sides, left and right.
-        found: Differences and agreements.
-        digits: Figures that agree to so many counted as equal.
-        versions: Of what computed it.
-        skipped: What was not compared, in sentences.
-    """
-
-    one: DescribedFile
-    two: DescribedFile
-    found: Found
-    digits: int
-    versions: dict[str, str]
-    skipped: tuple[str, ...] = ()
-
-    @property
-    def equal(self) -> bool:
-        """Whether everything was compared, and nothing was found that matters."""
-        return not self.skipped and not any(row.matters for row in self.found.differences)
 
 
 def split(text: str) -> tuple[str, str | None]:
@@ -178,7 +109,7 @@ def compare(
     digits: int = 6,
     seed: int = 0,
     menagerie: str | os.PathLike[str] | None = None,
-) -> Compared:
+) -> Figures:
     """Every difference between two descriptions.
 
     Args:
@@ -190,6 +121,20 @@ def compare(
         digits: Figures that agree to so many count as equal, 1 to 17.
         seed: Of the poses at which both are compared.
         menagerie: A folder to look names up in.
+
+    Returns:
+        one, two: The sides, left and right: the file with its folder; its format, URDF, MJCF, MJB
+            or the engine that it was loaded into; what read it; how many links, joints and shapes
+            it has; notes of the reader.
+        differences: The weightiest subjects first, and in each the weightiest difference.
+        agreements: How well the rest agrees.
+        posed: Whether the same positions give the same poses.
+        mass: Of each robot in all [kg], what stands still in the world apart.
+        notes: What a reader should know, in sentences.
+        digits: Figures that agree to so many counted as equal.
+        versions: Of what computed it.
+        skipped: What was not compared, in sentences.
+        equal: Whether everything was compared, and nothing was found that matters.
 
     Raises:
         UnknownNameError: No such model, engine, joint or frame.
@@ -216,13 +161,6 @@ def compare(
         skipped += enter_rest(book, matched, robots, max(tree.reach for tree in trees))
     for question, *answers in own_ways(*engines):
         book.differ("engine", "", question, answers, share=0.5)
-    result = Found(
-        differences=book.ordered(),
-        agreements=tuple(book.agreements()),
-        posed=posed,
-        mass=(robots[0].mass, robots[1].mass),
-        notes=tuple(dict.fromkeys(notes)),
-    )
     versions = {
         "statemachine": __version__,
         "numpy": np.__version__,
@@ -232,18 +170,32 @@ def compare(
     readers = [robot.reader.partition(" ") for robot in robots if robot.format != "URDF"]
     versions |= {engine: version for engine, _, version in readers}
     left, right = [
-        DescribedFile(
+        Figures(
             file=robot.name,
             format=robot.format,
             reader=robot.reader,
             links=len(robot.links),
             joints=len(robot.joints),
             shapes=sum(len(link.shapes) for link in robot.links),
+            _mass=mass,
             notes=robot.notes,
         )
-        for robot in (trees[0].robot, robots[1])
+        for robot, mass in ((trees[0].robot, robots[0].mass), (robots[1], robots[1].mass))
     ]
-    return Compared(left, right, result, digits, versions, tuple(skipped))
+    rows = book.ordered()
+    return Figures(
+        one=left,
+        two=right,
+        differences=rows,
+        agreements=tuple(book.agreements()),
+        posed=posed,
+        mass=tuple(robot.mass for robot in robots),
+        notes=tuple(dict.fromkeys(notes)),
+        digits=digits,
+        versions=versions,
+        skipped=tuple(skipped),
+        equal=not skipped and not any(row.matters for row in rows),
+    )
 
 
 def own_ways(one: str | None, two: str | None) -> tuple[tuple[str, str, str], ...]:

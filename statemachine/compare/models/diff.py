@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,30 +11,12 @@ from ...engines.description.match import Matching, frame_names, match
 from ...engines.description.records import SCALAR
 from ...engines.description.tree import Group, GroupTree
 from ...measures.text import rounded
+from ...page import Figures
 from ...rotations import HERE
 from . import figures, geometry
 from .ledger import Ledger
 
 POSES = 100  # at which the same positions are put into both
-
-
-@dataclass(frozen=True)
-class Posed:
-    """The same joint positions in both readings.
-
-    Attributes:
-        poses: How many, the zero pose among them; seed: of the others.
-        distance, angle: The largest between the same link here and there [m, rad].
-        link: The link that is furthest off.
-        joints: How many joints were moved.
-    """
-
-    poses: int
-    seed: int
-    distance: float
-    angle: float
-    link: str
-    joints: int
 
 
 def diff(
@@ -44,7 +25,7 @@ def diff(
     right: GroupTree,
     frames: Mapping[str, str] | None = None,
     seed: int = 0,
-) -> tuple[Posed, list[str]]:
+) -> tuple[Figures, list[str]]:
     """Compare two readings.
 
     Args:
@@ -142,8 +123,15 @@ def _label(group: Group) -> str:
     return group.joint.name if group.joint else group.name
 
 
-def _posed(matching: Matching, left: GroupTree, right: GroupTree, seed: int) -> Posed:
-    """The same joint positions in both: how far apart are the same links?"""
+def _posed(matching: Matching, left: GroupTree, right: GroupTree, seed: int) -> Figures:
+    """The same joint positions in both: how far apart are the same links?
+
+    Returns:
+        poses: How many, the zero pose among them; seed: of the others.
+        distance, angle: The largest between the same link here and there [m, rad].
+        link: The link that is furthest off.
+        joints: How many joints were moved.
+    """
     random = np.random.default_rng(seed)
     ranges: dict[tuple[str, str], tuple[float, float]] = {}
     for pair in matching.pairs:
@@ -164,4 +152,11 @@ def _posed(matching: Matching, left: GroupTree, right: GroupTree, seed: int) -> 
             a, b = start @ ours[pair.left.number], theirs[pair.right.number] @ pair.align
             farthest = max(farthest, (a.distance(b), pair.left.name), key=lambda far: far[0])
             angle = max(angle, a.angle(b))
-    return Posed(POSES, seed, farthest[0], angle, farthest[1], len(ranges))
+    return Figures(
+        poses=POSES,
+        seed=seed,
+        distance=farthest[0],
+        angle=angle,
+        link=farthest[1],
+        joints=len(ranges),
+    )

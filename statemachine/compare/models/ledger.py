@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...engines.records import ModelDifference
+from ...page import Figures
 
 Value = float | str | tuple[float, ...] | None
 Key = tuple[str, str, str]
@@ -41,59 +41,6 @@ SUBJECTS = {
     "engine": "What the engines do of themselves, measured on small models of their own",
 }
 _ORDER = tuple(SUBJECTS)
-
-
-@dataclass(frozen=True)
-class Difference:
-    """One figure that is not the same.
-
-    Attributes:
-        subject: A key of `SUBJECTS`.
-        where: The joint, link or frame.
-        figure: What of it.
-        one, two: The values, SI units; None where a file does not say.
-        unit: Theirs.
-        size: How far they are apart, in `unit`; None where that is no number.
-        share: How much it matters, from 0 to 1; of what, each comparing function says.
-        effect: What it does, as far as that was computed.
-        matters: Whether it makes the two readings differ; else it is said for the record.
-        causes: The differences of the compiled models that it is a figure of, as `why.explain`
-            names them; none where only a reading tells of it.
-        refused: Why the right cannot be brought to the left in it; "" where it can, or where only
-            a reading tells of it.
-    """
-
-    subject: str
-    where: str
-    figure: str
-    one: Value
-    two: Value
-    unit: str
-    size: float | None
-    share: float
-    effect: str = ""
-    matters: bool = True
-    causes: tuple[str, ...] = ()
-    refused: str = ""
-
-
-@dataclass(frozen=True)
-class AgreedFigures:
-    """Figures that are the same, within rounding.
-
-    Attributes:
-        subject: A key of `SUBJECTS`.
-        count: How many.
-        worst: The largest difference, in `unit`; where: whose that is.
-        digits: To how many digits they agree; 17 is every bit of a float64.
-    """
-
-    subject: str
-    count: int
-    worst: float
-    unit: str
-    where: str
-    digits: int
 
 
 def plain(vector: Iterable[float]) -> tuple[float, ...]:
@@ -126,7 +73,7 @@ class Ledger:
         self, digits: int, compiled: Mapping[Key, Sequence[ModelDifference]], complete: bool
     ) -> None:
         self.tolerance = 0.5 * 10.0 ** (1 - digits)
-        self.differences: list[Difference] = []
+        self.differences: list[Figures] = []
         self.entered = set[Key]()
         self.compiled, self.complete = compiled, complete
         self._equal: dict[tuple[str, str], list[tuple[float, float, str]]] = {}
@@ -145,7 +92,23 @@ class Ledger:
         matters: bool = True,
         keys: Sequence[Key] = (),
     ) -> None:
-        """Enter a difference; in its effect "{share}" is its share."""
+        """Enter a figure that is not the same.
+
+        Args:
+            subject: A key of `SUBJECTS`.
+            where: The joint, link or frame.
+            figure: What of it.
+            values: `one` and `two` of the difference, SI units; None where a file does not say.
+            unit: Theirs.
+            size: How far they are apart, in `unit`; None where that is no number.
+            share: How much it matters, from 0 to 1; of what, each comparing function says.
+            effect: What it does, as far as that was computed; "{share}" in it is its share.
+            matters: Whether it makes the two readings differ; else it is said for the record.
+            keys: Of these the difference has `causes`: the differences of the compiled models
+                that it is a figure of, as `why.explain` names them, none where only a reading tells
+                of it; and `refused`: why the right cannot be brought to the left in it, "" where
+                it can, or where only a reading tells of it.
+        """
         share = float(matters) * (1.0 if math.isnan(share) else min(max(share, 0.0), 1.0))
         left, right = ["unlimited" if v in (math.inf, -math.inf) else v for v in values]
         size = None if size is None or not math.isfinite(size) else size
@@ -153,14 +116,20 @@ class Ledger:
         if self.complete and keys and not known and keys[0][0] != "site":  # a link is a frame too
             return
         self.entered.update(keys)
-        causes = dict.fromkeys(difference.title for difference in known)
-        refused = next((difference.refused for difference in known if difference.refused), "")
-        effect = effect.format(share=share)
         self.differences.append(
-            Difference(
-                *(subject, where, figure, left, right, unit, size, share, effect, matters),
-                causes=tuple(causes),
-                refused=refused,
+            Figures(
+                subject=subject,
+                where=where,
+                figure=figure,
+                one=left,
+                two=right,
+                unit=unit,
+                size=size,
+                share=share,
+                effect=effect.format(share=share),
+                matters=matters,
+                causes=tuple(dict.fromkeys(difference.title for difference in known)),
+                refused=next((row.refused for row in known if row.refused), ""),
             )
         )
 
@@ -268,16 +237,30 @@ class Ledger:
             keys=keys,
         )
 
-    def agreements(self) -> Iterator[AgreedFigures]:
-        """How well the rest agrees, by subject and unit."""
+    def agreements(self) -> Iterator[Figures]:
+        """Figures that are the same, within rounding, by subject and unit.
+
+        Returns:
+            subject: A key of `SUBJECTS`.
+            count: How many.
+            worst: The largest difference, in `unit`; where: whose that is.
+            digits: To how many digits they agree; 17 is every bit of a float64.
+        """
         for (subject, unit), entries in sorted(
             self._equal.items(), key=lambda item: _ORDER.index(item[0][0])
         ):
             relative = max(entry[0] for entry in entries)
             _, size, where = max(entries, key=lambda entry: entry[1])
-            yield AgreedFigures(subject, len(entries), size, unit, where, digits_of(relative))
+            yield Figures(
+                subject=subject,
+                count=len(entries),
+                worst=size,
+                unit=unit,
+                where=where,
+                digits=digits_of(relative),
+            )
 
-    def ordered(self) -> tuple[Difference, ...]:
+    def ordered(self) -> tuple[Figures, ...]:
         """The differences, by subject; the subject with the weightiest one first."""
         weight: dict[str, float] = {}
         for row in self.differences:

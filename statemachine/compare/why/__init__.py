@@ -9,17 +9,12 @@
 
 from __future__ import annotations
 
-from .explain import UNEXPLAINED, CauseShare, Explanation, explain
-from .gap import FirstTouch
-from .locate import Located
+from .explain import UNEXPLAINED, Explanation, explain
 from .shapley import ADDS_UP
 
 __all__ = [
     "ADDS_UP",
     "UNEXPLAINED",
-    "CauseShare",
     "Explanation",
-    "FirstTouch",
-    "Located",
     "explain",
 ]

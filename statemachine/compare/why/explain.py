@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import JointType, Model
 from ...measures import Deviation
+from ...page import Figures
 from ...releases import engine_of
 from ...runs import Trace
 from ...runs.drive import Progress, silent
-from ...runs.provenance import Provenance, provenance
+from ...runs.provenance import provenance
 from ...runs.robot import moved_by_actuators
 from ...runs.scenarios import Scenario
 from ..labels import files_apart
 from ..matching import match_alike, match_models, missing_parts
 from ..perturbed import EXACT, Uncertainty
 from .causes import Cause, order_of_joints
-from .gap import FirstTouch, touched_at_start
-from .locate import Located, locate
-from .places import Place, places_of
-from .shapley import Method, Shares, shapley
+from .gap import touched_at_start
+from .locate import locate
+from .places import places_of
+from .shapley import shapley
 from .trials import Measure, Trials
 
 # What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
@@ -36,38 +36,7 @@ NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be conclud
 _NOT_RUN = "no set of causes with it could be run"
 
 
-@dataclass(frozen=True)
-class CauseShare:
-    """One cause, and its part of the gap.
-
-    Attributes:
-        name: What it is, and of what.
-        kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
-            start, "engine" of a setting of an engine as it comes.
-        values: Each figure that differs: its name, the left's value, the right's.
-        unit: Of the first figure.
-        share: Its part of the gap (Shapley value); below zero where it hides others; None where it
-            cannot be brought to the same, or no set of causes with it could be run.
-        error: Standard error of the share; 0 where it is no estimate.
-        alone: The part that it takes away as the only one; last: after all others.
-        note: Why there is no share, or what else is to be said.
-        place: Where the right's file says it; None where that was not found.
-    """
-
-    name: str
-    kind: str
-    values: tuple[tuple[str, object, object], ...]
-    unit: str
-    share: float | None
-    error: float
-    alone: float | None
-    last: float | None
-    note: str = ""
-    place: Place | None = None
-
-
-@dataclass(frozen=True)
-class Explanation:
+class Explanation(Figures):
     """What the gap between two sides comes from.
 
     Attributes:
@@ -78,7 +47,7 @@ class Explanation:
         first: The gap in each quantity, as they come.
         gap: The one that is explained, in `unit`.
         shares: The causes in files, options, commands and settings of an engine, the largest share
-            first. The shares add up to `explained`.
+            first; see `_shares`. The shares add up to `explained`.
         method: How the shares were computed; orders: how many orders were drawn for it.
         brought: The gap with all of them brought to the same; None if that could not be run.
         found_in: What the rest is found in by leaving features out on both sides.
@@ -100,39 +69,6 @@ class Explanation:
             interpolated there.
         runs: How many runs it took; took: by the clock [s].
     """
-
-    experiment: str
-    says: str
-    seconds: float
-    one: str
-    two: str
-    quantity: str
-    unit: str
-    measure: Measure
-    first: dict[str, Deviation]
-    gap: float
-    shares: tuple[CauseShare, ...]
-    method: Method
-    orders: int
-    brought: float | None
-    found_in: tuple[Located, ...]
-    explained: float
-    located: float
-    unexplained: float
-    negligible: float
-    floor: float
-    redundant: tuple[str, ...]
-    impossible: tuple[tuple[str, ...], ...]
-    unmatched: tuple[Mapping[str, tuple[str, ...]], Mapping[str, tuple[str, ...]]]
-    missing: tuple[tuple[str, str], ...]
-    notes: tuple[str, ...]
-    still: tuple[str, ...]
-    touch: FirstTouch | None
-    moments: int
-    between: bool
-    runs: int
-    took: float
-    provenance: tuple[Provenance, Provenance]
 
     @property
     def is_rounding(self) -> bool:
@@ -348,15 +284,29 @@ def _quantity(
 
 def _shares(
     listed: tuple[Cause, ...],
-    divided: Shares,
-    rest: tuple[Located, ...],
+    divided: Figures,
+    rest: tuple[Figures, ...],
     right: Model,
     nothing: bool,
-) -> tuple[CauseShare, ...]:
-    """The causes, the largest share first; of what was found by a setting of one side, too."""
+) -> tuple[Figures, ...]:
+    """The causes, the largest share first; of what was found by a setting of one side, too.
+
+    Returns:
+        name: What it is, and of what.
+        kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
+            start, "engine" of a setting of an engine as it comes.
+        values: Each figure that differs: its name, the left's value, the right's.
+        unit: Of the first figure.
+        share: Its part of the gap (Shapley value); below zero where it hides others; None where it
+            cannot be brought to the same, or no set of causes with it could be run.
+        error: Standard error of the share; 0 where it is no estimate.
+        alone: The part that it takes away as the only one; last: after all others.
+        note: Why there is no share, or what else is to be said.
+        place: Where the right's file says it; None where that was not found.
+    """
     places = {} if nothing else places_of(right.path, listed)
     rows = [
-        CauseShare(
+        Figures(
             name=cause.name,
             kind=cause.kind,
             values=tuple(value for row in cause.differences for value in row.values),
@@ -371,7 +321,7 @@ def _shares(
         for cause in listed
     ]
     rows += [
-        CauseShare(
+        Figures(
             name=part.name,
             kind="option",
             values=((part.name, *part.values),) if part.values else (),
@@ -380,6 +330,8 @@ def _shares(
             error=0.0,
             alone=None,
             last=part.share,
+            note="",
+            place=None,
         )
         for part in rest
         if part.is_setting
@@ -388,7 +340,7 @@ def _shares(
 
 
 def _parts(
-    gap: float, brought: float | None, rest: tuple[Located, ...], nothing: bool
+    gap: float, brought: float | None, rest: tuple[Figures, ...], nothing: bool
 ) -> tuple[float, float, float]:
     """What is explained, located and unexplained, as parts of the gap."""
     if nothing or brought is None:

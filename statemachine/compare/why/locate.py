@@ -6,41 +6,13 @@ counts only where it takes away more than half of what was left.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from ...page import Figures
 from .settings import FEATURES
 from .trials import Measure, Trials
 
 _NOTHING = 1e-6  # of the gap: what is less is left alone
 _LEAST = 0.5  # of what was left: what takes less away does not count
 _STILL = 0.1  # of the left's own motion: less is no motion any more
-
-
-@dataclass(frozen=True)
-class Located:
-    """A part of a gap, and where it comes from.
-
-    Attributes:
-        name: What was left out, or chosen.
-        without: What a run without it is, in words; of an integrator, the one that was chosen.
-        values: The integrators of the two sides as they come, or, of a setting, those that ran;
-            None of what was left out.
-        share: The part of the gap that went.
-        gap: What was left of it, in the unit of the gap.
-        moved: How far the left's own motion is then from its motion as it comes; above zero
-            the gap is that of another motion.
-        is_still: Whether nothing moves any more, so that there can be no gap.
-        is_setting: Whether it is a setting of one side, chosen while nothing was left out.
-    """
-
-    name: str
-    without: str
-    values: tuple[str, str] | None
-    share: float
-    gap: float
-    moved: float
-    is_still: bool
-    is_setting: bool
 
 
 def locate(
@@ -51,7 +23,7 @@ def locate(
     gap: float,
     left: float,
     bound: float,
-) -> tuple[Located, ...]:
+) -> tuple[Figures, ...]:
     """Leave features out on both sides, each on top of those that count.
 
     The integrator comes first, of the sides that have several, and is tried again once something is
@@ -65,8 +37,21 @@ def locate(
         gap: As the sides come, above zero.
         left: With the causes brought to the same.
         bound: What rounding and chaos make of it: no more is looked for.
+
+    Returns:
+        A part of the gap each, and where it comes from:
+        name: What was left out, or chosen.
+        without: What a run without it is, in words; of an integrator, the one that was chosen.
+        values: The integrators of the two sides as they come, or, of a setting, those that ran;
+            None of what was left out.
+        share: The part of the gap that went.
+        gap: What was left of it, in the unit of the gap.
+        moved: How far the left's own motion is then from its motion as it comes; above zero
+            the gap is that of another motion.
+        is_still: Whether nothing moves any more, so that there can be no gap.
+        is_setting: Whether it is a setting of one side, chosen while nothing was left out.
     """
-    rows: list[Located] = []
+    rows: list[Figures] = []
     without, integrator = frozenset[str](), ""
     able = filter(trials.can_be_without, FEATURES)
     # None: an integrator is chosen. A run that was made already is not made again.
@@ -94,7 +79,7 @@ def locate(
             )
             values = on_left, on_right
         rows.append(
-            Located(
+            Figures(
                 name=feature.name if feature else "integrator",
                 without=feature.without if feature else best,
                 values=values,

@@ -9,6 +9,7 @@ from xml.parsers import expat
 
 import numpy as np
 
+from ...page import Figures
 from .causes import Cause
 
 
@@ -26,22 +27,6 @@ class Place:
 
 # Attributes of an MJCF that are called otherwise than the array that they are compiled to.
 _ATTRIBUTES = {"ipos": "pos", "inertia": "diaginertia", "gainprm": "kp", "solref_limit": "solref"}
-
-
-@dataclass(frozen=True)
-class _Element:
-    """An element of an XML file.
-
-    Attributes:
-        attributes: Its own.
-        owners: The names that it goes by: its own, or that of the element around it.
-        in_default: Whether it is a default of a class.
-    """
-
-    attributes: dict[str, str]
-    owners: frozenset[str]
-    in_default: bool
-    place: Place
 
 
 def places_of(path: Path, causes: Iterable[Cause]) -> dict[str, Place]:
@@ -63,7 +48,7 @@ def places_of(path: Path, causes: Iterable[Cause]) -> dict[str, Place]:
     return places
 
 
-def _says(element: _Element, cause: Cause) -> bool:
+def _says(element: Figures, cause: Cause) -> bool:
     """Whether an element says what a side has of a cause."""
     names = {row.where for row in cause.differences}
     owned = element.in_default if len(names) > 1 else bool(names & element.owners)
@@ -85,18 +70,29 @@ def _same(text: str, value: object) -> bool:
     return 0 < len(numbers) <= len(wanted) and np.allclose(numbers, wanted[: len(numbers)], 1e-6)
 
 
-def _elements(path: Path, seen: frozenset[Path] = frozenset()) -> Iterator[_Element]:
-    """All elements of a file, and of those that it includes; none of one that cannot be read."""
-    rows: list[tuple[str, _Element]] = []
+def _elements(path: Path, seen: frozenset[Path] = frozenset()) -> Iterator[Figures]:
+    """All elements of a file, and of those that it includes; none of one that cannot be read.
+
+    Yields:
+        attributes: Its own.
+        owners: The names that it goes by: its own, or that of the element around it.
+        in_default: Whether it is a default of a class.
+        place: Where it is.
+    """
+    rows: list[tuple[str, Figures]] = []
     around: list[tuple[str, str]] = []
     parser = expat.ParserCreate()
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
         own = attributes.get("name", "")
         owners = {own} if own or not around else {around[-1][1]}
-        in_default = any(outer == "default" for outer, _ in around)
-        place = Place(path.name, parser.CurrentLineNumber)
-        rows.append((tag, _Element(attributes, frozenset(owners) - {""}, in_default, place)))
+        element = Figures(
+            attributes=attributes,
+            owners=frozenset(owners) - {""},
+            in_default=any(outer == "default" for outer, _ in around),
+            place=Place(path.name, parser.CurrentLineNumber),
+        )
+        rows.append((tag, element))
         around.append((tag, own))
 
     parser.StartElementHandler = begin

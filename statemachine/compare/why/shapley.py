@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
 from ...interface import Array
+from ...page import Figures
 
 Method = Literal["nothing", "one at a time", "all sets", "drawn orders"]
 Subset = frozenset[str]
@@ -28,28 +28,6 @@ ADDS_UP = 0.01  # of the gap: causes that interact by less add up
 _DUMMY = 1e-7  # of the gap: a cause that takes away less, first and last, takes away nothing
 _PRECISE = 0.01  # of the gap: a standard error that is small enough
 _FEWEST, _FAILURES = 4, 10  # pairs of orders before their spread is believed; that could not be run
-
-
-@dataclass(frozen=True)
-class Shares:
-    """How a gap is divided among its causes, each as a part of the gap.
-
-    Attributes:
-        method: How they were computed.
-        share: By cause; error: its standard error, 0 where it is no estimate.
-        alone: What it takes away if it is the only one, None where that cannot be, or be run.
-        last: What it takes away if it comes after all others, None as for `alone`.
-        orders: How many orders were drawn.
-        impossible: Sets of causes that could not be run, sorted.
-    """
-
-    method: Method
-    share: dict[str, float | None]
-    error: dict[str, float]
-    alone: dict[str, float | None]
-    last: dict[str, float | None]
-    orders: int
-    impossible: tuple[tuple[str, ...], ...]
 
 
 class _Game:
@@ -99,7 +77,7 @@ def shapley(
     seed: int = 0,
     ahead: Callable[[Iterable[Subset]], None] = lambda _sets: None,
     needs: Needs = MappingProxyType({}),
-) -> Shares:
+) -> Figures:
     """Divide a gap among its causes.
 
     Args:
@@ -111,6 +89,14 @@ def shapley(
         seed: Of the orders.
         ahead: Told which sets are evaluated next, where that is known of several.
         needs: Of a cause the one that has to be brought to the same before it.
+
+    Returns:
+        method: How the parts of the gap were computed.
+        share: By cause; error: its standard error, 0 where it is no estimate.
+        alone: What it takes away if it is the only one, None where that cannot be, or be run.
+        last: What it takes away if it comes after all others, None as for `alone`.
+        orders: How many orders were drawn.
+        impossible: Sets of causes that could not be run, sorted.
     """
     game, everything = _Game(value, gap, ahead, needs), frozenset(causes)
     if causes:
@@ -148,11 +134,14 @@ def shapley(
         share |= dict(zip(active, means, strict=True))
         error |= dict(zip(active, _errors(drawn).tolist(), strict=True))
     impossible = (tuple(sorted(s)) for s, part in game.parts.items() if math.isnan(part))
-    return Shares(
-        method,
-        *(_known(share), error, _known(alone), _known(last)),
-        orders,
-        tuple(sorted(impossible)),
+    return Figures(
+        method=method,
+        share=_known(share),
+        error=error,
+        alone=_known(alone),
+        last=_known(last),
+        orders=orders,
+        impossible=tuple(sorted(impossible)),
     )
 
 

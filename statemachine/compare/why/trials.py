@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -21,6 +20,7 @@ from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Model
 from ...measures import Deviation
+from ...page import Figures
 from ...processes import checked_jobs
 from ...processes.parallel import forks_for, in_forks
 from ...runs import Trace
@@ -40,7 +40,7 @@ from .causes import (
     of_the_run,
     order_of_ctrl,
 )
-from .gap import Curves, FirstTouch, Ruler, first_touch
+from .gap import Curves, Ruler, first_touch
 from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, Feature, OwnSettings, leave_out
 
 Measure = Literal["worst", "end", "rms"]
@@ -71,21 +71,6 @@ class _Run(NamedTuple):
     brought: frozenset[str]
     without: frozenset[str] = _NONE
     integrator: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class _Outcome:
-    """What became of a run.
-
-    Attributes:
-        curves: None if it could not be made or did not stand.
-        reason: Why not.
-        ran: Whether it was begun.
-    """
-
-    curves: Curves | None
-    reason: str = ""
-    ran: bool = True
 
 
 class Trials:
@@ -142,7 +127,7 @@ class Trials:
             left, right = (SideStart(t.qpos[0], t.qvel[0], t.ctrl[0]) for t in self._recordings)
             self._starts = left, right
         self.ended, self._repeated = "", 0
-        self._runs: dict[_Run, _Outcome] = {}
+        self._runs: dict[_Run, Figures] = {}
         self._by_name: dict[str, Cause] = {}
         self._replaced = _NONE  # causes that are brought over by `Model.replace`
         traces, began = [], time.perf_counter()
@@ -208,7 +193,7 @@ class Trials:
                 unit = "s" if name == "timestep" else ""
                 yield ModelDifference(name, "option", "", values, unit)
 
-    def touch(self, quantity: str) -> FirstTouch | None:
+    def touch(self, quantity: str) -> Figures | None:
         """The first contact of either side; None where nothing touches, or it is not told."""
         one, two = (self._runs[_Run(side, _NONE)].curves for side in (0, 1))
         gap = self.ruler.distances(quantity, one, two) if one and two else None
@@ -293,7 +278,7 @@ class Trials:
         if jobs > 1:
             work = [partial(self._outcome, run) for run in new]
             for run, outcome in zip(new, in_forks(work, jobs, self._ran, self._took), strict=True):
-                self._runs[run] = outcome or _Outcome(None, _LOST)
+                self._runs[run] = outcome or Figures(curves=None, reason=_LOST, ran=True)
 
     def _forks_for(self, number: int) -> int:
         """How many forks are to share some runs."""
@@ -310,14 +295,20 @@ class Trials:
             self.ended = outcome.reason or self.ended
         return outcome.curves
 
-    def _outcome(self, run: _Run) -> _Outcome:
+    def _outcome(self, run: _Run) -> Figures:
+        """What became of a run.
+
+        Returns:
+            curves: None if it could not be made or did not stand; reason: why not.
+            ran: Whether it was begun.
+        """
         ran = False
         try:
             model = self._model(run)
             ran = True
             return self._measured(run.side, model, self._rerun(run, model).record(derive=False))
         except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
-            return _Outcome(None, str(error), ran)
+            return Figures(curves=None, reason=str(error), ran=ran)
 
     def _model(self, run: _Run) -> Model:
         """The Model of a run."""
@@ -424,9 +415,10 @@ class Trials:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
         return self.ruler.floor(first, [run[0] for run in curves if run], measure)
 
-    def _measured(self, side: int, model: Model, trace: Trace) -> _Outcome:
+    def _measured(self, side: int, model: Model, trace: Trace) -> Figures:
         curves = self.ruler.curves(trace, self._posed(model), side)
-        return _Outcome(curves, trace.header.ended or "it left every bound")
+        reason = trace.header.ended or "it left every bound"
+        return Figures(curves=curves, reason=reason, ran=True)
 
     def _posed(self, model: Model) -> Model:
         """A Model of the same bodies by which poses are computed, on the engine that is fastest."""

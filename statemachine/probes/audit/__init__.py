@@ -10,17 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 from ...engines import room
-from ...engines.auditing import Driver, Measured, ReferenceRun, SavePoint
+from ...engines.auditing import Driver, ReferenceRun, SavePoint
 from ...errors import BadInputError, DivergedError
 from ...interface import Model
 from ...interface.options import as_count
+from ...page import Figures
 from ...runs.drive import Progress, silent
-from ...runs.provenance import Provenance, provenance
+from ...runs.provenance import provenance
 from . import trials
-from .conclusions import Conclusion, conclude
+from .conclusions import conclude
 from .interface_driver import InterfaceDriver, findings_elsewhere, run_elsewhere
 from .points import points
 from .trials import AuditFinding
@@ -28,49 +28,7 @@ from .trials import AuditFinding
 STEPS = 60  # of each future
 
 
-@dataclass(frozen=True)
-class Audited:
-    """An engine, or the interface to it, and all that was found.
-
-    Attributes:
-        layer: "engine" or "interface".
-        name: What a page calls it.
-        legend: What the names of its ways to save mean.
-        points: The save points, as measured.
-        findings: What came of every trial.
-        conclusion: What follows from them.
-    """
-
-    layer: str
-    name: str
-    legend: str
-    points: tuple[Measured, ...]
-    findings: tuple[AuditFinding, ...]
-    conclusion: Conclusion
-
-
-@dataclass(frozen=True)
-class Audit:
-    """An engine and our interface to it.
-
-    Attributes:
-        steps: How many each future has.
-        audited: The engine itself, where there is a driver for it; then the interface.
-        without: Save points that this model does not have, and why.
-    """
-
-    steps: int
-    audited: tuple[Audited, ...]
-    without: tuple[str, ...]
-    provenance: Provenance
-
-    @property
-    def holds(self) -> bool:
-        """Whether every promise is kept."""
-        return all(finding.holds for driver in self.audited for finding in driver.findings)
-
-
-def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = silent) -> Audit:
+def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = silent) -> Figures:
     """Try everything on the engine behind a Model and on the interface.
 
     Args:
@@ -78,6 +36,14 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
         steps: Of each future that is compared.
         seed: Of the commands in motion and of other pasts.
         progress: Told the fraction that is done.
+
+    Returns:
+        steps: How many each future has.
+        audited: The engine itself, where there is a driver for it; then the interface. Of each:
+            the layer, "engine" or "interface"; its name; a legend of its ways to save; the save
+            points, as measured; the findings, an AuditFinding of every trial; the conclusion.
+        without: Save points that this model does not have, and why.
+        holds: Whether every promise is kept.
 
     Raises:
         BadInputError: `steps` or `seed` is no such number, or nothing in the model moves.
@@ -113,17 +79,23 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
                 *(trials.falls(driver) if driver.layer == "engine" else ()),
             ]
     audited = tuple(
-        Audited(
-            driver.layer,
-            driver.name,
-            driver.legend,
+        Figures(
+            layer=driver.layer,
+            name=driver.name,
+            legend=driver.legend,
             points=tuple(driver.measure(run.point) for run in runs[driver]),
             findings=tuple(findings[driver]),
             conclusion=conclude(findings[driver]),
         )
         for driver in drivers
     )
-    return Audit(nstep, audited, without + diverged, provenance(model, seed))
+    return Figures(
+        steps=nstep,
+        audited=audited,
+        without=without + diverged,
+        holds=all(finding.holds for driver in audited for finding in driver.findings),
+        provenance=provenance(model, seed),
+    )
 
 
 # A question to a driver about one save point, given the run from there that nothing disturbed.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from ...engines.auditing import ITSELF, ONLY
 from ...engines.futures import FutureGap, worst
 from ...measures.text import grouped
+from ...page import Figures
 from .trials import (
     EACH_OTHER,
     FORGETS,
@@ -21,63 +21,25 @@ from .trials import (
 _NEARLY = 1e-6  # of a difference: what is left of it is rounding
 
 
-@dataclass(frozen=True)
-class Missing:
-    """A component, and what comes of leaving it out of an otherwise whole state.
+def conclude(findings: Sequence[AuditFinding]) -> Figures:
+    """Draw the conclusion of one driver's findings.
 
-    Attributes:
-        field: The engine's name of it.
-        points: Where the future differs without it, into whatever it is restored.
-        itself: Where it differs in the run itself, which nobody has written into.
-        gap: The worst of it.
-    """
-
-    field: str
-    points: tuple[str, ...]
-    itself: tuple[str, ...]
-    gap: FutureGap
-
-
-@dataclass(frozen=True)
-class Conclusion:
-    """What the findings say of the state.
-
-    Attributes:
+    Returns:
         suffice: Candidates whose future was exact at every save point, whatever was restored.
         fail: The others, and the largest gap of each.
         agree: Candidates whose restores have one future, be it that of the run or not.
-        missing: Components without which something differs, and what.
+        missing: Components without which something differs: the engine's name of it; at which
+            points, into whatever it is restored, and at which in the run itself, which nobody has
+            written into; and the worst gap of it.
         idle: Components without which nothing differs.
         smallest: Whether those of `missing` alone suffice; None where that was not tried.
         forgotten: By way to save, what it does not bring back.
         touching: By save point, how far off all that can be written is in a fresh one, as
             it stands and with contacts switched off.
+        in_contact: Where nearly all that is missing acts through contacts, and nothing else.
         not_read_back: Candidates that do not read back as they were saved, before any step,
             and where.
     """
-
-    suffice: tuple[str, ...]
-    fail: dict[str, FutureGap]
-    agree: tuple[str, ...]
-    missing: tuple[Missing, ...]
-    idle: tuple[str, ...]
-    smallest: bool | None
-    forgotten: dict[str, tuple[str, ...]]
-    touching: dict[str, tuple[FutureGap, FutureGap]]
-    not_read_back: dict[str, tuple[str, ...]]
-
-    @property
-    def in_contact(self) -> tuple[str, ...]:
-        """Where nearly all that is missing acts through contacts, and nothing else."""
-        return tuple(
-            point
-            for point, (standing, off) in self.touching.items()
-            if not standing.exact and off.size <= _NEARLY * standing.size
-        )
-
-
-def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
-    """Draw the conclusion of one driver's findings."""
 
     def by_case(experiment: str, among: bool = False) -> dict[str, list[AuditFinding]]:
         return grouped(
@@ -89,7 +51,7 @@ def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
     tried, among, left_out = by_case(RESTORE), by_case(RESTORE, among=True), by_case(WITHOUT)
     alone = tried.pop(ONLY, None)
     missing = [
-        Missing(
+        Figures(
             field=name,
             points=_differing(of_name),
             itself=_differing(finding for finding in of_name if finding.into == ITSELF),
@@ -100,7 +62,10 @@ def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
     forgets = [f for f in findings if f.experiment == FORGETS and f.into != NOT_RESTORED]
     restores = {(f.case, f.into, f.point): f.gap for f in findings if f.experiment == RESTORE}
     without_contacts = [finding for finding in findings if finding.experiment == NO_CONTACTS]
-    return Conclusion(
+    touching = {
+        off.point: (restores[off.case, off.into, off.point], off.gap) for off in without_contacts
+    }
+    return Figures(
         suffice=tuple(case for case in tried if not _differing(tried[case])),
         fail={case: _worst(tried[case]) for case in tried if _differing(tried[case])},
         agree=tuple(case for case in among if case in tried and not _differing(among[case])),
@@ -111,10 +76,12 @@ def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
             way: tuple(f.case for f in forgets if f.into == way and not f.gap.exact)
             for way in dict.fromkeys(finding.into for finding in forgets)
         },
-        touching={
-            off.point: (restores[off.case, off.into, off.point], off.gap)
-            for off in without_contacts
-        },
+        touching=touching,
+        in_contact=tuple(
+            point
+            for point, (standing, off) in touching.items()
+            if not standing.exact and off.size <= _NEARLY * standing.size
+        ),
         not_read_back={
             case: points
             for case, of_case in tried.items()

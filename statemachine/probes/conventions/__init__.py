@@ -9,12 +9,12 @@ the adapters that keep our contract. An engine whose room measures nothing is no
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 from ...engines import room, room_names
 from ...engines.measured import Absent, Measurement
 from ...errors import check_name
 from ...installed import ENGINES, engine_version, require
+from ...page import Figures
 from . import frames, memory, motion
 from .answers import NO_ANSWER, UNDECIDED, Answers, Convention, EngineAnswer, EngineQuestion
 
@@ -22,9 +22,7 @@ __all__ = [
     "NO_ANSWER",
     "QUESTIONS",
     "UNDECIDED",
-    "Answered",
     "Answers",
-    "Conventions",
     "EngineAnswer",
     "EngineQuestion",
     "ask",
@@ -51,23 +49,6 @@ QUESTIONS: dict[str, Convention] = {
     "save": memory.save,
     "future": memory.future,
 }
-
-
-@dataclass(frozen=True)
-class Answered:
-    """A question and what was found, by engine; None of one that was not asked."""
-
-    name: str
-    question: EngineQuestion
-    findings: dict[str, Answers | None]
-
-
-@dataclass(frozen=True)
-class Conventions:
-    """All that was asked, and of which versions."""
-
-    versions: dict[str, str]
-    questions: tuple[Answered, ...]
 
 
 def ask(question: str, engine: str) -> Answers | None:
@@ -101,13 +82,18 @@ def probe(
     engines: Sequence[str],
     questions: Iterable[str] = QUESTIONS,
     progress: Callable[[float], None] = lambda _fraction: None,
-) -> Conventions:
+) -> Figures:
     """Ask each engine each question.
 
     Args:
         engines: Keys of `installed.ENGINES`.
         questions: Some of `QUESTIONS`.
         progress: Told the fraction that is done.
+
+    Returns:
+        versions: That were asked.
+        questions: Of each its name, its words, and what was found, by engine; None of one that was
+            not asked.
 
     Raises:
         MissingEngineError: An engine is not installed here.
@@ -119,10 +105,11 @@ def probe(
     for done, (name, engine) in enumerate(pairs):
         progress(done / len(pairs))
         asked[name][engine] = ask(name, engine)
-    return Conventions(
-        versions(engines),
-        tuple(
-            Answered(name, QUESTIONS[name].question, findings) for name, findings in asked.items()
+    return Figures(
+        versions=versions(engines),
+        questions=tuple(
+            Figures(name=name, question=QUESTIONS[name].question, findings=findings)
+            for name, findings in asked.items()
         ),
     )
 

@@ -3,42 +3,29 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...drawing import Drawing, Part, lathe
 from ...interface import Array
+from ...page import Figures
 from ...rotations import matrix_from_quat
 from ...runs import Trace
 
 _GREY = (0.6, 0.6, 0.6, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """Triangles of all parts of a drawing, in the frames of their bodies.
-
-    Attributes:
-        vertices: (v, 3) [m].
-        faces: (f, 3) numbers of vertices.
-        parts: (body, first index, count of indices, red, green, blue) of each part.
-        simplified: How many triangles there were before, if they were too many; else 0.
-    """
-
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.int64]
-    parts: Sequence[tuple[float, ...]]
-    simplified: int
-
-
-def mesh_of(drawing: Drawing, most: int = 24_000) -> Mesh:
+def mesh_of(drawing: Drawing, most: int = 24_000) -> Figures:
     """All parts of a drawing but endless planes, with at most so many triangles.
 
     Too many triangles are made fewer by snapping points to a grid, as fine as will do.
+
+    Returns:
+        vertices: (v, 3) [m], in the frames of their bodies.
+        faces: (f, 3) numbers of vertices.
+        parts: (body, first index, count of indices, red, green, blue) of each part.
+        simplified: How many triangles there were before, if they were too many; else 0.
     """
     parts = [part for part in drawing.parts if not part.endless]
     before = sum(len(part.faces) for part in parts)
@@ -55,11 +42,11 @@ def mesh_of(drawing: Drawing, most: int = 24_000) -> Mesh:
         faces.append(triangles + corner)
         placed.append((part.body, index, triangles.size, *(round(c, 3) for c in part.rgba[:3])))
         corner, index = corner + len(points), index + triangles.size
-    return Mesh(
-        np.concatenate(vertices).astype(np.float32),
-        np.concatenate(faces).astype(np.int64),
-        placed,
-        before if before > most else 0,
+    return Figures(
+        vertices=np.concatenate(vertices).astype(np.float32),
+        faces=np.concatenate(faces).astype(np.int64),
+        parts=placed,
+        simplified=before if before > most else 0,
     )
 
 
@@ -128,7 +115,7 @@ def quantised(values: Any, low: Any, span: Any) -> Any:
     return np.round(np.clip(scaled, 0.0, 1.0) * 65535)
 
 
-def mesh_as_data(mesh: Mesh) -> dict[str, Any]:
+def mesh_as_data(mesh: Figures) -> dict[str, Any]:
     """A mesh as JSON."""
     points = mesh.vertices.astype(np.float64) if len(mesh.vertices) else np.zeros((1, 3))
     low, span = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-9)

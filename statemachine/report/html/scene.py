@@ -16,7 +16,7 @@ from ...interface import Array, Ints
 from ...measures import common_moments
 from ...runs import Trace
 from .. import template
-from ..finding import long_labels
+from ..finding import long_labels, traces_of
 from ..over_time import BothRuns
 from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised, unit_quat
 
@@ -85,7 +85,7 @@ def scene_of(
         left_out: How many compared moments are not.
         start: The moment that the page opens at, among them.
     """
-    traces = runs.one, runs.two
+    traces, site = traces_of(runs.comparison), runs.comparison.tip
     if any("xpos" not in trace or "xquat" not in trace for trace in traces):
         return None, ["The traces tell no poses of the bodies: there is nothing to draw."], 0.0
     labels = long_labels(runs.comparison)
@@ -111,7 +111,7 @@ def scene_of(
         for drawing, pos, trace, place in zip(drawings, poses, traces, places, strict=True)
     ]
     camera = camera_for(motions, _ASPECT, _NEAR * extent)
-    tips = _tips(traces, places, runs.site)
+    tips = _tips(traces, places, site)
     few = max(2, _CONTACTS // len(times))
     contacts = [
         _contacts(trace, rows, few) for trace, (rows, _) in zip(traces, places, strict=True)
@@ -124,7 +124,7 @@ def scene_of(
             "quat": packed(np.round(motion.xquat * 32767), "i2"),
             "tip": packed(tips[k], "f4") if tips else "",
             "contacts": contacts[k][0],
-            **_way(trace, runs.site, times),
+            **_way(trace, site, times),
         }
         for k, (trace, motion) in enumerate(zip(traces, motions, strict=True))
     ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...interface import Ints
 from ...measures.text import figure, on, reading, short_time
-from ..finding import long_labels, short_labels
+from ..finding import long_labels, short_labels, traces_of
 from ..over_time import BothRuns, QuantityChart, spans
 from ..terminal import non_breaking
 from .geometry import packed
@@ -36,11 +36,11 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> tuple[Html, dict[str, Any],
         The scene, the slider and the lanes under it; the data for the script; and what a reader
         should know of the picture, in sentences.
     """
-    until = runs.comparison.until
+    until, site = runs.comparison.until, runs.comparison.tip
     # Of these moments the page tells: they must be among those that can be shown.
     agreements = runs.comparison.agreements
     moments = {t for a in agreements for t in (a.at, a.since) if t is not None}
-    times, left_out = moments_of(runs.one, runs.two, sorted(moments))
+    times, left_out = moments_of(*traces_of(runs.comparison), sorted(moments))
     start = int(np.argmin(np.abs(times - runs.start)))
     scene, notes, strongest = scene_of(runs, looks, times, left_out, start)
     compared = runs.charts[0].curve.time if runs.charts else times
@@ -63,7 +63,7 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> tuple[Html, dict[str, Any],
         "short_two": short_two,
         "on_one": non_breaking(f"{until:g} s {on(one)}"),
         "on_two": on(two),
-        "tip": _TOOL if runs.site == "gripperframe" else runs.site or "a site",
+        "tip": _TOOL if site == "gripperframe" else site or "a site",
         "now": short_time(now),
         "arrows": non_breaking(ARROWS.format(force=figure(strongest))) if strongest else "",
         "last": len(times) - 1,
