@@ -41,6 +41,7 @@ from statemachine.installed import engine_version
 from statemachine.interface import Behaviour
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import take
+from statemachine.processes import resident_memory
 from statemachine.worlds import make_worlds, step
 
 from .conftest import (
@@ -191,6 +192,19 @@ def test_two_that_add_it_at_once(adding: Callable[[str], Any]) -> None:
     assert [process.returncode for process in both] == [0, 0], ends
     assert [place.name for place in releases.folder().iterdir()] == [OLD]
     assert [release.name for release in releases.releases()] == [OLD]
+
+
+def test_the_index_is_asked_by_uv_where_there_is_no_pip(
+    nothing: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    versions = f"9.0.0, {engine_version('mujoco')}, 3.10.0, 3.9.0, 3.8.0"
+    (nothing / "uv").write_text(
+        f"#!/bin/sh\ntest $6 = index && echo 'Available versions: {versions}'"
+    )
+    (nothing / "uv").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{nothing}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setattr(releases, "find_spec", lambda _name: None)
+    assert releases.published("3.9.0") == ["mujoco==3.9.0", "mujoco==3.10.0", "mujoco"]
 
 
 @pytest.mark.usefixtures("nothing")
@@ -540,6 +554,8 @@ class TestReleases:
                     data.close()
             sizes.append(int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * 4096)
         assert sizes[2] < sizes[0] + 20e6  # forgotten by nobody, 40 took 100 MB
+        own = int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+        assert resident_memory() > own + sizes[2] / 2  # what is there is counted, too
 
     def test_worlds_of_it(self) -> None:
         model = sm.load("so101", backend=OLD)

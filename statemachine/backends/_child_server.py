@@ -55,7 +55,7 @@ def receive(pipe, patience):
 
     A process that sleeps takes longer to wake than most calls take. So a message is looked for,
     and waited for asleep where it does not come soon, or somebody else wants the processor: then
-    a look takes long.
+    a look takes long. The processor is not yielded: where many want it, it is gone for long.
 
     Args:
         pipe: Where it comes. On Windows no pipe can be looked at.
@@ -64,7 +64,6 @@ def receive(pipe, patience):
     began = now = time.perf_counter()
     calm, until = True, began + max(patience, SPIN)
     while os.name != "nt" and calm and now < until and not select.select([pipe], [], [], 0)[0]:
-        os.sched_yield()
         before, now = now, time.perf_counter()
         calm = now - before < SPIN
     said, packed = pickle.load(pipe)

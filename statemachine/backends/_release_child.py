@@ -134,8 +134,8 @@ def load(file, text, names):
     """Compile a file; its flags, and the numeric fields that this release has of those names."""
     if hasattr(mujoco, "set_mju_user_warning"):  # else it writes a file where it runs
         mujoco.set_mju_user_warning(lambda text: None)
-    kind = mujoco.MjModel
-    model = kind.from_xml_string(text) if text else kind.from_xml_path(file)
+    read = mujoco.MjModel.from_xml_string if text else mujoco.MjModel.from_xml_path
+    model = read(text or file)
     if hasattr(mujoco.mjtDisableBit, "mjDSBL_AUTORESET"):
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     fields = {}

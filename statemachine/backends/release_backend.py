@@ -64,14 +64,14 @@ def load(
     """
     python, version = str(python_of(release)), version_of(release)
     if engine_of(release) == DEFAULT:
-        there = ServedEngine(release, python, child.__file__, f"MuJoCo {version}")
-        return served(there)(path, defaults)
+        engine = ServedEngine(release, python, child.__file__, f"MuJoCo {version}")
+        return served(engine)(path, defaults)
     require("pybullet")
     from .pybullet_backend import load as load_bullet
 
-    file = Path(__file__).with_name("_bullet_release_child.py")
-    there = ServedEngine(release, python, str(file), f"PyBullet {version}")
-    return load_bullet(path, defaults, there=there)
+    file = str(Path(__file__).with_name("_bullet_release_child.py"))
+    engine = ServedEngine(release, python, file, f"PyBullet {version}")
+    return load_bullet(path, defaults, there=engine)
 
 
 def served(
@@ -215,9 +215,11 @@ def _edits(reading: FileReading, raw: mujoco.MjModel) -> dict[str, Any]:
         if np.array_equal(_field(raw, name), _field(base, name)):
             continue
         if name not in reading.shared:
-            reason = "it has no such field, or lays it out in a way of its own"
-            about = SimpleNamespace(backend=reading.engine.name, capabilities=None)
-            raise unsupported(about, name, reason)
+            raise unsupported(
+                SimpleNamespace(backend=reading.engine.name, capabilities=None),
+                name,
+                "it has no such field, or lays it out in a way of its own",
+            )
         kind = name.removeprefix("opt.").removesuffix("flags")
         edits[name] = child.flags_of(raw, kind) if name in _FLAGS else np.array(_field(raw, name))
     return edits

@@ -115,7 +115,7 @@ def _world_bytes(model: Model, most: int) -> float | None:
     size = None
     for n in (1, most):  # the first pays for what is loaded once
         before = resident_memory()
-        with make_worlds(model, n) as worlds:
+        with make_worlds(model, n, workers=1) as worlds:  # all of them in this process
             step(worlds)
             size = _share(before, n)
     return size

@@ -6,9 +6,11 @@ import os
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from ..errors import BadInputError
 
@@ -17,6 +19,8 @@ if sys.platform != "win32":
 
 # The environment of several processes that run at once, each on one processor.
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+# Processes that live and answer this one.
+SERVERS = weakref.WeakSet[Any]()
 _WATCH = 1.0  # seconds between two looks at whether the parent is still there
 
 
@@ -116,9 +120,10 @@ def _left_to_groups() -> Iterator[int]:
 
 
 def resident_memory() -> int:
-    """Bytes of memory that this process holds; 0 where it is not told."""
+    """Bytes of memory that this process and its `SERVERS` hold; 0 where it is not told."""
+    pids = ["self", *(server.pid for server in SERVERS)]
     try:
-        with open("/proc/self/statm", encoding="ascii") as file:
-            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        pages = [int(Path(f"/proc/{pid}/statm").read_text().split()[1]) for pid in pids]
+        return sum(pages) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, AttributeError):  # not Linux
         return 0

@@ -8,12 +8,12 @@ import signal
 import subprocess
 import tempfile
 import time
-import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from io import BufferedReader, BufferedWriter
 from typing import Any, cast
 
+from . import SERVERS
 from .sandbox import signal_name
 
 _SPIN = 50e-6  # [s] in which most calls are answered: to wake up takes longer
@@ -49,7 +49,7 @@ class PipedChild:
         self.to = cast("BufferedWriter", self._process.stdin)
         self.out = cast("BufferedReader", self._process.stdout)
         self.pid = self._process.pid
-        _LIVING.add(self)
+        SERVERS.add(self)
 
     def how_it_ended(self, seconds: float = _ENDS_IN) -> str:
         """In a few words, of one that has ended, or does so in this time; "" of one that lives."""
@@ -108,11 +108,8 @@ def last_line(said: bytes, code: int) -> str:
     return lines[-1] if lines else f"exit code {code}"
 
 
-_LIVING: weakref.WeakSet[PipedChild] = weakref.WeakSet()
-
-
 def _let_go() -> None:
-    for process in _LIVING:
+    for process in SERVERS:
         for pipe in (process.to, process.out):  # not `leave`: another thread may hold their locks
             pipe.raw.close()  # pyright: ignore[reportAttributeAccessIssue]
 
