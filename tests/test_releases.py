@@ -235,6 +235,10 @@ REMEMBERED = mjcf(
     "<keyframe><key qpos='.3 0 .1 1 0 0 0 .2' act='.7' mpos='0 .2 1'/></keyframe>",
     "<option solver='PGS' tolerance='1e-5'/>",
 )
+CLOTH = (
+    "<flexcomp name='f' type='grid' count='3 3 1' spacing='.1 .1 .1' mass='.5' dim='2'>"
+    "<edge equality='true'/></flexcomp>"
+)
 GROUND = mjcf(
     "<geom type='hfield' hfield='h'/><geom type='mesh' mesh='m' pos='9 9 9'/>"
     "<body pos='0 0 1'><freejoint/><geom size='.1' pos='.03 0 0'/></body>",
@@ -281,6 +285,7 @@ class TestReleases:
         [
             (REMEMBERED, pushed, ("mujoco", SAME)),
             (REMEMBERED, partial(pushed, key=0), ("mujoco", SAME)),
+            (mjcf(CLOTH), pushed, ("mujoco", SAME)),
             (GROUND, on_raised_ground, ("mujoco", SAME)),
             (
                 mjcf("<body pos='0 0 3'><freejoint/><geom size='.1' pos='.03 .02 0'/></body>"),

@@ -160,6 +160,7 @@ def edit(model, edits, flags):
         other = copy.copy(model)
         mujoco.mj_setConst(other, mujoco.MjData(other))
         model.stat.meaninertia = other.stat.meaninertia
+        model.flexedge_invweight0[:] = other.flexedge_invweight0
     for name, wanted in flags.items():
         holder, field = held(model, name)
         kinds = KINDS[field[: -len("flags")]].__members__

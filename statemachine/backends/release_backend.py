@@ -36,7 +36,7 @@ from .mujoco_backend import load as load_installed
 _OWN = (
     *("bvh", "cam", "hfield_path", "light", "mat_", "mesh_path", "name", "sensor", "skin", "tex"),
     *("paths", "efm", "B_", "D_", "M_", "mapM", "mapD", "flg_", "ten_J", "dof_length"),
-    *("actuator_history", "sensor_history"),
+    *("actuator_history", "sensor_history", "flexedge_invweight0"),
 )
 # What is large and laid out in each release's own way: nobody sends it to another.
 _UNSENT = ("flex", "mesh", "oct")
