@@ -239,13 +239,15 @@ def reading_emulated(name: str, rounds: int, target: list[float]) -> list[Ratio]
     return interleaved(steps(lambda _: None), others, rounds)
 
 
-def pooled(name: str, rounds: int) -> list[Ratio]:
-    """Worlds on PyBullet, in processes, against as many Data stepped one after the other."""
-    model, count, steps = sm.load(name, backend="pybullet"), 8, _LONG // 20
+def pooled(name: str, rounds: int, count: int, steps: int) -> list[Ratio]:
+    """Worlds on PyBullet against as many Data stepped one after the other."""
+    model = sm.load(name, backend="pybullet")
     singles = [sm.make_data(model) for _ in range(count)]
     pools = {
-        f"PyBullet, {count} worlds, {words}": make_worlds(model, count, workers=workers)
-        for workers, words in ((1, "a process"), (2, "two processes"))
+        f"PyBullet, {count} worlds, {steps} steps, {words}": make_worlds(
+            model, count, workers=workers, derived=()
+        )
+        for workers, words in ((1, "here"), (2, "two processes"))
     }
 
     def serial() -> None:
@@ -483,7 +485,11 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None, str]] =
     (partial(emulation, target=_AIR), "so101/scene", 1.8, ""),
     (partial(reading_emulated, target=_FLOOR), "so101/scene", 1.5, "tip"),
     (partial(reading_emulated, target=_AIR), "so101/scene", 1.5, "tip"),
-    (pooled, "so101/scene", None, ""),
+    *(
+        (partial(pooled, count=count, steps=steps), "so101/scene", None, "")
+        for count in (2, 8)
+        for steps in (1, 10, 100)
+    ),
     (freshness, "so101", 1.02, "asked before"),
     (reading, "so101", None, ""),
     (recording, "so101", 1.10, ""),
