@@ -31,7 +31,7 @@ from statemachine.robots import (
     gaps,
     many,
 )
-from statemachine.robots import table as tables
+from statemachine.robots.records import read_table, write_table
 from statemachine.runs import record_scenario
 from statemachine.runs.provenance import model_files
 from statemachine.runs.scenarios import scenario
@@ -306,8 +306,8 @@ ROW = ExaminedModel(
 def test_a_table_is_read_as_it_was_written(tmp_path: Path, suffix: str) -> None:
     bare = ExaminedModel("=c.xml", "1" * 64, "with", ended="it crashed")
     target = tmp_path / f"table{suffix}"
-    tables.write(target, [ROW, bare])
-    read = tables.read(target)
+    write_table(target, [ROW, bare])
+    read = read_table(target)
     assert read[ROW.file, ROW.sha256, "with"] == ROW
     assert list(read.values())[1] == bare
     if suffix == ".csv":
@@ -317,7 +317,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path: Path, suffix: str) -> None:
     else:
         assert [row["file"] for row in json.loads(target.read_text())] == [ROW.file, "=c.xml"]
     target.write_text("a,b\n1,2\n" if suffix == ".csv" else '{"a": 1}')
-    refused((BadInputError, "is no table of models", lambda: tables.read(target)))
+    refused((BadInputError, "is no table of models", lambda: read_table(target)))
 
 
 def test_what_is_wrong() -> None:
@@ -390,7 +390,7 @@ def test_an_interrupt_leaves_a_table_and_no_process(
         env={**os.environ, "PYTHONPATH": paths}, text=True, stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )  # fmt: skip
-    assert soon(lambda: table.exists() and len(tables.read(table)) == 6, 120)
+    assert soon(lambda: table.exists() and len(read_table(table)) == 6, 120)
     process.send_signal(number)
     _, err = process.communicate(timeout=60)
     if number is signal.SIGINT:
@@ -398,7 +398,7 @@ def test_an_interrupt_leaves_a_table_and_no_process(
         assert "Type the same to go on" in err
     else:
         assert process.returncode == -signal.SIGTERM
-    assert len(tables.read(table)) == 6
+    assert len(read_table(table)) == 6
     for pid in processes_with("robots.examine"):
         with suppress(OSError):
             assert str(sabotage).encode() not in Path(f"/proc/{pid}/environ").read_bytes()

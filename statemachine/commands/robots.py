@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     from ..report import robots as words
     from ..report.progress import progress
     from ..robots import examine_all, find
-    from ..robots.table import check_suffix
+    from ..robots.records import check_suffix
     from ..runs.whole import check_place
 
     if options.out is not None:

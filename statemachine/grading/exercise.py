@@ -185,7 +185,9 @@ class ExerciseJudge(ExitStack):
         """All functions at once, so that the slowest decides how long it takes."""
         stop, recordings = threading.Event(), dict[str, Any]()
         work: dict[str, Callable[[], Any]] = {
-            name: partial(_recorded, copy, name, self.backend, self.limits, folder / name, stop)
+            name: partial(
+                record, copy.path, copy.folder, name, self.backend, self.limits, folder / name, stop
+            )
             for name in JUDGES
         }
         # Meanwhile what is right is worked out here, where no code of the student's runs.
@@ -240,7 +242,7 @@ def _without_answers(copy: _Copy, name: str, recording: FunctionRecording) -> Ju
         text = f"what its process recorded is no record of a run ({recording.broken})"
     elif not recording.began:
         text = (
-            f"nothing could be judged: the judge itself {outcome.how}, twice. Your code was "
+            f"nothing could be judged: the judge itself {outcome.how}. Your code was "
             "not run: this machine may be busy, or out of memory; try again"
         )
     else:
@@ -314,13 +316,3 @@ def _copied(path: Path, own: Mapping[str, Path], folder: Path) -> _Copy:
     name = next(name for name, file in own.items() if file.resolve() == path)
     folder = folder.resolve()
     return _Copy(folder / name, folder, path.parents[name.count("/")])
-
-
-def _recorded(
-    copy: _Copy, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
-) -> FunctionRecording:
-    """A recording; if the process did not get ready, a second one."""
-    first = record(copy.path, copy.folder, name, backend, limits, folder / "1", stop)
-    if first.began or first.refusal or first.broken or stop.is_set():
-        return first
-    return record(copy.path, copy.folder, name, backend, limits, folder / "2", stop)

@@ -24,9 +24,8 @@ from ..processes import ALONE, checked_jobs, fresh_python, sandbox
 from ..processes.parallel import in_parallel, unwinding
 from ..runs.drive import Progress, silent
 from ..runs.provenance import model_digest, model_files
-from . import table as tables
 from .gaps import STEPS
-from .records import ExaminedModel, Survey
+from .records import ExaminedModel, Survey, read_table, write_table
 
 _ROOTS = (DEFAULT, "robot")  # of MJCF, whose root is called after its engine, and of URDF
 _BINARY = ".mjb"
@@ -168,7 +167,7 @@ def examine_all(
     )
     require(DEFAULT)
     made_with = _made_with(quick, seed)
-    before = tables.read(table) if table is not None and table.exists() else {}
+    before = read_table(table) if table is not None and table.exists() else {}
     rows: dict[str, ExaminedModel] = {}
     work: dict[str, Callable[[], ExaminedModel | None]] = {}
     stop = threading.Event()
@@ -189,7 +188,7 @@ def examine_all(
             return
         rows[name] = row
         if table is not None:
-            tables.write(table, in_order())
+            write_table(table, in_order())
 
     with unwinding():
         in_parallel(
@@ -197,7 +196,7 @@ def examine_all(
         )
     done = in_order()
     if table is not None:
-        tables.write(table, done)
+        write_table(table, done)
     return Survey(
         DEFAULT,
         tuple(row for row in done if row.is_model),

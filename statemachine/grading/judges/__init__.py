@@ -12,13 +12,14 @@ A judge is a module with
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..answers import Answer
+from ...interface import Array, Model
+from ..answers import Answer, kind
 from ..calls import FaultError
 from ..worlds import ExerciseWorld
 
@@ -84,3 +85,86 @@ def judged(
         return None
     also = f"; right in {len(worlds) - 1} other case{'s' * (len(worlds) > 2)}"
     return Judgement(function, True, True, (passed[0] + also,))
+
+
+T = TypeVar("T")
+LIFT, TIP = "shoulder_lift", "gripperframe"
+
+
+def address(model: Model, joint: str = LIFT) -> int:
+    """Where a joint begins in qpos."""
+    return int(model.jnt_qposadr[model.joint_id(joint)])
+
+
+def parts(value: Any, number: int, what: str) -> list[Any]:
+    """A returned value as so many parts.
+
+    Raises:
+        FaultError: It has another number of them, or none.
+    """
+    several = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.shape)
+    items = list(value) if several else []
+    if not several or len(items) != number:
+        raise FaultError(f"it returns {kind(value)}, where {what} should be")
+    return items
+
+
+def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
+    """A returned value as an array of a shape.
+
+    Raises:
+        FaultError: It is not one.
+    """
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise FaultError(f"{what}: numbers are asked for, and it returns {kind(value)}") from None
+    if array.shape != shape:
+        raise FaultError(
+            f"{what}: an array of shape {shape} is asked for, and it returns one of {array.shape}"
+        )
+    return array
+
+
+def short_float(value: Any) -> str:
+    """The name of the floating-point type in a value that has fewer digits than a float."""
+    if isinstance(value, (tuple, list)):
+        return next(filter(None, map(short_float, value)), "")
+    dtype = getattr(value, "dtype", None)
+    return str(dtype) if dtype is not None and dtype.kind == "f" and dtype.itemsize < 8 else ""
+
+
+def grain(values: Array) -> float:
+    """Half of the last decimal, if all values are rounded to two to eight; otherwise 0."""
+    with np.errstate(all="ignore"):
+        for decimals in range(2, 9):
+            if near(values, np.round(values, decimals), 1e-14 * (1 + abs(values).max())):
+                return 0.5 * 10.0**-decimals
+    return 0.0
+
+
+def near(left: Array, right: Array, tolerance: float) -> bool:
+    """Whether no number is farther apart; NaN is far from everything."""
+    return left.shape == right.shape and bool((abs(left - right) <= tolerance).all())
+
+
+def same_bits(left: Array, right: Array) -> bool:
+    """Whether all numbers are equal."""
+    return left.shape == right.shape and bool((left == right).all())
+
+
+def owner(model: Model, place: int) -> str:
+    """The joint that a place in qpos belongs to."""
+    starts = model.jnt_qposadr.tolist()
+    return model.joint_names[max(k for k, start in enumerate(starts) if start <= place)]
+
+
+def listed(values: Array, digits: int = 4) -> str:
+    """Numbers in brackets."""
+    return "[" + " ".join(f"{v + 0.0:.{digits}g}" for v in values.tolist()) + "]"
+
+
+def told_apart(left: T, right: T, text: Callable[[T, int], str]) -> str:
+    """'x where y' with as many digits as it takes to tell them apart, four at least."""
+    digits = next((d for d in range(4, 17) if text(left, d) != text(right, d)), 17)
+    return f"{text(left, digits)} where {text(right, digits)}"

@@ -14,18 +14,7 @@ from ..answers import Answer
 from ..calls import first_of, reason
 from ..watch import Inputs
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from ._values import (
-    LIFT,
-    TIP,
-    address,
-    grain,
-    near,
-    numbers,
-    owner,
-    parts,
-    short_float,
-    told_apart,
-)
+from . import LIFT, TIP, address, grain, near, numbers, owner, parts, short_float, told_apart
 
 SCENE = "so101/scene"
 ANGLE = 0.8  # [rad], what is written

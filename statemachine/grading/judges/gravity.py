@@ -12,17 +12,7 @@ from ...measures.text import count
 from ..answers import Answer
 from ..calls import reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from ._values import (
-    LIFT,
-    address,
-    grain,
-    listed,
-    near,
-    numbers,
-    owner,
-    parts,
-    told_apart,
-)
+from . import LIFT, address, grain, listed, near, numbers, owner, parts, told_apart
 
 SCENE = "so101/scene"
 TOLERANCE = 0.006  # [degrees]: two decimals will do

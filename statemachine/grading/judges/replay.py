@@ -12,16 +12,7 @@ from ..answers import Answer, kind
 from ..calls import first_of, reason
 from ..watch import EngineRun, Nudge
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from ._values import (
-    address,
-    grain,
-    listed,
-    near,
-    numbers,
-    parts,
-    same_bits,
-    short_float,
-)
+from . import address, grain, listed, near, numbers, parts, same_bits, short_float
 
 SCENE = "so101/scene_box"
 _CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)

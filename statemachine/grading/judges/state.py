@@ -13,7 +13,7 @@ from ...measures.text import count
 from ..answers import Answer, kind
 from ..calls import FaultError, first_of, reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from ._values import parts
+from . import parts
 
 SCENE = "so101/scene_box"
 
