@@ -70,13 +70,11 @@ def free_memory() -> int | None:
     What Linux calls available, what is left to the control groups (containers) of this process,
     and what its own limit of addresses (`ulimit -v`) leaves it.
     """
-    if sys.platform == "win32":
-        return None
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             lines = dict(line.split(":", 1) for line in file)
         free = int(lines["MemAvailable"].split()[0]) << 10
-    except (OSError, KeyError):  # nor on macOS
+    except (OSError, KeyError):  # not Linux
         return None
     return max(min([free, *_left_to_groups(), *_left_of_addresses()]), 0)
 

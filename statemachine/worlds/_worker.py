@@ -67,8 +67,6 @@ class SharedBlock:
         inherited: What `subprocess.Popen` is to be told.
     """
 
-    inherited: dict[str, Any]
-
     def __init__(self, size: int) -> None:
         self.size = size
         if sys.platform == "win32":
@@ -119,7 +117,7 @@ class WorldsProcess(PipedChild):
             block: The memory that it shares with this process.
             answers: Where in that the answers of all processes are.
         """
-        self.worlds = worlds
+        self.worlds, self._asleep = worlds, 0
         self._block, self._place = block, answers + number * ANSWER_MOST
         command, environment = fresh_python(
             f"{__package__}._worker", block.handle, str(block.size), str(number)
@@ -147,7 +145,7 @@ class WorldsProcess(PipedChild):
                 poll.register(self.out.fileno(), select.POLLIN)
                 if not poll.poll(max(0.0, 1000 * (deadline - time.monotonic()))):
                     raise TimeoutError
-            await_message(self.out.fileno())
+            self._asleep = await_message(self.out.fileno(), self._asleep)
             frame = os.read(self.out.fileno(), ANSWER.size)
             if len(frame) < ANSWER.size:
                 raise EOFError
@@ -252,14 +250,15 @@ def main(handle: str, size: str, number: str) -> None:
     out, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)  # engines greet there, and warn
     holder = _Apart(open_block(handle, int(size)), int(number))
+    asleep = 0
     while True:
-        await_message(0)
+        asleep = await_message(0, asleep)
         frame = os.read(0, COMMAND.size)
         if len(frame) < COMMAND.size:
             return
         command = COMMAND.unpack(frame)
-        stop = VERBS[command[1]] == "stop"
-        os.write(out, ANSWER.pack(command[0], 0 if stop else holder.obey(command)))
+        answered = 0 if VERBS[command[1]] == "stop" else holder.obey(command)
+        os.write(out, ANSWER.pack(command[0], answered))
         if VERBS[command[1]] == "fill":
             os.dup2(nothing, 2)  # until now somebody read what was said there
 

@@ -262,8 +262,7 @@ class PoolWorlds(Worlds):
                 ids = ids[~np.isin(ids, list(self._errors))]
             if len(ids):
                 self._ask(ids, "derive", 1 << self.derived.index(name))
-        vars(self)[name] = self._derived_arrays[name]
-        return self._derived_arrays[name]
+        return vars(self).setdefault(name, self._derived_arrays[name])
 
     def _step(self, ids: Ints, nstep: int, forward: bool) -> Mapping[int, Exception]:
         return self._change(ids, "step_and_forward" if forward else "step", nstep)
@@ -293,8 +292,8 @@ class PoolWorlds(Worlds):
         return [ids[start : start + most] for start in range(0, len(ids), most)]
 
     def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
-        own = self._layouts[world % self.workers]
-        return own[world // self.workers if self._options else 0]
+        place = world // self.workers if self._options else 0
+        return self._layouts[world % self.workers][place]
 
     def _record(
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None

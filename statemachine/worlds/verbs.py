@@ -90,7 +90,7 @@ def step(
     """
     _admit(worlds)
     nstep = as_count(nstep, "nstep")
-    _run(worlds, worlds._step, _chosen(worlds, ids), nstep, bool(forward))
+    _run(worlds, worlds._step, _chosen(worlds, ids), nstep, forward)
 
 
 def forward(worlds: Worlds, *, ids: ArrayLike | None = None) -> None:
