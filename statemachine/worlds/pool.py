@@ -115,7 +115,9 @@ class PoolWorlds(Worlds):
                 self._processes.append(process)
             begun = self._begun("start", self._answers, {**job, "layout": layout})
             left = sum(process["left"] for process in begun)
-            check_memory(n, max(process["each"] for process in begun), n - left)
+            # What this process and its children hold grows as the children do.
+            apart = begun[-len(self._processes) :]
+            check_memory(n, max(process["each"] for process in apart), n - left)
             self._layouts = self._begun("fill")
         except BaseException:
             self._close()
