@@ -155,8 +155,7 @@ def test_every_way_has_its_turn_in_every_round() -> None:
 
 
 def test_forward_compares_bits() -> None:
-    found = lesson_result("forward", sm.load("so101"), value=1e-12)
-    assert found.equal == ((1, 2),)
+    assert lesson_result("forward", sm.load("so101"), value=1e-12).equal == ((1, 2),)
 
 
 def test_state_of_every_type_of_joint(tmp_path: Path) -> None:
@@ -199,8 +198,7 @@ class TestCertificate:
         assert (np.ptp(one[1:], axis=0) > 0.5 * (high - low)).all()
 
     def test_its_tolerance_is_what_the_project_promises(self) -> None:
-        found = fingertip.certify(sm.load("so101"), poses=20)
-        assert_has(found, tolerance=1e-12, agrees=True)
+        assert_has(fingertip.certify(sm.load("so101"), poses=20), tolerance=1e-12, agrees=True)
 
     @pytest.mark.parametrize("what", ["position", "rotation"])
     def test_one_bad_pose_among_many_is_enough(

@@ -19,14 +19,14 @@ from statemachine.errors import BadInputError, ModelError, ModelFileError, Unkno
 from statemachine.rotations import matrix_from_quat
 from statemachine.runs.provenance import model_digest
 
-from .conftest import assert_has, opened, refused, written
+from .conftest import assert_has, opened, refused, written_all
 from .small_models import ATTACHED, BODY, EVERY_JOINT, STAND
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
 
 
 def _write(folder: Path, text: str, name: str = "robot.xml") -> Path:
-    return written(folder / name, text)
+    return written_all(folder, {name: text}) / name
 
 
 def _against_mujoco(model: sm.Model, qpos: np.ndarray, site: str) -> float:
@@ -332,8 +332,7 @@ TWO_ARMS = """<attach model="arm" body="base" prefix="left-"/><frame pos="0 .5 0
 def test_an_attached_file_is_read(
     tmp_path: Path, inside: str, beside: str, name: str, order: str
 ) -> None:
-    (tmp_path / "parts").mkdir()
-    part = _write(tmp_path / "parts", ATTACHED.format(order=order), "arm.xml")
+    part = _write(tmp_path, ATTACHED.format(order=order), "parts/arm.xml")
     model = sm.load(_write(tmp_path, STAND.format(inside=inside, beside=beside, name=name)))
     own = sm.Kinematics(model.path)
     assert own.grade == "own reading"
@@ -356,11 +355,10 @@ def test_an_attached_file_is_read(
 def test_an_attachment_that_cannot_be_read_is_refused(
     tmp_path: Path, attach: str, said: str
 ) -> None:
-    (tmp_path / "parts").mkdir()
     text = ATTACHED.format(order="xyz").replace(
         "</worldbody>", "<frame pos='1 0 0'><body name='moved'/></frame></worldbody>"
     )
-    _write(tmp_path / "parts", text, "arm.xml")
+    _write(tmp_path, text, "parts/arm.xml")
     stand = STAND.format(inside=f"<attach {attach} prefix='x'/>", beside="", name="name='arm'")
     refused((ModelError, said, lambda: sm.Kinematics(_write(tmp_path, stand))))
 
@@ -402,23 +400,18 @@ def test_a_place_that_pinocchio_drops_is_said_to_be_kept(tmp_path: Path) -> None
 
 def test_included_files_are_found_as_mujoco_finds_them(tmp_path: Path) -> None:
     """From the main file's folder; where nothing is there, from that of the file itself."""
-    inner = tmp_path / "parts" / "inner"
-    inner.mkdir(parents=True)
-    _write(
-        tmp_path / "parts",
-        "<mujoco><include file='inner/joint.xml'/>{}</mujoco>".format(
-            "<worldbody><include file='inner/body.xml'/></worldbody>"
-        ),
-        "arm.xml",
-    )
-    _write(inner, "<mujoco><default><joint axis='1 2 3'/></default></mujoco>", "joint.xml")
     site = "<site name='s' pos='{}'/>"
     body = f"<x><body name='b' pos='1 0 0'>{BODY}<joint name='j'/>{site}</body></x>"
-    _write(inner, body.format("0 1 0"), "body.xml")
-    main = _write(tmp_path, "<mujoco><include file='parts/arm.xml'/></mujoco>")
+    texts = {
+        "robot.xml": "<mujoco><include file='parts/arm.xml'/></mujoco>",
+        "parts/arm.xml": "<mujoco><include file='inner/joint.xml'/><worldbody>"
+        "<include file='inner/body.xml'/></worldbody></mujoco>",
+        "parts/inner/joint.xml": "<mujoco><default><joint axis='1 2 3'/></default></mujoco>",
+        "parts/inner/body.xml": body.format("0 1 0"),
+    }
+    main = written_all(tmp_path, texts) / "robot.xml"
     assert _poses_agree(sm.load(main), sm.Kinematics(main)) < 1e-12
-    (tmp_path / "inner").mkdir()
-    _write(tmp_path / "inner", body.format("0 0 5"), "body.xml")
+    _write(tmp_path, body.format("0 0 5"), "inner/body.xml")
     again = sm.load(main)
     assert again.site_pos[0].tolist() == [0, 0, 5]
     assert _poses_agree(again, sm.Kinematics(main)) < 1e-12

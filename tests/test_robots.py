@@ -220,20 +220,18 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
         "tendon.xml",
     ]  # fmt: skip
     assert [row.file for row in survey.parts] == ["parts/hand.xml"]
-    good = rows["good.xml"]
-    assert (good.nq, good.nv, good.nu) == (2, 2, 1)
-    mujoco, pybullet = good.backends["mujoco"], good.backends["pybullet"]
-    assert_has(mujoco, equals_engine=True, restores=True)
+    assert_has(rows["good.xml"], nq=2, nv=2, nu=1, faults=())
+    mujoco, pybullet = (rows["good.xml"].backends[name] for name in ("mujoco", "pybullet"))
+    assert_has(mujoco, equals_engine=True, restores=True, scenarios={})  # quick
     assert_has(pybullet, restores=True, equals_engine=None)
     gap = pybullet.without_contacts
     assert gap.moved > 0.1
     assert gap.hinge < 1e-9
     assert gap.slide is None
-    assert not good.faults
-    assert not mujoco.scenarios  # quick
-    assert rows["tendon.xml"].backends["pybullet"].features == ("tendon",)
-    assert "tendon" in rows["tendon.xml"].backends["pybullet"].refusal
-    assert rows["tendon.xml"].backends["mujoco"].equals_engine
+    tendon = rows["tendon.xml"].backends
+    assert_has(tendon["pybullet"], features=("tendon",))
+    assert "tendon" in tendon["pybullet"].refusal
+    assert tendon["mujoco"].equals_engine
     assert "cannot read" in rows["broken.xml"].backends["mujoco"].refusal
     assert rows["arm.urdf"].nv == 1
     assert rows["crash.xml"].ended.startswith("it crashed the process (SIGABRT)")
