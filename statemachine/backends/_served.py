@@ -152,6 +152,7 @@ class ServedWorld(HiddenWorld):
         engine: ServedEngine,
         opened: Callable[[Server], int],
         compiled: Any,
+        timestep: float,
     ) -> None:
         """Open it.
 
@@ -159,10 +160,10 @@ class ServedWorld(HiddenWorld):
             engine: Whose process it is in.
             opened: Loads the model there; its number. All worlds of a Model have the same one.
             compiled: The mjModel, in the terms of the installed release.
+            timestep: Of an engine step [s]: that of the mjModel, when the model was made.
         """
         self.engine, self._engine, self._opened = engine.title, engine, opened
-        self._compiled, self.timestep = compiled, float(compiled.opt.timestep)
-        self.qpos0 = compiled.qpos0
+        self._compiled, self.timestep, self.qpos0 = compiled, timestep, compiled.qpos0
         # Steps of a call that have one command take one exchange.
         self._ahead = not compiled.actuator_delay.any()
         self._ctrl = np.zeros(compiled.nu)

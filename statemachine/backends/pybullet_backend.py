@@ -225,7 +225,8 @@ class PybulletModel(HiddenModel):
         about = facts(raw)
         opener: Callable[[], HiddenWorld] = partial(DrivenWorld, plan, kind, acts)
         if there:
-            opener = partial(ServedWorld, there, partial(sent, pickle.dumps(opener)), raw)
+            load_there = partial(sent, pickle.dumps(opener))
+            opener = partial(ServedWorld, there, load_there, raw, float(raw.opt.timestep))
         super().__init__(
             opener,
             backend=there.name if there else "pybullet",

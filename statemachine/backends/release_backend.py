@@ -242,7 +242,13 @@ class ServedModel(HiddenModel):
         engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner
         edits = _edits(reading, engine.raw)
         super().__init__(
-            partial(ServedWorld, reading.engine, partial(_opened, reading, edits), inner.raw),
+            partial(
+                ServedWorld,
+                reading.engine,
+                partial(_opened, reading, edits),
+                inner.raw,
+                float(inner.raw.opt.timestep),
+            ),
             backend=reading.engine.name,
             engine_version=reading.version,
             raw=inner.raw,

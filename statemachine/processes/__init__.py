@@ -121,7 +121,7 @@ def resident_memory() -> int:
     """Bytes of memory that this process and its `SERVERS` hold; 0 where it is not told."""
     pids = ["self", *(server.pid for server in SERVERS)]
     try:
-        pages = [int(Path(f"/proc/{pid}/statm").read_text().split()[1]) for pid in pids]
+        pages = [int(Path(f"/proc/{pid}/statm").read_text("ascii").split()[1]) for pid in pids]
         return sum(pages) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, AttributeError):  # not Linux
         return 0
