@@ -222,8 +222,7 @@ class ServedWorld(HiddenWorld):
         return self._state[qpos], self._state[qvel]
 
     def memory_at(self, key: int | None) -> Memory:
-        compiled = self._compiled
-        mocap = compiled.body_mocapid >= 0
+        compiled, mocap = self._compiled, self._compiled.body_mocapid >= 0
         start = {"mocap_pos": compiled.body_pos[mocap], "mocap_quat": compiled.body_quat[mocap]}
         if key is not None:
             start = {
@@ -231,8 +230,10 @@ class ServedWorld(HiddenWorld):
                 "mocap_pos": compiled.key_mpos[key],
                 "mocap_quat": compiled.key_mquat[key],
             }
-        zeros = zip(self.memory_layout, super().memory_at(key), strict=True)
-        return tuple(np.ravel(start.get(name, zero)) for (name, _), zero in zeros)
+        return tuple(
+            np.ravel(start.get(name, zeros))
+            for (name, _), zeros in zip(self.memory_layout, super().memory_at(key), strict=True)
+        )
 
     @property
     def memory(self) -> Memory:
