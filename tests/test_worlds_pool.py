@@ -298,6 +298,16 @@ def test_few_worlds_need_no_process_and_more_have_the_same_bits(model: sm.Model)
         live(worlds, [model] * 3, 28)
 
 
+@pytest.mark.usefixtures("bullet")
+def test_what_a_model_has_told_is_not_told_of_each_variant() -> None:
+    model = sm.load("so101/scene_box", backend="pybullet")
+    frictions = np.random.default_rng(0).uniform(0.2, 1.5, (2, model.ngeom))
+    with pytest.warns(EngineWarning, match="friction"):
+        model.replace(friction=frictions[0])
+    with warnings.catch_warnings(action="error"):
+        make_worlds(model, 2, friction=list(frictions)).close()
+
+
 def test_states_that_do_not_fit_into_the_shared_memory_at_once(
     worlds: Worlds, monkeypatch: pytest.MonkeyPatch
 ) -> None:

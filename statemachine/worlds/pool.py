@@ -131,7 +131,8 @@ class PoolWorlds(Worlds):
 
     def _begun(self, verb: str, argument: int = 0, payload: Any = None) -> list[Any]:
         """What all processes say as they start, or raise what keeps one from it."""
-        answers = self._exchange(range(self.workers), verb, argument, payload)
+        with warnings.catch_warnings(action="ignore"):  # of each variant of a Model that has told
+            answers = self._exchange(range(self.workers), verb, argument, payload)
         for _, error, *_ in answers:
             if error is not None:
                 known = isinstance(error, StateMachineError)
@@ -180,8 +181,7 @@ class PoolWorlds(Worlds):
                 process.send(count, verb, argument, size, of_ids, wanted)
             answers: list[Answer] = []
             if self._here and 0 in numbers:
-                done = self._here.answer(verb, argument, payload, of_ids, wanted)
-                answers.append((*done, []))
+                answers.append((*self._here.answer(verb, argument, payload, of_ids, wanted), []))
             return answers + [process.receive(count) for process in processes]
         except EOFError:
             error = lost_worlds(processes)
