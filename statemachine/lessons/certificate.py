@@ -11,7 +11,6 @@ from ..measures.text import degrees, listed, millimetres, vector
 from ..page import Figures, Items, Page, Table
 from ..witness import OWN_READING
 from . import template
-from .fingertip import Offset
 from .template import by_engine, differences
 
 _SHOWN = 12  # rows of a table of tips
@@ -78,7 +77,7 @@ def _tips(name: str, result: Figures) -> Table:
     return Table(head, rows, title=title, wide=frozenset({3}))
 
 
-def _offset(offset: Offset | None) -> str:
+def _offset(offset: Figures | None) -> str:
     if offset is None:
         return "no common body: not comparable"
     if offset.same:

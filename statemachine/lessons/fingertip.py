@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,17 +33,10 @@ _TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
 _SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
 
 
-@dataclass(frozen=True)
-class Offset:
-    """From the engine's frame to the witness's: a distance [m] and an angle [rad]."""
-
-    distance: float
-    angle: float
-
-    @property
-    def same(self) -> bool:
-        """Whether the two are one frame."""
-        return self.distance <= _SAME_FRAME and self.angle <= _SAME_FRAME
+def _offset(distance: float, angle: float) -> Figures:
+    """From the engine's frame to the witness's [m, rad], and whether the two are one frame."""
+    same = distance <= _SAME_FRAME and angle <= _SAME_FRAME
+    return Figures(distance=distance, angle=angle, same=same)
 
 
 def certify(
@@ -254,7 +246,7 @@ def _engine_poses(
 
 def _declared_offset(
     model: Model, tip: Tip, kinematics: Kinematics, name: str, kind: str
-) -> Offset | None:
+) -> Figures | None:
     """Offset between the two files' definitions, if both fix the frame to one body."""
     if kind != "site" or tip.kind != "site":
         return None
@@ -263,10 +255,10 @@ def _declared_offset(
         return None
     distance = float(np.linalg.norm(theirs.pos - model.site_pos[tip.number]))
     angle = float(angle_between(matrix_from_quat(model.site_quat[tip.number]), theirs.mat))
-    return Offset(distance, angle)
+    return _offset(distance, angle)
 
 
-def _steady_offset(ours: Placement, theirs: Placement) -> Offset | None:
+def _steady_offset(ours: Placement, theirs: Placement) -> Figures | None:
     """The offset that all poses share; None if it changes with the pose.
 
     Where the files call their bodies differently, definitions cannot be compared
@@ -279,7 +271,7 @@ def _steady_offset(ours: Placement, theirs: Placement) -> Offset | None:
     spread = max(float(np.ptp(shift, axis=0).max()), float(np.ptp(turn, axis=0).max()))
     if spread > _SAME_FRAME:
         return None
-    return Offset(float(np.linalg.norm(shift[0])), float(angle_between(np.eye(3), turn[0])))
+    return _offset(float(np.linalg.norm(shift[0])), float(angle_between(np.eye(3), turn[0])))
 
 
 def random_qpos(model: Model, joints: Sequence[int], count: int, seed: int) -> Array:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from contextlib import closing, nullcontext
-from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -34,6 +33,7 @@ from ..interface import (
 )
 from ..measures.quantities import Readings, readings
 from ..measures.text import count, few, listed, milliseconds
+from ..page import Figures
 from ..rotations import times
 from .stale_rows import Freshness, Row, gaps, same
 
@@ -44,11 +44,10 @@ DEPEND |= dict.fromkeys(("qfrc_bias", "qfrc_passive"), INPUTS[:2])
 _ROUNDING = 1e-12  # of poses that are equal but for the order of additions [m, and 1]
 
 
-@dataclass(frozen=True)
-class Age:
+def age_from(**known: Any) -> Figures:
     """How old derived values are, as far as it is known.
 
-    Attributes:
+    Returns:
         steps: Engine steps since; None if that is not known.
         writes: Changes of each input since; None if nobody counted.
         never: Whether nothing was derived since the Data was made, reset or set.
@@ -57,14 +56,8 @@ class Age:
             quaternions 1], where that is how the number of steps was found; unmatched: bodies
             whose poses match neither moment.
     """
-
-    steps: int | None = None
-    writes: Mapping[str, int] | None = None
-    never: bool = False
-    written: tuple[str, ...] = ()
-    retraced: tuple[str, ...] = ()
-    unmatched: tuple[str, ...] = ()
-    within: float = 0.0
+    unknown = {"steps": None, "writes": None, "never": False, "within": 0.0}
+    return Figures(**unknown | dict.fromkeys(("written", "retraced", "unmatched"), ()) | known)
 
 
 class Scratch:
@@ -100,7 +93,7 @@ class Scratch:
 
 
 def row(
-    model: Model, name: str, age: Age, held: Array | Contacts, now: Array | Contacts | None
+    model: Model, name: str, age: Figures, held: Array | Contacts, now: Array | Contacts | None
 ) -> Row:
     """What is to be told of one array.
 
@@ -123,7 +116,7 @@ def row(
     return Row(name, False, age.steps, writes, of, off)
 
 
-def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Age:
+def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Figures:
     """How old derived values are, from nothing but their values.
 
     Args:
@@ -134,25 +127,25 @@ def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Age:
     """
     now = scratch.now(state)
     if all(same(held[name], now[name]) for name in held):
-        return Age(steps=0)
+        return age_from(steps=0)
     poses, current = _poses(held), _poses(now)
     if not poses[:, 3:].any():  # a rotation is never zero
-        return Age(never=True)
+        return age_from(never=True)
     lag = np.abs(current - poses).max(axis=1)
     if not lag.any():  # the poses, which alone can be retraced, are of now
-        return Age()
+        return age_from()
     off = np.abs(scratch.one_step_back(state) - poses).max(axis=1)
     # Nearer than rounding makes them, and much nearer than those of now. One body is enough:
     # what else is not there was written since.
     moved = lag > 0
     there = moved & (off <= _ROUNDING * (1 + np.abs(poses).max())) & (off <= lag / 100)
     if not there.any():
-        return Age()
+        return age_from()
 
     def names(chosen: Any) -> tuple[str, ...]:
         return tuple(model.body_names[b] or f"body {b}" for b in np.flatnonzero(chosen).tolist())
 
-    return Age(
+    return age_from(
         steps=1,
         retraced=names(there),
         unmatched=names(moved & ~there),
@@ -235,7 +228,7 @@ def freshness(model: Model, data: Data) -> Freshness:
     )
 
 
-def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> list[str]:
+def _notes(model: Model, rows: tuple[Row, ...], age: Figures, touching: bool) -> list[str]:
     """What has to be added to the rows: each sentence with what it holds under."""
     behaviours = model.capabilities.behaviours
     stale = {row.name for row in rows if not row.now}

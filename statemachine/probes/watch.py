@@ -21,7 +21,8 @@ from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from ..measures import Gap
 from ..measures.quantities import readings
 from ..measures.text import few
-from .freshness import DEPEND, Age, Scratch, age_of, row
+from ..page import Figures
+from .freshness import DEPEND, Scratch, age_from, age_of, row
 from .stale_rows import Row, StaleRead, gaps_text, table
 
 _PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
@@ -116,11 +117,13 @@ class Watch:
         finally:
             self._aside = before
 
-    def age(self) -> Age:
+    def age(self) -> Figures:
         """How old derived values are, as counted."""
         self.touch()
         writes = None if self._steps is None else dict(self._writes)
-        return Age(self._steps, writes, self._never, tuple(self._entries()))
+        return age_from(
+            steps=self._steps, writes=writes, never=self._never, written=tuple(self._entries())
+        )
 
     def touch(self) -> None:
         """See whether an input was written since the last time."""
