@@ -52,8 +52,8 @@ class DrivenWorld(HiddenWorld):
         self._nq, self._nv = int(raw.nq), int(raw.nv)
         self.timestep, self.qpos0 = float(raw.opt.timestep), raw.qpos0
         self.raw = world = World(plan, kind)
-        trees = [tree for tree in world.trees if tree.joints]
-        self._free = [tree for tree in world.trees if tree.free]
+        trees = [tree for tree in world.trees if tree.driven]
+        self._free = [tree for tree in world.trees if tree.free and not tree.driven]
         self._arms: list[Any]
         if kind == "engine":
             self._arms = [Motors(world, tree, raw) for tree in trees]
@@ -96,15 +96,15 @@ class DrivenWorld(HiddenWorld):
 
     def diverging(self, fastest: float) -> bool:
         """Looks at the arms only: to read free bodies takes longer."""
-        return not all(bounded(arm.angles, arm.speed, fastest) for arm in self._arms)
+        return not all(bounded(arm.positions, arm.speed, fastest) for arm in self._arms)
 
     def read(self) -> tuple[Array, Array]:
         """As the base says."""
         if self._alone:
-            return self._arms[0].angles, self._arms[0].speed
+            return self._arms[0].positions, self._arms[0].speed
         qpos, qvel = np.empty(self._nq), np.empty(self._nv)
         for arm in self._arms:
-            qpos[arm.tree.qpos], qvel[arm.tree.qvel] = arm.angles, arm.speed
+            qpos[arm.tree.qpos], qvel[arm.tree.qvel] = arm.positions, arm.speed
         for tree in self._free:
             qpos[tree.qpos], qvel[tree.qvel] = self.raw.read_free(tree)
         self._speed = qvel
@@ -176,7 +176,7 @@ class Motors:
 
     def __init__(self, world: World, tree: Tree, raw: mujoco.MjModel) -> None:
         self._world, self.tree = world, tree
-        joints = raw.dof_jntid[tree.dofs].tolist()
+        joints = raw.dof_jntid[tree.dofs[tree.base :]].tolist()
         pairs = [
             (joints.index(raw.actuator_trnid[a, 0]), int(raw.actuator_ctrladr[a]))
             for a in np.flatnonzero(in_force(raw))
@@ -188,24 +188,21 @@ class Motors:
     def place(self, qpos: Array, qvel: Array, *_: Array) -> None:
         """Start from a state."""
         # Copies: a slice would follow what is written into the arrays.
-        self.angles, self.speed = qpos[self.tree.qpos].copy(), qvel[self.tree.qvel].copy()
+        self.positions, self.speed = qpos[self.tree.qpos].copy(), qvel[self.tree.qvel].copy()
 
     def read(self) -> None:
         """Take over what the engine made of the last step."""
-        states = pb.getJointStates(self.tree.body, self.tree.joints, self._world.client)
-        self.angles, self.speed, self.torque = np.array([(s[0], s[1], s[3]) for s in states]).T
+        positions, speed = self._world.read_tree(self.tree)
+        self.positions, self.speed = np.array(positions), np.array(speed)
 
     def forces(self) -> dict[str, Array]:
         """What the engine tells: its bias, and the torque of its motors in the last step."""
-        angles, speed = self._before
-        bias = pb.calculateInverseDynamics(
-            self.tree.body,
-            angles.tolist(),
-            speed.tolist(),
-            [0.0] * len(angles),
-            physicsClientId=self._world.client,
-        )
-        return {"qfrc_bias": np.array(bias), "qfrc_actuator": self.torque}
+        positions, speed = (array.tolist() for array in self._before)
+        bias = self._world.needed(self.tree, positions, speed, [0.0] * len(speed))
+        torque = np.zeros(len(speed))
+        states = pb.getJointStates(self.tree.body, self.tree.joints, self._world.client)
+        torque[self.tree.base :] = [state[3] for state in states]
+        return {"qfrc_bias": np.array(bias), "qfrc_actuator": torque}
 
     def command(self, ctrl: Array) -> None:
         """Take a new command (nu,) of the whole model."""
@@ -213,7 +210,7 @@ class Motors:
 
     def drive(self, afresh: bool = False) -> None:
         """Command the motors, as a PyBullet user would; without actuation, nothing is said."""
-        self._before = self.angles, self.speed
+        self._before = self.positions, self.speed
         if self._driven:
             pb.setJointMotorControlArray(
                 self.tree.body,

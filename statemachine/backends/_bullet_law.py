@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import chain
 from operator import ge, le
 from typing import Any
 
@@ -32,7 +31,6 @@ import numpy as np
 
 from ..interface import Array
 from . import _dense as dense
-from ._bullet_client import pb
 from ._bullet_world import Tree, World
 
 _OFF = mujoco.mjtDisableBit
@@ -46,24 +44,25 @@ class Law:
 
     Attributes:
         tree: The tree.
-        angles, speed: (n,) positions and velocities, as the engine has them.
+        positions, speed: What of qpos and qvel (n,) is the tree's, as the engine has them.
         friction: (n,) the dry friction of the last step [N·m or N].
     """
 
     def __init__(self, raw: mujoco.MjModel, world: World, tree: Tree, ghost: World) -> None:
         """Of a tree in a world that is stepped; the ghost has the true arm."""
-        twin = next(other for other in ghost.trees if other.root == tree.root)
-        self._ghost, self._true = ghost.client, twin.body
-        self._client, self._body, self.tree = world.client, tree.body, tree
+        self._true = next(other for other in ghost.trees if other.root == tree.root)
+        self._ghost, self._world, self.tree = ghost, world, tree
         off = {name: bool(raw.opt.disableflags & int(bit)) for name, bit in _FLAGS.items()}
         dofs = tree.dofs
         joints = raw.dof_jntid[dofs]
         self._timestep = h = float(raw.opt.timestep)
         self._armature = raw.dof_armature[dofs]
         damping = raw.dof_damping[dofs] * (not off["damper"])
-        stiffness = raw.jnt_stiffness[joints] * (not off["spring"])
-        rest = stiffness * raw.qpos_spring[tree.qpos]
-        # Linear in x, which is positions, velocities and 1.
+        scalar = np.arange(len(dofs)) >= tree.base
+        places = raw.jnt_qposadr[joints] + ~scalar
+        stiffness = raw.jnt_stiffness[joints] * (scalar & (not off["spring"]))
+        rest = stiffness * raw.qpos_spring[places]
+        # Linear in x, which is positions (of a free joint: zeros), velocities and 1.
         passive = np.column_stack([-np.diag(stiffness), -np.diag(damping), rest])
         euler = raw.opt.integrator in _EXPLICIT
         damped_later = 0.0 if euler and off["eulerdamp"] else h
@@ -141,15 +140,15 @@ class Law:
 
     def read(self) -> None:
         """Take over what the engine made of the last step."""
-        states = pb.getJointStates(self._body, self.tree.joints, self._client)
-        q, v, _, _ = zip(*states, strict=True)
-        self._take(q, v)
+        self._take(*self._world.read_tree(self.tree))
         self._contact = None
 
     def _take(self, q: Sequence[float], v: Sequence[float]) -> None:
         self._q, self._v = q, v
-        self._x = x = np.array([*q, *v, 1.0])
-        self.angles, self.speed = x[: len(q)], x[len(q) : -1]
+        self._angles = angles = (0.0,) * 6 + tuple(q[7:]) if self.tree.free else q
+        self._x = x = np.array([*angles, *v, 1.0])
+        self.speed = x[len(v) : -1]
+        self.positions = np.array(q) if self.tree.free else x[: len(v)]
 
     @property
     def contact(self) -> Array:
@@ -157,8 +156,7 @@ class Law:
         if self._contact is None:
             q, v, speed = self._start
             rate = ((self.speed - speed) / self._timestep).tolist()
-            needed = pb.calculateInverseDynamics(self._body, q, v, rate, 0, self._client)
-            self._contact = np.array(needed) - self._torque
+            self._contact = np.array(self._world.needed(self.tree, q, v, rate)) - self._torque
         return self._contact
 
     def forces(self) -> dict[str, Array]:
@@ -189,25 +187,17 @@ class Law:
         contact, q, v = self.contact, self._q, self._v
         self._start = q, v, self.speed
         acceleration = self._solve(contact, afresh).tolist()
-        needed = pb.calculateInverseDynamics(self._body, q, v, acceleration, 0, self._client)
+        needed = self._world.needed(self.tree, q, v, acceleration)
         self._torque = np.array(needed) - contact
-        pb.setJointMotorControlArray(
-            self._body,
-            self.tree.joints,
-            pb.TORQUE_CONTROL,
-            forces=self._torque.tolist(),
-            physicsClientId=self._client,
-        )
+        self._world.push(self.tree, q, self._torque)
 
     def _solve(self, contact: Array, afresh: bool) -> Array:
         """The acceleration (n,) of a step, and what makes it up in `_mass` and `_parts`."""
-        q, v, x, friction = self._q, self._v, self._x, self.friction
-        n, body, client = len(q), self._true, self._ghost
-        rows = pb.calculateMassMatrix(body, q, 0, client)
-        # Faster than np.array, as several lines here are than what is shorter.
-        self._mass = mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
-        bias = np.array(pb.calculateInverseDynamics(body, q, v, self._zeros, 0, client))
-        speed = x[n:-1]
+        v, x, friction, tree = self._v, self._x, self.friction, self._true
+        n = len(v)
+        self._mass = mass = self._ghost.mass_matrix(tree, self._q)
+        bias = np.array(self._ghost.needed(tree, self._q, v, self._zeros))
+        q, speed = self._angles, x[n:-1]
         linear = dense.times(self._linear, x)
         passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + self._aim
         force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)

@@ -61,6 +61,15 @@ class Plan:
     def __reduce__(self) -> tuple[Any, ...]:
         return Plan, (self.raw,)
 
+    def rigid(self, root: int) -> bool:
+        """Whether a tree is one free body that nothing but gravity and contact moves."""
+        raw = self.raw
+        if not urdf.floats(raw, root) or len(urdf.tree(raw, root)) > 1:
+            return False
+        own = slice(raw.body_dofadr[root], raw.body_dofadr[root] + 6)
+        laws = raw.dof_armature, raw.dof_damping, raw.dof_frictionloss
+        return not any(law[own].any() for law in laws)
+
     @cached_property
     def padding(self) -> Array:
         """(nv,) what each degree of freedom gives of its armature to the stepped arm.
@@ -81,8 +90,9 @@ class Plan:
         """
         raw = self.raw
         solids = (solid.body for solid in self.surfaces.solids)
-        moving = [b for b in solids if raw.body_weldid[b] and not floats(raw, raw.body_rootid[b])]
-        tree_weights = 1 / raw.body_subtreemass[raw.body_rootid[moving]]
+        roots = raw.body_rootid
+        moving = [b for b in solids if raw.body_weldid[b] and not urdf.floats(raw, roots[b])]
+        tree_weights = 1 / raw.body_subtreemass[roots[moving]]
         weights = np.maximum(raw.body_invweight0[moving, 0], tree_weights)
         return float(_YIELDS * raw.opt.timestep * np.median(weights)) if moving else 0.0
 
@@ -103,12 +113,13 @@ class Plan:
         if kind == "engine":  # as it comes, meshes come from their files
             meshes = {geom: int(raw.geom_dataid[geom]) for geom in hulls}
             hulls = {g for g, mesh in meshes.items() if mesh < 0 or raw.mesh_pathadr[mesh] < 0}
+        loose = kind == "engine" and urdf.floats(raw, root)
         dialect = urdf.Dialect(
             capsules=True,
             looks=False,
             solids=kind != "ghost" and bool(self.surfaces.solids),
             dynamics=kind == "engine",
-            anchored=bool(root) and not floats(raw, root),
+            anchored=bool(root) and not (self.rigid(root) or loose),
             padding=self.padding if kind == "stepped" else None,
             tips=kind != "stepped" and urdf.parts(raw, root) + sites <= MOST_PARTS,
             hulls=frozenset(hulls),
@@ -170,11 +181,6 @@ def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array
         own = moving.T @ moving if slides else turning.T @ shape @ turning
         total += share[dof] * own
     return total
-
-
-def floats(raw: mujoco.MjModel, root: int) -> bool:
-    """Whether a tree is a free body."""
-    return bool(raw.body_jntnum[root]) and not urdf.axes(raw, root)
 
 
 class Hull:

@@ -13,8 +13,8 @@ from ..interface import Array, JointType
 from ..measures.text import few
 from ._bullet_contacts import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_law import in_force
-from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, floats, roughness
-from ._bullet_urdf import parts, roots, tree
+from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, roughness
+from ._bullet_urdf import parts, roots
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 # What MuJoCo's contacts have by default; and the part of a speed that is a bounce to tell of.
@@ -88,14 +88,9 @@ Rows = list[tuple[str, str, Any, str]]
 
 def _of_joints(raw: mujoco.MjModel) -> Rows:
     free = raw.jnt_type == _FREE
-    # The degrees of freedom of a free joint; those of another are of no matter.
-    dofs = np.minimum(raw.jnt_dofadr[:, None] + np.arange(6), raw.nv - 1)
     span = raw.jnt_range[:, 1] - raw.jnt_range[:, 0]
     features = {
         "ball joint": raw.jnt_type == _BALL,
-        "armature of a free joint": free & raw.dof_armature[dofs].any(axis=1),
-        "damping of a free joint": free & raw.dof_damping[dofs].any(axis=1),
-        "frictionloss of a free joint": free & raw.dof_frictionloss[dofs].any(axis=1),
         "stiffness of a free joint": free & (raw.jnt_stiffness != 0),
         "nonlinear spring": raw.jnt_stiffnesspoly.any(axis=1),
         "nonlinear damping": raw.dof_dampingpoly[raw.jnt_dofadr].any(axis=1),
@@ -105,15 +100,13 @@ def _of_joints(raw: mujoco.MjModel) -> Rows:
 
 
 def _of_bodies(raw: mujoco.MjModel) -> Rows:
-    large, several = np.zeros(raw.nbody, dtype=bool), np.zeros(raw.nbody, dtype=bool)
+    large = np.zeros(raw.nbody, dtype=bool)
     for root in roots(raw):
         large[root] = parts(raw, root) > MOST_PARTS
-        several[root] = floats(raw, root) and len(tree(raw, root)) > 1
     much = f"has more than {MOST_PARTS} bodies and joints"
     return [
         ("body", "mocap body", raw.body_mocapid >= 0, "is one"),
         ("body", "a tree of so many parts", large, much),
-        ("body", "free body of several bodies", several, "carries others"),
     ]
 
 

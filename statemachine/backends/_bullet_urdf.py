@@ -27,6 +27,7 @@ _BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE
 _CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 _PRIMITIVES = {_BOX: "box", _SPHERE: "sphere", _CAPSULE: "capsule", _CYLINDER: "cylinder"}
 _MESH, _PLANE = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_PLANE)
+LIGHT = 1e-9  # [kg] mass, and a thousandth of it [kg m²] inertia, of what only carries a tree
 UNLIMITED = 1e9  # a range or a force where there is none: PyBullet wants a number
 _LONGEST = 200  # PyBullet cuts names at 1,023 bytes
 
@@ -44,7 +45,9 @@ class Dialect:
         dynamics: Write the ranges, damping and dry friction of the joints.
         anchored: Fix the root to a massless link "world", at its place. PyBullet's
             inverse dynamics takes gravity in the principal axes of a fixed base, which
-            is gravity in another direction unless the base has no mass.
+            is gravity in another direction unless the base has no mass. A tree that floats
+            is fixed to a link of next to no mass at the origin of its root, which is then
+            what the engine moves; of another it moves the centre of mass.
         tips: Write a link for each site.
         hulls: Geoms that are read from a file of their own, see `hull_file`.
         padding: (nv,) J of each degree of freedom. The link that a hinge carries gets
@@ -80,6 +83,11 @@ def axes(raw: mujoco.MjModel, body: int) -> list[int]:
     return [j for j in joints if raw.jnt_type[j] in (int(JointType.HINGE), int(JointType.SLIDE))]
 
 
+def floats(raw: mujoco.MjModel, root: int) -> bool:
+    """Whether the root of a tree has a free joint."""
+    return bool(raw.body_jntnum[root]) and not axes(raw, root)
+
+
 def parts(raw: mujoco.MjModel, root: int) -> int:
     """How many bodies and joints a tree has."""
     bodies = tree(raw, root)
@@ -103,7 +111,8 @@ def write(
     robot = Element("robot", name=raw.names[: raw.names.index(b"\0")].decode() or "robot")
     on_world = bool(axes(raw, root)) or dialect.anchored
     if on_world:
-        robot.append(_bare_link("world", 0.0, np.zeros((3, 3))))
+        light = LIGHT * floats(raw, root)
+        robot.append(_bare_link("world", light, 1e-3 * light * np.eye(3)))
     for body in tree(raw, root):
         robot.append(_link(raw, body, dialect, names))
         if body != root or on_world:
@@ -256,6 +265,8 @@ def _joints(
     parent = "world" if body == root else names.links[upper]
     turn = matrix_from_quat(raw.body_quat[body])
     place = raw.body_pos[body] - (np.zeros(3) if body == root else _anchor(raw, upper))
+    if body == root and floats(raw, root):
+        turn, place = np.eye(3), np.zeros(3)
     joints = axes(raw, body)
     if not joints:
         where, name = _origin(place, turn), names.fixed[body]

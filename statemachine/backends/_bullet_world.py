@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
@@ -30,12 +31,14 @@ from ._bullet_client import (
     turned,
 )
 from ._bullet_contacts import Solid
-from ._bullet_plan import Plan, floats
+from ._bullet_plan import Plan
+from ._hidden_world import HiddenWorld
 from .compiled import gravity
 
 _PUSHES = 0.03  # of an overlap that a contact undoes in a step; the engine's own is 0.08
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
+_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # a pose, as the engine has them
 _REST = math.sqrt(1 - 2 * _TILT**2)
 
 
@@ -45,9 +48,11 @@ class Tree:
     Attributes:
         root: MuJoCo's id of its root.
         body: PyBullet's id of it.
-        free: Whether it floats; its joint is then the root's free joint.
-        joints: PyBullet's indices of its joints, in order of their degrees of freedom.
-        dofs: Their degrees of freedom; of a free joint, its first.
+        free: Whether it floats: its first joint is then the root's free joint.
+        driven: Whether a law drives it, because it has joints, or more than gravity moves it.
+        joints: PyBullet's indices of its joints, but for the free one.
+        dofs: (n,) degrees of freedom: the six of a free joint, then those of the joints.
+        base: How many of them are the free joint's.
         qpos, qvel: What of these arrays is the tree's: a slice where that is enough.
         links: PyBullet's index of each body's link; -1 is the base.
         tips: PyBullet's index of each site's link, where it has one.
@@ -56,7 +61,7 @@ class Tree:
     def __init__(self, plan: Plan, root: int, body: int, client: int) -> None:
         raw, names = plan.raw, plan.names
         self.root, self.body = root, body
-        self.free = floats(raw, root)
+        self.free = urdf.floats(raw, root)
         infos = joint_infos(client, body)
         indices = {info[12].decode(): info[0] for info in infos}
         bodies = urdf.tree(raw, root)
@@ -67,18 +72,24 @@ class Tree:
         self.tips = {s: indices[names.tips[s]] for s in sites if names.tips[s] in indices}
         by_name = {names.joints[j]: j for b in bodies for j in urdf.axes(raw, b)}
         moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]
-        ids = [joint for _, joint in moving] or [int(raw.body_jntadr[root])] * self.free
         self.joints = [index for index, _ in moving]
+        self.driven = bool(self.joints) or (self.free and not plan.rigid(root))
+        self.base = 6 * self.free
+        first = int(raw.body_jntadr[root])
+        ids = [joint for _, joint in moving]
+        places = raw.jnt_qposadr[ids].astype(int)
         self.dofs = raw.jnt_dofadr[ids].astype(int)
-        self.qpos = _index(raw.jnt_qposadr[ids].astype(int), 7 if self.free else 1)
-        self.qvel = _index(self.dofs, 6 if self.free else 1)
+        if self.free:
+            places = np.r_[raw.jnt_qposadr[first] + np.arange(7), places]
+            self.dofs = np.r_[raw.jnt_dofadr[first] + np.arange(6), self.dofs]
+        self.qpos, self.qvel = _index(places), _index(self.dofs)
 
 
-def _index(places: Any, size: int) -> Any:
-    """Places of things of a size: a slice, which NumPy takes faster, or an array."""
-    if not len(places) or (np.diff(places) == size).all():
+def _index(places: Any) -> Any:
+    """Places in an array: a slice, which NumPy takes faster, where they follow one another."""
+    if not len(places) or (np.diff(places) == 1).all():
         start = int(places[0]) if len(places) else 0
-        return slice(start, start + size * len(places))
+        return slice(start, start + len(places))
     return places
 
 
@@ -109,18 +120,27 @@ class World:
         self.client = connect()
         self._end = weakref.finalize(self, disconnect, self.client)
         pb.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
-        pb.setGravity(*gravity(raw).tolist(), self.client)
+        self._gravity = gravity(raw).tolist()
+        pb.setGravity(*self._gravity, self.client)
         self.trees: list[Tree] = []
         self._planes: dict[int, int] = {}  # PyBullet's body of each plane of the world
         for root in (0, *urdf.roots(raw)):
             jointed = any(urdf.axes(raw, b) for b in urdf.tree(raw, root))
-            if jointed or kind != "ghost":
+            floating = urdf.floats(raw, root) and not plan.rigid(root)
+            if jointed or floating or kind != "ghost":
                 self._load(root, kind)
+        self._frames = {  # of free bodies: the inertial frame in the body's own
+            tree.body: pb.getDynamicsInfo(tree.body, -1, self.client)[3:5]
+            for tree in self.trees
+            if tree.free
+        }
+        self._last: dict[int, Quat] = dict.fromkeys(self._frames, (0.0, 0.0, 0.0, 1.0))
         with silence():  # what it has to say of a tree, it says the first time
             for tree in self.trees:
-                if tree.joints:
-                    zero = [0.0] * len(tree.joints)
-                    pb.calculateInverseDynamics(tree.body, zero, zero, zero, 0, self.client)
+                if tree.driven:
+                    zero = [0.0] * len(tree.dofs)
+                    pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] * tree.free
+                    self.needed(tree, [*pose, *zero[tree.base :]], zero, zero)
         if kind == "ghost":
             return
         if kind == "stepped":
@@ -144,12 +164,6 @@ class World:
             (body, pb.getBasePositionAndOrientation(body, self.client))
             for body in (*(tree.body for tree in self.trees), *self._planes.values())
         ]
-        self._frames = {  # of free bodies: the inertial frame in the body's own
-            tree.body: pb.getDynamicsInfo(tree.body, -1, self.client)[3:5]
-            for tree in self.trees
-            if tree.free
-        }
-        self._last: dict[int, Quat] = dict.fromkeys(self._frames, (0.0, 0.0, 0.0, 1.0))
 
     def close(self) -> None:
         """Give the client back."""
@@ -165,7 +179,6 @@ class World:
         text, files = self._plan.described(root, kind)
         if not root and "<collision" not in text:
             return
-        free = floats(raw, root)
         flags = (
             pb.URDF_USE_INERTIA_FROM_FILE
             | pb.URDF_USE_SELF_COLLISION
@@ -177,7 +190,7 @@ class World:
                 self.client,
                 name,
                 "the URDF of this model",
-                useFixedBase=not free,
+                useFixedBase=not urdf.floats(raw, root),
                 flags=0 if kind == "engine" else flags,
             )
         tree = Tree(self._plan, root, body, self.client)
@@ -214,7 +227,7 @@ class World:
     def joints(self) -> Iterator[tuple[int, int, int]]:
         """PyBullet's body and index of each joint, and its degree of freedom."""
         for tree in self.trees:
-            for index, dof in zip(tree.joints, tree.dofs.tolist(), strict=False):
+            for index, dof in zip(tree.joints, tree.dofs[tree.base :].tolist(), strict=True):
                 yield tree.body, index, dof
 
     def links(self) -> Iterator[tuple[int, int, int]]:
@@ -303,18 +316,17 @@ class World:
         for tree in self.trees:
             if tree.free:
                 self._put_free(tree, qpos, qvel)
-                continue
             if tree.joints:
                 pb.resetJointStatesMultiDof(
                     tree.body,
                     tree.joints,
-                    [[q] for q in qpos[tree.qpos].tolist()],
-                    [[v] for v in qvel[tree.qvel].tolist()],
+                    [[q] for q in qpos[tree.qpos][-len(tree.joints) :].tolist()],
+                    [[v] for v in qvel[tree.qvel][-len(tree.joints) :].tolist()],
                     physicsClientId=self.client,
                 )
 
     def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
-        body, qpos, qvel = tree.body, qpos[tree.qpos], qvel[tree.qvel]
+        body, qpos, qvel = tree.body, qpos[tree.qpos][:7], qvel[tree.qvel][:6]
         centre, axes = self._frames[body]
         quat = qpos[3:] / math.hypot(*qpos[3:])
         turn = matrix_from_quat(quat)
@@ -340,7 +352,7 @@ class World:
         return where, quat
 
     def read_free(self, tree: Tree) -> tuple[list[float], list[float]]:
-        """What of qpos (7,) and qvel (6,) is a free body's, in MuJoCo's conventions."""
+        """What of qpos (7,) and qvel (6,) is a free joint's, in MuJoCo's conventions."""
         centre, (ax, ay, az, aw) = self._frames[tree.body]
         (px, py, pz), pose = self.follow(tree.body)
         (vx, vy, vz), spin = pb.getBaseVelocity(tree.body, self.client)
@@ -360,12 +372,78 @@ class World:
         """What the engine tells of positions (nq,) and velocities (nv,)."""
         qpos, qvel = np.zeros(self._raw.nq), np.zeros(self._raw.nv)
         for tree in self.trees:
-            if tree.joints:
-                states = pb.getJointStates(tree.body, tree.joints, self.client)
-                qpos[tree.qpos], qvel[tree.qvel] = [s[0] for s in states], [s[1] for s in states]
-            if tree.free:
-                qpos[tree.qpos], qvel[tree.qvel] = self.read_free(tree)
+            qpos[tree.qpos], qvel[tree.qvel] = self.read_tree(tree)
         return qpos, qvel
+
+    def read_tree(self, tree: Tree) -> tuple[Sequence[float], Sequence[float]]:
+        """The same of one tree, in the order of its `qpos` and `qvel`."""
+        if not tree.joints:
+            return self.read_free(tree) if tree.free else ((), ())
+        q, v, _, _ = zip(*pb.getJointStates(tree.body, tree.joints, self.client), strict=True)
+        if tree.free:
+            pose, twist = self.read_free(tree)
+            return (*pose, *q), (*twist, *v)
+        return q, v
+
+    def needed(
+        self, tree: Tree, q: Sequence[float], v: Sequence[float], rate: Sequence[float]
+    ) -> Sequence[float]:
+        """The generalised force (n,) that gives a tree an acceleration, by inverse dynamics.
+
+        PyBullet takes the angles of a base in another order than it gives them. So a tree that
+        floats is told to it in the axes of its base, and gravity turned into them.
+
+        Args:
+            tree: The tree.
+            q: Its positions, in the order of its `qpos`.
+            v: Its velocities, in the order of its `qvel`.
+            rate: (n,) its acceleration, as qacc.
+        """
+        if not tree.free:
+            return pb.calculateInverseDynamics(tree.body, q, v, rate, 0, self.client)
+        w, x, y, z = q[3:7]
+        pose, back = (x, y, z, w), (-x, -y, -z, w)
+        with HiddenWorld.lock:  # gravity is all worlds' of a client
+            pb.setGravity(*turned(back, self._gravity), self.client)
+            force = pb.calculateInverseDynamics(
+                tree.body,
+                [*_ORIGIN, *q[7:]],
+                [*v[3:6], 0.0, 0.0, 0.0, *v[6:]],
+                [*rate[3:6], *turned(back, rate[:3]), *rate[6:]],
+                0,
+                self.client,
+            )
+            pb.setGravity(*self._gravity, self.client)
+        return [*turned(pose, force[:3]), *force[3:]]
+
+    def mass_matrix(self, tree: Tree, q: Sequence[float]) -> Array:
+        """M (n, n) of a tree where its `qpos` are q, in the coordinates of its `qvel`."""
+        n = len(tree.dofs)
+        rows = pb.calculateMassMatrix(tree.body, q[7 * tree.free :], 0, self.client)
+        # Faster than np.array.
+        mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
+        if not tree.free:
+            return mass
+        # The engine's base is turning, then moving, in its own axes.
+        axes = np.eye(n)
+        axes[:6, :6] = 0.0
+        axes[:3, 3:6], axes[3:6, :3] = np.eye(3), matrix_from_quat(np.array(q[3:7])).T
+        return dense.product(np.ascontiguousarray(axes.T), dense.product(mass, axes))
+
+    def push(self, tree: Tree, q: Sequence[float], force: Array) -> None:
+        """Let a generalised force (n,) act on a tree, whose `qpos` are q, in the next step."""
+        if tree.free:
+            body, moment = tree.body, force[3:6].tolist()
+            pb.applyExternalForce(body, -1, force[:3].tolist(), q[:3], pb.WORLD_FRAME, self.client)
+            pb.applyExternalTorque(body, -1, moment, pb.LINK_FRAME, self.client)
+        if tree.joints:
+            pb.setJointMotorControlArray(
+                tree.body,
+                tree.joints,
+                pb.TORQUE_CONTROL,
+                forces=force[tree.base :].tolist(),
+                physicsClientId=self.client,
+            )
 
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""
