@@ -21,8 +21,8 @@ torque it got, by inverse dynamics, is the e of the next step.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from operator import ge, le
 from typing import Any
 
@@ -31,10 +31,21 @@ import numpy as np
 
 from ..interface import Array
 from . import _dense as dense
+from ._bullet_constraints import (
+    Equalities,
+    Row,
+    Tendons,
+    bounds_of,
+    curves,
+    impedance,
+    soft,
+    soft_row,
+    softness,
+    springs,
+)
 from ._bullet_world import Tree, World
 
 _OFF = mujoco.mjtDisableBit
-_TINY = 1e-300  # for a power that is too small for a float
 _STEADY = 1e-5  # of the largest friction: a change of it that is worth the whole solution
 _EXPLICIT = (int(mujoco.mjtIntegrator.mjINT_EULER), int(mujoco.mjtIntegrator.mjINT_RK4))
 
@@ -56,7 +67,7 @@ class Law:
         dofs = tree.dofs
         joints = raw.dof_jntid[dofs]
         self._timestep = h = float(raw.opt.timestep)
-        self._armature = raw.dof_armature[dofs]
+        armature = raw.dof_armature[dofs]
         damping = raw.dof_damping[dofs] * (not off["damper"])
         scalar = np.arange(len(dofs)) >= tree.base
         places = raw.jnt_qposadr[joints] + ~scalar
@@ -66,12 +77,17 @@ class Law:
         passive = np.column_stack([-np.diag(stiffness), -np.diag(damping), rest])
         euler = raw.opt.integrator in _EXPLICIT
         damped_later = 0.0 if euler and off["eulerdamp"] else h
+        self._tendons = tendons = Tendons(raw, tree, off)
         # The inertia that constraints feel, and the one that velocities are found with.
-        self._inertia = np.array(
-            [np.diag(self._armature), np.diag(self._armature + damped_later * damping)]
-        )
+        self._inertia = np.array([np.diag(armature), np.diag(armature + damped_later * damping)])
+        if len(tendons.ids):
+            heavy, damp = (tendons.squared(w) for w in (tendons.armature, tendons.damping))
+            self._inertia += heavy * tendons.near
+            self._inertia[1] += (0.0 if euler else h) * damp * tendons.near
+            passive[:, len(dofs) : -1] -= damp
         self._zeros, self._nothing = [0.0] * len(dofs), np.zeros(len(dofs))
         feedback = self._take_actuators(raw, joints, off)
+        self._equalities = Equalities(raw, world, tree, tendons, off)
 
         rub = not (off["friction"] or off["constraint"])
         self._frictionloss = raw.dof_frictionloss[dofs] * rub
@@ -80,57 +96,58 @@ class Law:
         weight = raw.dof_invweight0[dofs]
         floor = 0.0 if off["refsafe"] else 2 * h
         solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
-        self._rub_b, _ = _spring(solref, solimp, floor)
+        self._rub_b, _ = springs(solref, solimp, floor)
         damped = np.zeros(passive.shape)
         damped[:, len(dofs) : -1] = np.diag(self._rub_b)
         self._linear = np.vstack([passive, damped, feedback])
-        still = [_impedance(curve, 0.0) for curve in _curves(solimp)]
-        self._rub_r = np.array([_softness(*pair) for pair in zip(still, weight, strict=True)])
+        still = [impedance(curve, 0.0) for curve in curves(solimp)]
+        self._rub_r = np.array([softness(*pair) for pair in zip(still, weight, strict=True)])
         self._rub_weight = weight + self._rub_r
-        # Rows of joints with friction: sign, softness, -b, least and most.
         self._rubs = rubs = np.flatnonzero(self._frictionloss)
-        columns = [self._rub_r, -self._rub_b, self._least_rub, self._frictionloss]
-        self._rub_rows = np.array([np.ones(len(rubs)), *(column[rubs] for column in columns)])
+        self._unit = np.eye(len(dofs))
+        # Joints with friction: softness, -b, most.
+        columns = np.column_stack([self._rub_r, -self._rub_b, self._frictionloss])
+        self._rub_rows = list(zip(rubs.tolist(), columns[rubs].tolist(), strict=True))
+        self._coupled = bool(self._equalities) or tendons.rubs
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
         # A limit acts from its margin on, and as if it were there.
         margin = raw.jnt_margin[joints][:, None] * [1.0, -1.0]
-        low, high = _range(raw.jnt_range[joints] + margin, limited)
+        low, high = bounds_of(raw.jnt_range[joints] + margin, limited)
         self._ranges: tuple[list[float], list[float]] = low.tolist(), high.tolist()
         solref, solimp = raw.jnt_solref[joints], raw.jnt_solimp[joints]
-        damping, stiffness = _spring(solref, solimp, floor)
-        # Of each joint: the curve of its impedance, and b, k and the weight of its limit.
-        constants = np.column_stack([damping, stiffness, weight]).tolist()
-        self._stops = list(zip(_curves(solimp), constants, strict=True))
+        self._stops = soft(solref, solimp, weight, floor)
 
     def _take_actuators(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> Array:
         """Force = clip(gain·clip(ctrl) + b₀ + b₁·length + b₂·speed); length = gear·q."""
-        driven = np.isin(raw.actuator_trnid[:, 0], joints) & (not off["actuation"])
-        driven &= in_force(raw)
-        ids = np.flatnonzero(driven)
+        on_tendon = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+        target = raw.actuator_trnid[:, 0]
+        driven = np.where(on_tendon, np.isin(target, self._tendons.ids), np.isin(target, joints))
+        ids = np.flatnonzero(driven & (not off["actuation"]) & in_force(raw))
         self._ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
         self._gear = np.zeros((len(joints), len(ids)))
         for column, a in enumerate(ids):
-            row = int(np.flatnonzero(joints == raw.actuator_trnid[a, 0])[0])
-            self._gear[row, column] = raw.actuator_gear[raw.actuator_outadr[a], 0]
+            moment = self._tendons.moments.get(target[a]) if on_tendon[a] else joints == target[a]
+            self._gear[:, column] = raw.actuator_gear[raw.actuator_outadr[a], 0] * moment
         affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
         feedback = [bias[:, k, None] * self._gear.T for k in (1, 2)]
         later = 0.0 if raw.opt.integrator in _EXPLICIT else self._timestep
-        self._slope = -later * self._gear**2 * bias[:, 2]
+        self._slope = -later * self._gear * bias[:, 2]
         self._unsaturated = self._with_slope(np.ones(len(ids)))
         limited = raw.actuator_forcelimited[ids].astype(bool)
-        self._low_force, self._high_force = _range(raw.actuator_forcerange[ids], limited)
+        self._low_force, self._high_force = bounds_of(raw.actuator_forcerange[ids], limited)
         fenced = raw.jnt_actfrclimited[joints].astype(bool)
-        self._fence = _range(raw.jnt_actfrcrange[joints], fenced) if fenced.any() else None
+        self._fence = bounds_of(raw.jnt_actfrcrange[joints], fenced) if fenced.any() else None
         self._straight = np.array_equal(self._gear, np.eye(len(joints)))
         return np.column_stack([*feedback, bias[:, 0]])
 
     def _with_slope(self, free: Array) -> Array:
         """Both inertias, with the slope of the actuators that are not at their limit."""
         inertias = self._inertia.copy()
-        inertias[1] += np.diag(dense.times(self._slope, free))
+        slope = dense.product(self._slope * free, self._gear.T.copy())
+        inertias[1] += slope * self._tendons.near
         return inertias
 
     def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
@@ -161,9 +178,9 @@ class Law:
 
     def forces(self) -> dict[str, Array]:
         """Accelerations and forces of the last step, by their names in the contract."""
-        bias, actuator, passive, friction, limit = self._parts
-        total = actuator + passive + friction + limit + self.contact
-        factor = dense.factored(self._mass + np.diag(self._armature))
+        bias, actuator, passive, friction, limit, equality = self._parts
+        total = actuator + passive + friction + limit + equality + self.contact
+        factor = dense.factored(self._mass + self._inertia[0])
         return {
             "qacc": dense.solved(factor, total - bias),
             "qfrc_bias": bias,
@@ -172,6 +189,7 @@ class Law:
             "qfrc_friction": friction,
             "qfrc_limit": limit,
             "qfrc_contact": self.contact,
+            "qfrc_constraint": equality,  # and what the others come to
         }
 
     def command(self, ctrl: Array) -> None:
@@ -215,12 +233,17 @@ class Law:
         explicit, implicit = mass + inertia
         dense.factored(explicit)
         dense.factored(implicit)
+        if self._tendons.stiff:
+            passive = passive + self._tendons.spring_force(x[:n])
         others = actuator + passive - bias + contact
-        limit = self._nothing
+        limit = equality = self._nothing
         low, high = self._ranges
         within = all(map(le, low, q)) and all(map(ge, high, q))
         hit = [] if within else [i for i in range(n) if not low[i] <= q[i] <= high[i]]
-        solve = afresh or bool(hit)
+        rows = [self._stop(i, q[i], float(speed[i])) for i in hit]
+        if self._tendons.limited:
+            rows += self._tendons.stops(x[:n], speed)
+        solve = afresh or bool(rows) or self._coupled
         if not solve and len(self._rubs):
             # One sweep from the last step's friction, of all joints at once: enough where
             # it hardly changes, as in a joint that rests or slides.
@@ -232,52 +255,47 @@ class Law:
             friction = moved
             solve = dense.dot(change, change) > self._steady
         if solve:
-            friction, limit = self._constrained(explicit, others, q, speed, friction, hit)
-            others = others + limit
-        self.friction, self._parts = friction, (bias, actuator, passive, friction, limit)
+            rubbing = [
+                Row(self._unit[i], soft, damping * speed[i], -most, most)
+                for i, (soft, damping, most) in self._rub_rows
+            ] + self._tendons.rubbing(speed)
+            tied = self._equalities.rows(self._q, x[:n], speed) if self._equalities else []
+            friction, limit, equality = self._constrained(
+                explicit, others, friction, (rubbing, rows, tied)
+            )
+            others = others + limit + equality
+        self.friction = friction
+        self._parts = bias, actuator, passive, friction, limit, equality
         return dense.solved(implicit, others + friction)
 
     def _constrained(
-        self,
-        factor: Array,
-        others: Array,
-        q: Sequence[float],
-        speed: Array,
-        friction: Array,
-        hit: list[int],
-    ) -> tuple[Array, Array]:
-        """Friction and limit force, by pivoting between free and bounded rows.
+        self, factor: Array, others: Array, friction: Array, kinds: Sequence[Sequence[Row]]
+    ) -> list[Array]:
+        """Friction, limit and equality force (n,), by pivoting between free and bounded rows.
 
-        Each row of sign s at joint i has a force F between two bounds, and wants
-        s·a_i + R·F = its reference; a row at a bound may miss it to one side.
+        Each row has a force F between two bounds, and wants J·a + R·F = its reference; a row at a
+        bound may miss it to one side.
         """
-        n, rubs, rubbing = len(friction), self._rubs, len(self._rubs)
-        at, rows = rubs, np.empty((5, rubbing + len(hit)))
-        rows[:, :rubbing] = self._rub_rows
-        rows[2, :rubbing] *= speed[rubs]
-        if hit:
-            at = np.array([*rubs, *hit])
-            rows[:, rubbing:] = np.array([self._stop(i, q[i], float(speed[i])) for i in hit]).T
-        sign, soft, goal, least, most = rows
-        matrix = dense.inverse_rows(factor, at)[:, at] * sign[:, None] * sign
-        matrix.flat[:: len(at) + 1] += soft
-        right = goal - sign * dense.solved(factor, others.copy())[at]
-        force = np.zeros(len(at))
-        force[:rubbing] = friction[rubs]
+        rows = [row for kind in kinds for row in kind]
+        if not rows:
+            return [self._nothing] * len(kinds)
+        jacobian, soft, goal, least, most = (np.array(part) for part in zip(*rows, strict=True))
+        response = np.array([dense.solved(factor, row.copy()) for row in jacobian])
+        matrix = dense.product(response, jacobian.T.copy())
+        matrix.flat[:: len(rows) + 1] += soft
+        right = goal - dense.times(jacobian, dense.solved(factor, others.copy()))
+        force = np.zeros(len(rows))
+        force[: len(self._rubs)] = friction[self._rubs]
         force = dense.pivoted(matrix, right, least, most, force)
-        friction, limit = np.zeros(n), np.zeros(n)
-        friction[rubs], limit[hit] = force[:rubbing], (sign * force)[rubbing:]
-        return friction, limit
+        ends = np.cumsum([0, *map(len, kinds)]).tolist()
+        return [dense.times(jacobian[a:b].T.copy(), force[a:b]) for a, b in pairwise(ends)]
 
-    def _stop(self, joint: int, place: float, speed: float) -> tuple[float, ...]:
-        """The row of the limit that a joint is beyond: sign, softness, reference, bounds."""
+    def _stop(self, joint: int, place: float, speed: float) -> Row:
+        """The row of the limit that a joint is beyond."""
         low, high = self._ranges
         above, below = place - low[joint], high[joint] - place
         side, gap = (1.0, above) if above < below else (-1.0, below)
-        curve, (damping, stiffness, weight) = self._stops[joint]
-        impedance = _impedance(curve, gap)
-        goal = -damping * side * speed - stiffness * impedance * gap
-        return side, _softness(impedance, weight), goal, 0.0, math.inf
+        return soft_row(self._stops[joint], side * self._unit[joint], gap, side * speed)
 
 
 _FLAGS = {
@@ -285,6 +303,7 @@ _FLAGS = {
     "spring": _OFF.mjDSBL_SPRING,
     "friction": _OFF.mjDSBL_FRICTIONLOSS,
     "limit": _OFF.mjDSBL_LIMIT,
+    "equality": _OFF.mjDSBL_EQUALITY,
     "constraint": _OFF.mjDSBL_CONSTRAINT,
     "actuation": _OFF.mjDSBL_ACTUATION,
     "refsafe": _OFF.mjDSBL_REFSAFE,
@@ -297,49 +316,3 @@ def in_force(raw: mujoco.MjModel) -> Any:
     groups = raw.actuator_group
     off = (groups >= 0) & (groups < 31) & ((raw.opt.disableactuator >> (groups & 31)) & 1 > 0)
     return ~off & (not raw.opt.disableflags & int(_OFF.mjDSBL_ACTUATION))
-
-
-def _range(ranges: Array, limited: Any) -> tuple[Array, Array]:
-    low, high = np.where(limited[:, None], ranges, [-np.inf, np.inf]).T
-    return low, high
-
-
-def _curves(solimp: Array) -> list[list[float]]:
-    """Rows of solimp, each number within what MuJoCo takes; then the scales of both halves.
-
-    Their powers are Python's: the last bits of NumPy's are those of the processor.
-    """
-    least, most = [1e-4, 1e-4, 1e-15, 1e-4, 1.0], [0.9999, 0.9999, 9e9, 0.9999, 9e9]
-    curves = []
-    for low, high, width, middle, power in np.clip(solimp, least, most).tolist():
-        scales = [math.pow(part, power - 1) or _TINY for part in (middle, 1 - middle)]
-        curves.append([low, high, width, middle, power, *scales])
-    return curves
-
-
-def _impedance(curve: Sequence[float], distance: float) -> float:
-    """d(r) of a curve [MuJoCo's manual, chapter Modeling, Solver parameters]."""
-    low, high, width, middle, power, rising, falling = curve
-    if width <= 1e-15:
-        return (low + high) / 2
-    x = min(abs(distance) / width, 1.0)
-    part = math.pow(x, power) / rising if x <= middle else 1 - math.pow(1 - x, power) / falling
-    return low + part * (high - low)
-
-
-def _softness(impedance: float, inverse_weight: float) -> float:
-    """R, by which a constraint yields to its own force."""
-    return max((1 - impedance) / impedance * inverse_weight, 1e-15)
-
-
-def _spring(solref: Array, solimp: Array, shortest: float) -> tuple[Array, Array]:
-    """Damping b and stiffness k of the reference acceleration, of solref (n, 2)."""
-    time, ratio = solref.T
-    most = np.clip(solimp[:, 1], 1e-4, 0.9999)
-    given = time <= 0  # then they are stiffness and damping, negated
-    time = np.where(given, 1.0, np.maximum(time, shortest))
-    damping = np.where(given, -ratio / most, 2 / (most * time))
-    stiffness = np.where(
-        given, -solref[:, 0] / most**2, 1 / (most * time * np.where(given, 1, ratio)) ** 2
-    )
-    return damping, stiffness

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
 from ..measures.text import few
+from ._bullet_constraints import ends_of, linear_sum
 from ._bullet_contacts import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_law import in_force
 from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, roughness
@@ -41,7 +42,7 @@ def check(plan: Plan, backend: str) -> None:
     """
     raw = plan.raw
     problems = _of_the_whole(raw)
-    rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw)]
+    rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw), *_of_ties(raw)]
     if not raw.opt.disableflags & NO_CONTACT:
         rows += _of_geoms(raw)
     problems += [
@@ -69,8 +70,6 @@ def check(plan: Plan, backend: str) -> None:
 def _of_the_whole(raw: mujoco.MjModel) -> list[tuple[str, str]]:
     """Whole kinds of elements, and settings of the model, with what is to be said of them."""
     counts = {
-        "equality constraint": raw.neq,
-        "tendon": raw.ntendon,
         "flex": raw.nflex,
         "explicit contact pair": raw.npair,
         "plugin": raw.nplugin,
@@ -105,7 +104,6 @@ def _of_bodies(raw: mujoco.MjModel) -> Rows:
         large[root] = parts(raw, root) > MOST_PARTS
     much = f"has more than {MOST_PARTS} bodies and joints"
     return [
-        ("body", "mocap body", raw.body_mocapid >= 0, "is one"),
         ("body", "a tree of so many parts", large, much),
     ]
 
@@ -115,6 +113,7 @@ def _of_actuators(raw: mujoco.MjModel) -> Rows:
     own |= raw.actuator_dampingpoly.any(axis=1)
     used, joints = in_force(raw), raw.actuator_trnid[:, 0]
     on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    on_tendon = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
     turning = np.zeros(raw.nactuator, dtype=bool)
     turning[on_joint] = np.isin(raw.jnt_type[joints[on_joint]], (_FREE, _BALL))
     between = (raw.actuator_delay != 0) & (raw.actuator_history[:, 1] != 0)
@@ -124,11 +123,34 @@ def _of_actuators(raw: mujoco.MjModel) -> Rows:
     name, says = "actuator", "has it: give it to the joint"
     return [
         (name, "actuator armature or damping", own, says),
-        (name, "actuator transmission", used & ~on_joint, "does not drive a joint"),
+        (name, "actuator transmission", used & ~(on_joint | on_tendon), "drives no joint"),
         (name, "actuator of a free joint", used & turning, "is one"),
         (name, "actuator dynamics", used & stateful, "has a state of its own"),
         (name, "interpolated latency", used & between, "acts between two commands"),
         (name, "actuator gain", used & ~straight, "has one that is not constant"),
+    ]
+
+
+def _of_ties(raw: mujoco.MjModel) -> Rows:
+    """Tendons and equality constraints: what goes through space, and what ties two trees."""
+    spatial, several = np.zeros((2, raw.ntendon), dtype=bool)
+    for tendon in range(raw.ntendon):
+        bodies = raw.jnt_bodyid[linear_sum(raw, tendon)[0]]
+        spatial[tendon] = not len(bodies)
+        several[tendon] = len(set(raw.body_rootid[bodies])) > 1
+    poly = raw.tendon_stiffnesspoly.any(axis=1) | raw.tendon_dampingpoly.any(axis=1)
+    strange, apart = np.zeros((2, raw.neq), dtype=bool)
+    for eq in np.flatnonzero(raw.eq_active0):
+        bodies = ends_of(raw, eq)
+        strange[eq] = not bodies
+        apart[eq] = len({int(raw.body_rootid[b]) for b in bodies if raw.body_treeid[b] >= 0}) > 1
+    return [
+        ("tendon", "spatial tendon", spatial, "goes through space"),
+        ("tendon", "tendon between trees", several, "is of joints of several trees"),
+        ("tendon", "nonlinear tendon", poly, "has a spring or damper that is not linear"),
+        ("tendon", "force range of a tendon", raw.tendon_actfrclimited.astype(bool), "has one"),
+        ("equality", "equality constraint", strange, "is of a kind that is not known here"),
+        ("equality", "equality between trees", apart, "ties two trees of bodies"),
     ]
 
 

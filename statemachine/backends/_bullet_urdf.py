@@ -162,7 +162,7 @@ def _once(name: str, taken: set[str], suffix: str = "") -> str:
     return name
 
 
-def _anchor(raw: mujoco.MjModel, body: int) -> Array:
+def anchor(raw: mujoco.MjModel, body: int) -> Array:
     """Where a body's last joint is, in the body's frame: the origin of its link."""
     joints = axes(raw, body)
     return raw.jnt_pos[joints[-1]] if joints else np.zeros(3)
@@ -187,7 +187,7 @@ def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, 
 
 
 def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Element:
-    anchor, joints = _anchor(raw, body), axes(raw, body)
+    origin, joints = anchor(raw, body), axes(raw, body)
     frame = matrix_from_quat(raw.body_iquat[body])
     mass, inertia = float(raw.body_mass[body]), np.diag(raw.body_inertia[body])
     if joints:
@@ -197,7 +197,7 @@ def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Ele
         "link",
         _element(
             "inertial",
-            _origin(raw.body_ipos[body] - anchor, frame),
+            _origin(raw.body_ipos[body] - origin, frame),
             _element("mass", value=mass),
             _inertia(inertia),
         ),
@@ -206,7 +206,7 @@ def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Ele
     for geom in range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body]):
         touches = raw.geom_contype[geom] or raw.geom_conaffinity[geom]
         if dialect.solids if touches else dialect.looks:
-            link.extend(_geom(raw, geom, anchor, "collision" if touches else "visual", dialect))
+            link.extend(_geom(raw, geom, origin, "collision" if touches else "visual", dialect))
     return link
 
 
@@ -264,7 +264,7 @@ def _joints(
     upper = int(raw.body_parentid[body])
     parent = "world" if body == root else names.links[upper]
     turn = matrix_from_quat(raw.body_quat[body])
-    place = raw.body_pos[body] - (np.zeros(3) if body == root else _anchor(raw, upper))
+    place = raw.body_pos[body] - (np.zeros(3) if body == root else anchor(raw, upper))
     if body == root and floats(raw, root):
         turn, place = np.eye(3), np.zeros(3)
     joints = axes(raw, body)
@@ -341,7 +341,7 @@ def _tip(raw: mujoco.MjModel, site: int, names: Names) -> Iterator[Element]:
     body, name = int(raw.site_bodyid[site]), names.tips[site]
     mat = matrix_from_quat(raw.site_quat[site])
     yield _bare_link(name, 0.0, np.zeros((3, 3)))
-    where = _origin(raw.site_pos[site] - _anchor(raw, body), mat)
+    where = _origin(raw.site_pos[site] - anchor(raw, body), mat)
     yield _joint(names.tips_fixed[site], "fixed", names.links[body], name, where)
 
 

@@ -15,7 +15,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ..interface import Array
-from ..rotations import matrix_from_quat, xyzw_from_wxyz
+from ..rotations import matrix_from_quat, wxyz_from_xyzw, xyzw_from_wxyz
+from ..rotations import times as quat_times
 from ..silence import silence
 from . import _bullet_urdf as urdf
 from . import _dense as dense
@@ -424,11 +425,42 @@ class World:
         mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
         if not tree.free:
             return mass
-        # The engine's base is turning, then moving, in its own axes.
-        axes = np.eye(n)
-        axes[:6, :6] = 0.0
-        axes[:3, 3:6], axes[3:6, :3] = np.eye(3), matrix_from_quat(np.array(q[3:7])).T
+        axes = _base_axes(q, n)
         return dense.product(np.ascontiguousarray(axes.T), dense.product(mass, axes))
+
+    def body_pose(self, tree: Tree, body: int) -> tuple[Array, Array]:
+        """The xpos (3,) and xquat (4,) of a body that is not the engine's base."""
+        raw = self._raw
+        where, axes, *_ = pb.getLinkState(tree.body, tree.links[body], 0, 1, self.client)
+        quat = quat_times(wxyz_from_xyzw(np.array(axes)), raw.body_iquat[body] * [1, -1, -1, -1])
+        return where - dense.times(matrix_from_quat(quat), raw.body_ipos[body]), quat
+
+    def jacobian(
+        self, tree: Tree, q: Sequence[float], body: int, pose: tuple[Array, Array], point: Array
+    ) -> Array:
+        """How a point that is fixed to a body moves, then turns, by the tree's `qvel`: (6, n).
+
+        Args:
+            tree: The tree, which the world has in the same pose.
+            q: Its `qpos`.
+            body: MuJoCo's id.
+            pose: xpos (3,) and xquat (4,) of the body.
+            point: (3,) in the world.
+        """
+        zeros, angles = [0.0] * len(tree.joints), q[7 * tree.free :]
+        moving, turning = pb.calculateJacobian(
+            tree.body, tree.links[body], (0.0, 0.0, 0.0), angles, zeros, zeros, self.client
+        )
+        moving, turning = np.array(moving), np.array(turning)
+        if tree.free:
+            axes, turn = _base_axes(q, len(tree.dofs)), matrix_from_quat(np.array(q[3:7]))
+            moving, turning = (
+                dense.product(turn, dense.product(rows, axes)) for rows in (moving, turning)
+            )
+        # What the engine tells is of the origin of the link, where its last joint is.
+        where, quat = pose
+        origin = where + dense.times(matrix_from_quat(quat), urdf.anchor(self._raw, body))
+        return np.vstack([moving + np.cross(turning, point - origin, axisa=0).T, turning])
 
     def push(self, tree: Tree, q: Sequence[float], force: Array) -> None:
         """Let a generalised force (n,) act on a tree, whose `qpos` are q, in the next step."""
@@ -448,6 +480,17 @@ class World:
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""
         return pb.getContactPoints(physicsClientId=self.client)
+
+
+def _base_axes(q: Sequence[float], n: int) -> Array:
+    """T (n, n), by which the engine's velocities of a tree that floats are T·qvel.
+
+    Its base turns, then moves, in its own axes.
+    """
+    axes = np.eye(n)
+    axes[:6, :6] = 0.0
+    axes[:3, 3:6], axes[3:6, :3] = np.eye(3), matrix_from_quat(np.array(q[3:7])).T
+    return axes
 
 
 ENGINE_TIMESTEP = 1 / 240

@@ -1,0 +1,372 @@
+"""MuJoCo's soft constraints of one tree of joints, as rows that the law of the tree solves.
+
+Those of joints the law has itself. Here are tendons that are linear sums of joints, and equality
+constraints: of joints, of tendons, and of two places, one of which may stand still [MuJoCo's
+manual, chapter Computation, section Constraint model].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from ..interface import Array
+from ..rotations import matrix_from_quat, times
+from . import _dense as dense
+from ._bullet_world import Tree, World
+
+_TINY = 1e-300  # for a power that is too small for a float
+_EQ = mujoco.mjtEq
+_SITE = int(mujoco.mjtObj.mjOBJ_SITE)
+_SUMS, _PLACES = (_EQ.mjEQ_JOINT, _EQ.mjEQ_TENDON), (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD)
+_INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
+
+
+class Row(NamedTuple):
+    """One constraint, which has a force F along J.
+
+    Attributes:
+        jacobian: J (n,).
+        softness: R, by which it yields to its own force.
+        reference: What J·a + R·F is to be.
+        least, most: Bounds of F.
+    """
+
+    jacobian: Array
+    softness: float
+    reference: float
+    least: float
+    most: float
+
+
+# The curve of a constraint's impedance; damping b, stiffness k and inverse weight.
+Soft = tuple[list[float], list[float]]
+
+
+def soft(solref: Array, solimp: Array, weight: Array, shortest: float) -> list[Soft]:
+    """Of each of m constraints, from its solref (m, 2), solimp (m, 5) and inverse weight (m,)."""
+    damping, stiffness = springs(solref, solimp, shortest)
+    constants = np.column_stack([damping, stiffness, weight]).tolist()
+    return list(zip(curves(solimp), constants, strict=True))
+
+
+def soft_row(
+    kind: Soft,
+    jacobian: Array,
+    gap: float,
+    speed: float,
+    bounds: tuple[float, float] = (0.0, math.inf),
+    distance: float | None = None,
+) -> Row:
+    """The row of a constraint.
+
+    Args:
+        kind: What it is like.
+        jacobian: J (n,).
+        gap: By how much it is not met.
+        speed: J·v.
+        bounds: Of its force.
+        distance: What its impedance depends on; by default the gap.
+    """
+    curve, (damping, stiffness, weight) = kind
+    strength = impedance(curve, gap if distance is None else distance)
+    goal = -damping * speed - stiffness * strength * gap
+    return Row(jacobian, softness(strength, weight), goal, *bounds)
+
+
+def linear_sum(raw: mujoco.MjModel, tendon: int) -> tuple[Any, Array]:
+    """Joints and factors (k,) of a tendon's length; none of one that goes through space."""
+    part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
+    if (raw.wrap_type[part] != int(mujoco.mjtWrap.mjWRAP_JOINT)).any():
+        return [], np.zeros(0)
+    return raw.wrap_objid[part], raw.wrap_prm[part]
+
+
+def ends_of(raw: mujoco.MjModel, eq: int) -> list[int]:
+    """The bodies that an equality constraint ties, of a kind that is known here; else none."""
+    kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
+    if kind in _PLACES:
+        sites = raw.eq_objtype[eq] == _SITE
+        return [int(raw.site_bodyid[end] if sites else end) for end in ends]
+    ends = [int(end) for end in ends if end >= 0]
+    if kind == _EQ.mjEQ_TENDON:
+        ends = [joint for end in ends for joint in linear_sum(raw, end)[0]]
+    return raw.jnt_bodyid[ends].tolist() if kind in _SUMS else []
+
+
+def related(raw: mujoco.MjModel, a: int, b: int) -> bool:
+    """Whether one of two degrees of freedom carries the other."""
+    low, high = min(a, b), max(a, b)
+    while high > low:
+        high = int(raw.dof_parentid[high])
+    return high == low
+
+
+class Tendons:
+    """The tendons of a tree that are linear sums of its joints.
+
+    Attributes:
+        ids: MuJoCo's numbers of them.
+        moments: By number, the moment (n,) of each.
+        armature, damping: (t,).
+        near: (n, n) the pairs of degrees of freedom of which one carries the other: MuJoCo's
+            matrices have no room for others.
+        stiff, limited, rubs: Whether any has a spring, a limit, dry friction.
+    """
+
+    def __init__(self, raw: mujoco.MjModel, tree: Tree, off: Mapping[str, bool]) -> None:
+        self.moments = dict[int, Array]()
+        for tendon in range(raw.ntendon):
+            joints, factors = linear_sum(raw, tendon)
+            if set(raw.body_rootid[raw.jnt_bodyid[joints]]) == {tree.root}:
+                self.moments[tendon] = moment = np.zeros(len(tree.dofs))
+                for dof, factor in zip(raw.jnt_dofadr[joints], factors, strict=True):
+                    moment[tree.dofs == dof] += factor
+        self.ids = ids = list(self.moments)
+        self._moment = np.array([*self.moments.values()]).reshape(len(ids), len(tree.dofs))
+        self._across = self._moment.T.copy()
+        self.near = np.array([[related(raw, a, b) for b in tree.dofs] for a in tree.dofs])
+        self.armature = raw.tendon_armature[ids]
+        self.damping = raw.tendon_damping[ids] * (not off["damper"])
+        self._stiffness = raw.tendon_stiffness[ids] * (not off["spring"])
+        self._slack = raw.tendon_lengthspring[ids].T
+        self.stiff = bool(self._stiffness.any())
+        shortest = 0.0 if off["refsafe"] else 2 * raw.opt.timestep
+        weight, on = raw.tendon_invweight0[ids], not off["constraint"]
+        self._friction = raw.tendon_frictionloss[ids] * (on and not off["friction"])
+        self.rubs = bool(self._friction.any())
+        self._rub = soft(raw.tendon_solref_fri[ids], raw.tendon_solimp_fri[ids], weight, shortest)
+        fenced = raw.tendon_limited[ids].astype(bool) & (on and not off["limit"])
+        self.limited = bool(fenced.any())
+        margin = raw.tendon_margin[ids][:, None] * [1.0, -1.0]
+        self._range = bounds_of(raw.tendon_range[ids] + margin, fenced)
+        self._stop = soft(raw.tendon_solref_lim[ids], raw.tendon_solimp_lim[ids], weight, shortest)
+
+    def squared(self, weight: Array) -> Array:
+        """Jᵀ·W·J (n, n) of weights (t,)."""
+        return dense.product(self._across * weight, self._moment)
+
+    def spring_force(self, angles: Array) -> Array:
+        """(n,) what springs do where they are beyond their slack."""
+        length = dense.times(self._moment, angles)
+        slack = np.minimum(np.maximum(length, self._slack[0]), self._slack[1])
+        return dense.times(self._across, self._stiffness * (slack - length))
+
+    def stops(self, angles: Array, speed: Array) -> list[Row]:
+        """Rows of the limits that tendons are beyond."""
+        rows = []
+        length, rate = dense.times(self._moment, angles), dense.times(self._moment, speed)
+        for k, (low, high) in enumerate(zip(*self._range, strict=True)):
+            for side, gap in ((1.0, length[k] - low), (-1.0, high - length[k])):
+                if gap < 0:
+                    rows.append(
+                        soft_row(self._stop[k], side * self._moment[k], gap, side * rate[k])
+                    )
+        return rows
+
+    def rubbing(self, speed: Array) -> list[Row]:
+        """Rows of dry friction."""
+        if not self.rubs:
+            return []
+        rate = dense.times(self._moment, speed)
+        return [
+            soft_row(self._rub[k], self._moment[k], 0.0, rate[k], (-most, most))
+            for k, most in enumerate(self._friction.tolist())
+            if most
+        ]
+
+
+class Equalities:
+    """The equality constraints of a tree that are in force."""
+
+    def __init__(
+        self,
+        raw: mujoco.MjModel,
+        world: World,
+        tree: Tree,
+        tendons: Tendons,
+        off: Mapping[str, bool],
+    ) -> None:
+        self._raw, self._world, self._tree = raw, world, tree
+        self._sums: list[tuple[Soft, list[Array], list[float], list[float]]] = []
+        self._places: list[tuple[int, list[Soft], list[Place]]] = []
+        shortest = 0.0 if off["refsafe"] else 2 * raw.opt.timestep
+        active = raw.eq_active0 & (not (off["equality"] or off["constraint"]))
+        for eq in np.flatnonzero(active).tolist():
+            bodies = ends_of(raw, eq)
+            if tree.root not in raw.body_rootid[bodies]:
+                continue
+            kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
+            style = raw.eq_solref[[eq]], raw.eq_solimp[[eq]]
+            if kind in _PLACES:
+                weights = raw.body_invweight0[bodies].sum(axis=0)
+                move, turn = (soft(*style, weights[[k]], shortest) for k in (0, 1))
+                kinds = move * 3 + turn * 3 * int(kind == _EQ.mjEQ_WELD)
+                places = [Place(raw, eq, side, body) for side, body in enumerate(bodies)]
+                self._places.append((eq, kinds, places))
+                continue
+            ends = [int(end) for end in ends if end >= 0]
+            if kind == _EQ.mjEQ_JOINT:
+                dofs = raw.jnt_dofadr[ends]
+                moments = [(tree.dofs == dof).astype(np.float64) for dof in dofs]
+                zero, weight = raw.qpos0[raw.jnt_qposadr[ends]], raw.dof_invweight0[dofs]
+            else:
+                moments = [tendons.moments[end] for end in ends]
+                zero, weight = raw.tendon_length0[ends], raw.tendon_invweight0[ends]
+            (own,) = soft(*style, weight.sum(keepdims=True), shortest)
+            self._sums.append((own, moments, zero.tolist(), raw.eq_data[eq, :5].tolist()))
+
+    def __bool__(self) -> bool:
+        return bool(self._sums or self._places)
+
+    def rows(self, q: Sequence[float], angles: Array, speed: Array) -> list[Row]:
+        """Their rows, where the tree's qpos are q, its angles (n,) and its velocities (n,)."""
+        rows, free = [], (-math.inf, math.inf)
+        for kind, moments, zero, factors in self._sums:
+            lengths = [
+                dense.dot(moment, angles) - at for moment, at in zip(moments, zero, strict=True)
+            ]
+            jacobian, gap = moments[0], lengths[0] - factors[0]
+            if len(moments) > 1:
+                gap -= sum(factors[k] * lengths[1] ** k for k in range(1, 5))
+                slope = sum(k * factors[k] * lengths[1] ** (k - 1) for k in range(1, 5))
+                jacobian = jacobian - slope * moments[1]
+            rows.append(soft_row(kind, jacobian, gap, dense.dot(jacobian, speed), free))
+        for eq, kinds, places in self._places:
+            gaps, jacobian, drift = self._apart(eq, places, q, speed)
+            distance = math.hypot(*gaps[: len(kinds)])
+            rates = dense.times(jacobian, speed)
+            for k, kind in enumerate(kinds):
+                row = soft_row(kind, jacobian[k], float(gaps[k]), float(rates[k]), free, distance)
+                rows.append(row._replace(reference=row.reference - float(drift[k])))
+        return rows
+
+    def _apart(
+        self, eq: int, places: list[Place], q: Sequence[float], speed: Array
+    ) -> tuple[Array, Array, Array]:
+        """By how much two places differ (6,), J (6, n) of that, and what J's change does (6,).
+
+        Three numbers are of their positions, three of their axes.
+        """
+        tree, n = self._tree, len(speed)
+        points, quats = [], []
+        moves, spins, drifts = np.zeros((2, 6, n)), np.zeros((2, 4)), np.zeros((2, 6))
+        for k, place in enumerate(places):
+            pose = place.still or self._world.body_pose(tree, place.body)
+            point = pose[0] + dense.times(matrix_from_quat(pose[1]), place.offset)
+            points.append(point)
+            quats.append(times(pose[1], place.quat))
+            if not place.still:
+                moves[k] = self._world.jacobian(tree, q, place.body, pose, point)
+                spins[k, 1:], drifts[k] = self._drift(moves[k], speed)
+        jacobian, drift = moves[0] - moves[1], drifts[0] - drifts[1]
+        scale, back = 0.5 * float(self._raw.eq_data[eq, 10]), quats[1] * _INVERSE
+
+        def turned(spin: Array) -> Array:
+            """What a spin (…, 3) does to the quaternion from one place to the other (…, 3)."""
+            pure = np.concatenate([np.zeros((*spin.shape[:-1], 1)), spin], axis=-1)
+            return times(times(back, pure), quats[0])
+
+        apart = spins[0] - spins[1]
+        moving = times(times(apart, spins[0]) - times(spins[1], apart), quats[0])
+        drift[3:] = scale * (turned(drift[3:]) + 0.5 * times(back, moving))[1:]
+        jacobian[3:] = scale * turned(jacobian[3:].T)[:, 1:].T
+        gaps = np.concatenate([points[0] - points[1], 2 * scale * times(back, quats[0])[1:]])
+        return gaps, jacobian, drift
+
+    def _drift(self, jacobian: Array, speed: Array) -> tuple[Array, Array]:
+        """How a place spins (3,), and how it moves and turns faster (6,) without any qacc.
+
+        The axis of each joint is a screw about the place, and moves with the body that carries
+        it: its rate is the motion cross product with that body's velocity [Featherstone, Rigid
+        Body Dynamics Algorithms, chapter 2].
+        """
+        order = np.argsort(self._tree.dofs)  # what carries comes before what is carried
+        moving, turning = jacobian[:3, order].T, jacobian[3:, order].T
+        move, turn = moving * speed[order, None], turning * speed[order, None]
+        # The velocity of what carries each axis; those of a free joint turn with its body.
+        carried = np.stack([move, turn]).cumsum(axis=1)
+        if self._tree.free:
+            carried[:, 3:6] = carried[:, 5:6]
+        (lift, spin), (velocity, whole) = carried, carried[:, -1]
+        rise = np.cross(spin, move) + np.cross(lift, turn)
+        faster = np.concatenate([rise.sum(axis=0), np.cross(spin, turn).sum(axis=0)])
+        faster[:3] += np.cross(whole, velocity)
+        return whole, faster
+
+
+class Place:
+    """What one side of a connect or a weld holds.
+
+    Attributes:
+        body: MuJoCo's id of the body.
+        offset, quat: (3,) and (4,) where in the body.
+        still: xpos and xquat of the body, if it never moves.
+    """
+
+    def __init__(self, raw: mujoco.MjModel, eq: int, side: int, body: int) -> None:
+        number, data = int((raw.eq_obj1id, raw.eq_obj2id)[side][eq]), raw.eq_data[eq]
+        weld = raw.eq_type[eq] == int(_EQ.mjEQ_WELD)
+        self.body, self.quat = body, np.array([1.0, 0.0, 0.0, 0.0])
+        if raw.eq_objtype[eq] == _SITE:
+            self.offset, self.quat = raw.site_pos[number], raw.site_quat[number]
+        else:
+            first = 3 * (side != weld)  # a weld has the anchor of its second body first
+            self.offset = data[first : first + 3]
+            if weld and not side:
+                self.quat = data[6:10]
+        self.still: tuple[Array, Array] | None = None
+        if raw.body_treeid[body] < 0:
+            still = mujoco.MjData(raw)
+            mujoco.mj_kinematics(raw, still)
+            self.still = still.xpos[body].copy(), still.xquat[body].copy()
+
+
+def bounds_of(ranges: Array, limited: Any) -> tuple[Array, Array]:
+    low, high = np.where(limited[:, None], ranges, [-np.inf, np.inf]).T
+    return low, high
+
+
+def curves(solimp: Array) -> list[list[float]]:
+    """Rows of solimp, each number within what MuJoCo takes; then the scales of both halves.
+
+    Their powers are Python's: the last bits of NumPy's are those of the processor.
+    """
+    least, most = [1e-4, 1e-4, 1e-15, 1e-4, 1.0], [0.9999, 0.9999, 9e9, 0.9999, 9e9]
+    curves = []
+    for low, high, width, middle, power in np.clip(solimp, least, most).tolist():
+        scales = [math.pow(part, power - 1) or _TINY for part in (middle, 1 - middle)]
+        curves.append([low, high, width, middle, power, *scales])
+    return curves
+
+
+def impedance(curve: Sequence[float], distance: float) -> float:
+    """d(r) of a curve [MuJoCo's manual, chapter Modeling, Solver parameters]."""
+    low, high, width, middle, power, rising, falling = curve
+    if width <= 1e-15:
+        return (low + high) / 2
+    x = min(abs(distance) / width, 1.0)
+    part = math.pow(x, power) / rising if x <= middle else 1 - math.pow(1 - x, power) / falling
+    return low + part * (high - low)
+
+
+def softness(impedance: float, inverse_weight: float) -> float:
+    """R, by which a constraint yields to its own force."""
+    return max((1 - impedance) / impedance * inverse_weight, 1e-15)
+
+
+def springs(solref: Array, solimp: Array, shortest: float) -> tuple[Array, Array]:
+    """Damping b and stiffness k of the reference acceleration, of solref (n, 2)."""
+    time, ratio = solref.T
+    most = np.clip(solimp[:, 1], 1e-4, 0.9999)
+    given = time <= 0  # then they are stiffness and damping, negated
+    time = np.where(given, 1.0, np.maximum(time, shortest))
+    damping = np.where(given, -ratio / most, 2 / (most * time))
+    stiffness = np.where(
+        given, -solref[:, 0] / most**2, 1 / (most * time * np.where(given, 1, ratio)) ** 2
+    )
+    return damping, stiffness
