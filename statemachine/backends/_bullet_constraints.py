@@ -17,12 +17,11 @@ import numpy as np
 from ..interface import Array
 from ..rotations import matrix_from_quat, times
 from . import _dense as dense
+from ._bullet_plan import PLACES, SITE, ends_of, linear_sum
 from ._bullet_world import Tree, World
 
 _TINY = 1e-300  # for a power that is too small for a float
 _EQ = mujoco.mjtEq
-_SITE = int(mujoco.mjtObj.mjOBJ_SITE)
-_SUMS, _PLACES = (_EQ.mjEQ_JOINT, _EQ.mjEQ_TENDON), (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD)
 _INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
 
 
@@ -76,26 +75,6 @@ def soft_row(
     strength = impedance(curve, gap if distance is None else distance)
     goal = -damping * speed - stiffness * strength * gap
     return Row(jacobian, softness(strength, weight), goal, *bounds)
-
-
-def linear_sum(raw: mujoco.MjModel, tendon: int) -> tuple[Any, Array]:
-    """Joints and factors (k,) of a tendon's length; none of one that goes through space."""
-    part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
-    if (raw.wrap_type[part] != int(mujoco.mjtWrap.mjWRAP_JOINT)).any():
-        return [], np.zeros(0)
-    return raw.wrap_objid[part], raw.wrap_prm[part]
-
-
-def ends_of(raw: mujoco.MjModel, eq: int) -> list[int]:
-    """The bodies that an equality constraint ties, of a kind that is known here; else none."""
-    kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
-    if kind in _PLACES:
-        sites = raw.eq_objtype[eq] == _SITE
-        return [int(raw.site_bodyid[end] if sites else end) for end in ends]
-    ends = [int(end) for end in ends if end >= 0]
-    if kind == _EQ.mjEQ_TENDON:
-        ends = [joint for end in ends for joint in linear_sum(raw, end)[0]]
-    return raw.jnt_bodyid[ends].tolist() if kind in _SUMS else []
 
 
 def related(raw: mujoco.MjModel, a: int, b: int) -> bool:
@@ -202,7 +181,7 @@ class Equalities:
                 continue
             kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
             style = raw.eq_solref[[eq]], raw.eq_solimp[[eq]]
-            if kind in _PLACES:
+            if kind in PLACES:
                 weights = raw.body_invweight0[bodies].sum(axis=0)
                 move, turn = (soft(*style, weights[[k]], shortest) for k in (0, 1))
                 kinds = move * 3 + turn * 3 * int(kind == _EQ.mjEQ_WELD)
@@ -312,7 +291,7 @@ class Place:
         number, data = int((raw.eq_obj1id, raw.eq_obj2id)[side][eq]), raw.eq_data[eq]
         weld = raw.eq_type[eq] == int(_EQ.mjEQ_WELD)
         self.body, self.quat = body, np.array([1.0, 0.0, 0.0, 0.0])
-        if raw.eq_objtype[eq] == _SITE:
+        if raw.eq_objtype[eq] == SITE:
             self.offset, self.quat = raw.site_pos[number], raw.site_quat[number]
         else:
             first = 3 * (side != weld)  # a weld has the anchor of its second body first

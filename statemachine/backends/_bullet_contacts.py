@@ -10,16 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ..interface import Array, Contacts
 from ..rotations import matrix_from_quat
 from . import _dense as dense
-from ._contact_rules import bodies_meet, masks_meet, mixed
+from ._contact_rules import bodies_meet, mixed
 
 PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -29,11 +30,16 @@ _CLOSE = 0.01  # a friction is the model's if it is within this part of it
 
 @dataclass(frozen=True)
 class Solid:
-    """What touches as one: the geoms of a body but for planes, or one plane of the world."""
+    """What touches as one: geoms of a body that meet the same, or one plane of the world.
+
+    Attributes:
+        part: A body's solids, numbered.
+    """
 
     body: int
     geoms: tuple[int, ...]
     plane: bool
+    part: int = 0
 
 
 class Surfaces:
@@ -41,30 +47,30 @@ class Surfaces:
 
     Attributes:
         solids: All that can touch; planes first.
+        touching: (ngeom,) which geoms may touch any other.
+        meets: (ngeom, ngeom) which may touch which.
         pairs: Of two solids, by their places, whether they meet.
         meeting: The geoms that do, two by two.
         slide, spin, roll: Each solid's friction.
-        mixed: Pairs of bodies of whose geoms some meet and some do not.
         differences: Where friction is not the model's, in words.
     """
 
     def __init__(self, raw: mujoco.MjModel) -> None:
         self._raw = raw
-        self.solids = [] if raw.opt.disableflags & NO_CONTACT else _solids(raw)
+        self.meets = _meets(raw)
+        touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+        touching[[*raw.pair_geom1, *raw.pair_geom2]] = True
+        self.touching = touching & (not raw.opt.disableflags & NO_CONTACT)
+        self.solids = _solids(raw, self.meets, self.touching)
         several: list[str] = []
         self.pairs: dict[tuple[int, int], bool] = {}
         self.meeting: list[tuple[int, int]] = []
-        self.mixed: list[str] = []
         wanted = []  # friction (3,) of each pair that meets
         for (i, left), (j, right) in combinations(enumerate(self.solids), 2):
-            meeting = [
-                (a, b) for a in left.geoms for b in right.geoms if masks_meet(raw, a, b)
-            ] * bodies_meet(raw, left.body, right.body)
-            self.pairs[i, j] = bool(meeting)
-            self.meeting += meeting
-            if meeting and len(meeting) < len(left.geoms) * len(right.geoms):
-                self.mixed.append(self._label(i, j))
-            if meeting:
+            meet = self.pairs[i, j] = bool(self.meets[left.geoms[0], right.geoms[0]])
+            if meet:
+                meeting = [(a, b) for a in left.geoms for b in right.geoms]
+                self.meeting += meeting
                 frictions = np.array([_friction(raw, a, b) for a, b in meeting])
                 wanted.append((i, j, frictions.max(axis=0)))
                 if np.ptp(frictions[:, 0]) > _CLOSE * frictions[:, 0].max():
@@ -127,26 +133,56 @@ class Surfaces:
         return np.maximum(np.round(frictions, 12), 0.0)
 
 
-def _solids(raw: mujoco.MjModel) -> list[Solid]:
-    touching = [g for g in range(raw.ngeom) if raw.geom_contype[g] or raw.geom_conaffinity[g]]
-    planes = [g for g in touching if raw.geom_type[g] == PLANE]
-    solids = [Solid(0, (g,), True) for g in planes]
+def _meets(raw: mujoco.MjModel) -> NDArray[np.bool_]:
+    """(ngeom, ngeom): which geoms may touch."""
+    if raw.opt.disableflags & NO_CONTACT:
+        return np.zeros((raw.ngeom, raw.ngeom), dtype=bool)
+    meets = (raw.geom_contype[:, None] & raw.geom_conaffinity) != 0
+    meets |= meets.T
+    bodies = {body: raw.geom_bodyid == body for body in np.unique(raw.geom_bodyid).tolist()}
+    for (a, left), (b, right) in product(bodies.items(), repeat=2):
+        if not bodies_meet(raw, a, b):
+            meets[np.ix_(left, right)] = False
+    meets[raw.pair_geom1, raw.pair_geom2] = meets[raw.pair_geom2, raw.pair_geom1] = True
+    return meets
+
+
+def _solids(
+    raw: mujoco.MjModel, meets: NDArray[np.bool_], touching: NDArray[np.bool_]
+) -> list[Solid]:
+    """Geoms of a body that meet the same are one solid."""
+    planes = touching & (raw.geom_type == PLANE)
+    solids = [Solid(0, (g,), True) for g in np.flatnonzero(planes).tolist()]
     for body in range(raw.nbody):
-        geoms = tuple(g for g in touching if raw.geom_bodyid[g] == body and g not in planes)
-        if geoms:
-            solids.append(Solid(body, geoms, False))
+        alike: dict[bytes, list[int]] = {}
+        for geom in np.flatnonzero(touching & ~planes & (raw.geom_bodyid == body)).tolist():
+            alike.setdefault(meets[geom].tobytes(), []).append(geom)
+        solids += [
+            Solid(body, tuple(geoms), False, part) for part, geoms in enumerate(alike.values())
+        ]
     return solids
+
+
+def _mixed(raw: mujoco.MjModel, a: int, b: int) -> tuple[int, Array, Array]:
+    """The condim, friction (3,) and solref (2,) of a contact of two geoms."""
+    ends = np.sort([raw.pair_geom1, raw.pair_geom2], axis=0).T
+    named = np.flatnonzero((ends == sorted((a, b))).all(axis=1))
+    if len(named):
+        (pair, *_) = named.tolist()
+        friction = raw.pair_friction[pair, [0, 2, 3]]
+        return int(raw.pair_dim[pair]), friction, raw.pair_solref[pair]
+    return mixed(raw, a, b)[:3]
 
 
 def _friction(raw: mujoco.MjModel, a: int, b: int) -> Array:
     """Sliding, spinning and rolling friction of a pair, zero where its condim leaves it out."""
-    condim, friction, _, _ = mixed(raw, a, b)
+    condim, friction, _ = _mixed(raw, a, b)
     return friction * (condim > np.array([1, 3, 4]))
 
 
 def damping_ratios(raw: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
     """Of contacts of geoms (n, 2), by their solref."""
-    first, second = np.array([mixed(raw, a, b)[2] for a, b in pairs]).T
+    first, second = np.array([_mixed(raw, a, b)[2] for a, b in pairs]).T
     # Negated, they are stiffness and damping.
     return np.where(first <= 0, -second / (2 * np.sqrt(np.maximum(-first, 1e-15))), second)
 

@@ -43,6 +43,7 @@ from ._bullet_constraints import (
     softness,
     springs,
 )
+from ._bullet_medium import Medium
 from ._bullet_world import Tree, World
 
 _OFF = mujoco.mjtDisableBit
@@ -76,6 +77,7 @@ class Law:
         # Linear in x, which is positions (of a free joint: zeros), velocities and 1.
         passive = np.column_stack([-np.diag(stiffness), -np.diag(damping), rest])
         euler = raw.opt.integrator in _EXPLICIT
+        self._later = 0.0 if euler else h  # how much of a velocity's change forces feel at once
         damped_later = 0.0 if euler and off["eulerdamp"] else h
         self._tendons = tendons = Tendons(raw, tree, off)
         # The inertia that constraints feel, and the one that velocities are found with.
@@ -83,10 +85,11 @@ class Law:
         if len(tendons.ids):
             heavy, damp = (tendons.squared(w) for w in (tendons.armature, tendons.damping))
             self._inertia += heavy * tendons.near
-            self._inertia[1] += (0.0 if euler else h) * damp * tendons.near
+            self._inertia[1] += self._later * damp * tendons.near
             passive[:, len(dofs) : -1] -= damp
         self._zeros, self._nothing = [0.0] * len(dofs), np.zeros(len(dofs))
         feedback = self._take_actuators(raw, joints, off)
+        self._medium = Medium(raw, world, tree, off)
         self._equalities = Equalities(raw, world, tree, tendons, off)
 
         rub = not (off["friction"] or off["constraint"])
@@ -133,8 +136,7 @@ class Law:
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
         feedback = [bias[:, k, None] * self._gear.T for k in (1, 2)]
-        later = 0.0 if raw.opt.integrator in _EXPLICIT else self._timestep
-        self._slope = -later * self._gear * bias[:, 2]
+        self._slope = -self._later * self._gear * bias[:, 2]
         self._unsaturated = self._with_slope(np.ones(len(ids)))
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = bounds_of(raw.actuator_forcerange[ids], limited)
@@ -230,6 +232,10 @@ class Law:
                 held = dense.times(np.abs(self._gear.T), beyond) > 0
                 inertia = self._with_slope((force == wanted) & ~held)
                 actuator = within
+        if self._medium:
+            drag, slope = self._medium.forces(self._q, speed)
+            passive = passive + drag
+            inertia = np.array([inertia[0], inertia[1] + self._later * slope])
         explicit, implicit = mass + inertia
         dense.factored(explicit)
         dense.factored(implicit)

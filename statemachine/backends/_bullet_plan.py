@@ -27,6 +27,8 @@ _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
 _YIELDS = 0.02
 # PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
 MOST_PARTS = 120
+_EQ, SITE = mujoco.mjtEq, int(mujoco.mjtObj.mjOBJ_SITE)
+_SUMS, PLACES = (_EQ.mjEQ_JOINT, _EQ.mjEQ_TENDON), (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD)
 
 
 Faces = NDArray[np.int64]  # (m, 3) numbers of vertices
@@ -68,7 +70,9 @@ class Plan:
             return False
         own = slice(raw.body_dofadr[root], raw.body_dofadr[root] + 6)
         laws = raw.dof_armature, raw.dof_damping, raw.dof_frictionloss
-        return not any(law[own].any() for law in laws)
+        medium = raw.opt.density or raw.opt.viscosity or raw.body_gravcomp[root]
+        tied = root in raw.body_rootid[[b for eq in range(raw.neq) for b in ends_of(raw, eq)]]
+        return not (medium or tied or any(law[own].any() for law in laws))
 
     @cached_property
     def padding(self) -> Array:
@@ -123,6 +127,7 @@ class Plan:
             padding=self.padding if kind == "stepped" else None,
             tips=kind != "stepped" and urdf.parts(raw, root) + sites <= MOST_PARTS,
             hulls=frozenset(hulls),
+            parts={geom: solid.part for solid in self.surfaces.solids for geom in solid.geoms},
         )
         files = {
             urdf.hull_file(geom): self.hulls[geom].obj(smaller=kind == "stepped")
@@ -181,6 +186,26 @@ def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array
         own = moving.T @ moving if slides else turning.T @ shape @ turning
         total += share[dof] * own
     return total
+
+
+def linear_sum(raw: mujoco.MjModel, tendon: int) -> tuple[Any, Array]:
+    """Joints and factors (k,) of a tendon's length; none of one that goes through space."""
+    part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
+    if (raw.wrap_type[part] != int(mujoco.mjtWrap.mjWRAP_JOINT)).any():
+        return [], np.zeros(0)
+    return raw.wrap_objid[part], raw.wrap_prm[part]
+
+
+def ends_of(raw: mujoco.MjModel, eq: int) -> list[int]:
+    """The bodies that an equality constraint ties, of a kind that is known here; else none."""
+    kind, ends = _EQ(int(raw.eq_type[eq])), [raw.eq_obj1id[eq], raw.eq_obj2id[eq]]
+    if kind in PLACES:
+        sites = raw.eq_objtype[eq] == SITE
+        return [int(raw.site_bodyid[end] if sites else end) for end in ends]
+    ends = [int(end) for end in ends if end >= 0]
+    if kind == _EQ.mjEQ_TENDON:
+        ends = [joint for end in ends for joint in linear_sum(raw, end)[0]]
+    return raw.jnt_bodyid[ends].tolist() if kind in _SUMS else []
 
 
 class Hull:

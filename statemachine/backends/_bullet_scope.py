@@ -11,10 +11,9 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
 from ..measures.text import few
-from ._bullet_constraints import ends_of, linear_sum
 from ._bullet_contacts import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_law import in_force
-from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, roughness
+from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, ends_of, linear_sum, roughness
 from ._bullet_urdf import parts, roots
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
@@ -44,16 +43,12 @@ def check(plan: Plan, backend: str) -> None:
     problems = _of_the_whole(raw)
     rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw), *_of_ties(raw)]
     if not raw.opt.disableflags & NO_CONTACT:
-        rows += _of_geoms(raw)
+        rows += _of_geoms(plan)
     problems += [
         (feature, f"{kind} {_name(raw, kind, k)} {says}")
         for kind, feature, which, says in rows
         for k in np.flatnonzero(which).tolist()
     ]
-    if pairs := few(plan.surfaces.mixed):
-        problems.append(
-            ("contact masks within a body", f"of {pairs} some geoms meet and some do not")
-        )
     if not problems:
         return
     feature, reason = problems[0]
@@ -71,13 +66,9 @@ def _of_the_whole(raw: mujoco.MjModel) -> list[tuple[str, str]]:
     """Whole kinds of elements, and settings of the model, with what is to be said of them."""
     counts = {
         "flex": raw.nflex,
-        "explicit contact pair": raw.npair,
         "plugin": raw.nplugin,
-        "gravity compensation": raw.ngravcomp,
     }
     problems = [(feature, f"the model has {count}") for feature, count in counts.items() if count]
-    if raw.opt.density or raw.opt.viscosity:
-        problems.append(("fluid", "density or viscosity is not zero"))
     return problems
 
 
@@ -89,6 +80,7 @@ def _of_joints(raw: mujoco.MjModel) -> Rows:
     free = raw.jnt_type == _FREE
     span = raw.jnt_range[:, 1] - raw.jnt_range[:, 0]
     features = {
+        "compensation of gravity by actuators": raw.jnt_actgravcomp.astype(bool),
         "ball joint": raw.jnt_type == _BALL,
         "stiffness of a free joint": free & (raw.jnt_stiffness != 0),
         "nonlinear spring": raw.jnt_stiffnesspoly.any(axis=1),
@@ -154,11 +146,15 @@ def _of_ties(raw: mujoco.MjModel) -> Rows:
     ]
 
 
-def _of_geoms(raw: mujoco.MjModel) -> Rows:
-    touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+def _of_geoms(plan: Plan) -> Rows:
+    raw, touching = plan.raw, plan.surfaces.touching
+    wet = bool(raw.opt.density or raw.opt.viscosity) & (raw.geom_fluid[:, 0] > 0)
     strange = touching & ~np.isin(raw.geom_type, _SOLIDS)
     planes = touching & (raw.geom_type == PLANE) & (raw.geom_bodyid > 0)
-    rows = [("geom", "plane on a body", planes, "is not the world's own")]
+    rows = [
+        ("geom", "plane on a body", planes, "is not the world's own"),
+        ("geom", "fluid around an ellipsoid", wet, "has it"),
+    ]
     for kind in np.unique(raw.geom_type[strange]).tolist():
         says = f"is a {mujoco.mjtGeom(kind).name[7:].lower()}"
         rows.append(("geom", "shape of a geom", strange & (raw.geom_type == kind), says))
@@ -184,7 +180,7 @@ def ignored(plan: Plan) -> list[str]:
     if raw.jnt_springyield.any():
         sentences.append(f"springyield has no effect ({_list(raw, 'joint', raw.jnt_springyield)})")
     if not raw.opt.disableflags & NO_CONTACT:
-        touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+        touching = plan.surfaces.touching
         margins = raw.geom_margin * touching
         if margins.any():
             largest = int(margins.argmax())
@@ -222,7 +218,7 @@ def _bounces(plan: Plan) -> list[str]:
 def softness(plan: Plan) -> str:
     """Geoms that touch and have a solref or solimp of their own, in words; "" without any."""
     raw = plan.raw
-    touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+    touching = plan.surfaces.touching
     own = (raw.geom_solref != _SOLREF).any(axis=1) | (raw.geom_solimp != _SOLIMP).any(axis=1)
     geoms = np.flatnonzero(own & touching).tolist() if plan.surfaces.solids else []
     return few([str(_name(raw, "geom", geom)) for geom in geoms])

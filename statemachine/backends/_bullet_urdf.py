@@ -9,8 +9,8 @@ Numbers are written so that reading them back gives the same float64.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -50,6 +50,8 @@ class Dialect:
             what the engine moves; of another it moves the centre of mass.
         tips: Write a link for each site.
         hulls: Geoms that are read from a file of their own, see `hull_file`.
+        parts: Of a geom that touches, in which link of its body it is: 0 is the body's own,
+            others have a link without mass each, fixed to it.
         padding: (nv,) J of each degree of freedom. The link that a hinge carries gets
             J times `padding_shape` [kg m²] more inertia about its centre of mass, the
             link that a slide carries J [kg] more mass.
@@ -64,6 +66,7 @@ class Dialect:
     padding: Array | None = None
     tips: bool = True
     hulls: frozenset[int] = frozenset()
+    parts: Mapping[int, int] = field(default_factory=dict)
 
 
 def roots(raw: mujoco.MjModel) -> list[int]:
@@ -117,6 +120,13 @@ def write(
         robot.append(_link(raw, body, dialect, names))
         if body != root or on_world:
             robot.extend(_joints(raw, body, root, dialect, names))
+        geoms = range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body])
+        for part in sorted({dialect.parts.get(geom, 0) for geom in geoms} - {0}):
+            name, fixed = names.part(body, part)
+            link = _bare_link(name, 0.0, np.zeros((3, 3)))
+            link.extend(_geoms(raw, body, part, dialect))
+            where = _origin(np.zeros(3), np.eye(3))
+            robot.extend([link, _joint(fixed, "fixed", names.links[body], name, where)])
     for site in range(raw.nsite if dialect.tips else 0):
         if raw.body_rootid[raw.site_bodyid[site]] == root and root:
             robot.extend(_tip(raw, site, names))
@@ -148,6 +158,20 @@ class Names:
         self.between = {j: _once(f"{name}_link", links) for j, name in self.joints.items()}
         self.fixed = {b: _once(f"{name}_fixed", joints) for b, name in self.links.items()}
         self.tips_fixed = {s: _once(f"{name}_fixed", joints) for s, name in self.tips.items()}
+
+        self._parts: dict[tuple[int, int], tuple[str, str]] = {}
+        self._taken = links, joints
+
+    def part(self, body: int, part: int) -> tuple[str, str]:
+        """Of the link of a part of a body, and of its fixed joint."""
+        if (body, part) not in self._parts:
+            name = f"{self.links[body]}_part_{part}"
+            link, fixed = (
+                _once(text, taken)
+                for text, taken in zip((name, f"{name}_fixed"), self._taken, strict=True)
+            )
+            self._parts[body, part] = link, fixed
+        return self._parts[body, part]
 
 
 def _once(name: str, taken: set[str], suffix: str = "") -> str:
@@ -203,11 +227,18 @@ def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Ele
         ),
         name=names.links[body],
     )
-    for geom in range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body]):
-        touches = raw.geom_contype[geom] or raw.geom_conaffinity[geom]
-        if dialect.solids if touches else dialect.looks:
-            link.extend(_geom(raw, geom, origin, "collision" if touches else "visual", dialect))
+    link.extend(_geoms(raw, body, 0, dialect))
     return link
+
+
+def _geoms(raw: mujoco.MjModel, body: int, part: int, dialect: Dialect) -> Iterator[Element]:
+    """What of a body's geoms is in one of its links."""
+    for geom in range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body]):
+        touches = raw.geom_contype[geom] or raw.geom_conaffinity[geom] or geom in dialect.parts
+        wanted = dialect.solids if touches else dialect.looks
+        if wanted and dialect.parts.get(geom, 0) == part:
+            tag = "collision" if touches else "visual"
+            yield from _geom(raw, geom, anchor(raw, body), tag, dialect)
 
 
 def _geom(

@@ -56,6 +56,7 @@ class Tree:
         base: How many of them are the free joint's.
         qpos, qvel: What of these arrays is the tree's: a slice where that is enough.
         links: PyBullet's index of each body's link; -1 is the base.
+        parts: The same of each further solid of a body, by body and part.
         tips: PyBullet's index of each site's link, where it has one.
     """
 
@@ -67,6 +68,11 @@ class Tree:
         indices = {info[12].decode(): info[0] for info in infos}
         bodies = urdf.tree(raw, root)
         self.links = {b: indices.get(names.links[b], -1) for b in bodies}
+        self.parts = {
+            (solid.body, solid.part): indices.get(names.part(solid.body, solid.part)[0], -1)
+            for solid in plan.surfaces.solids
+            if solid.part and solid.body in self.links
+        }
         sites = [
             s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
         ]
@@ -220,9 +226,14 @@ class World:
 
     def solids(self) -> Iterator[tuple[int, int, Solid]]:
         """PyBullet's body and link of all that can touch, in the order of the surfaces."""
-        links = {b: (tree.body, link) for tree in self.trees for b, link in tree.links.items()}
+        links = {}
+        for tree in self.trees:
+            own = {(b, 0): link for b, link in tree.links.items()} | tree.parts
+            links |= {place: (tree.body, link) for place, link in own.items()}
         for solid in self._surfaces.solids:
-            body, link = (self._planes[solid.geoms[0]], -1) if solid.plane else links[solid.body]
+            body, link = (
+                (self._planes[solid.geoms[0]], -1) if solid.plane else links[solid.body, solid.part]
+            )
             yield body, link, solid
 
     def joints(self) -> Iterator[tuple[int, int, int]]:
@@ -447,19 +458,22 @@ class World:
             pose: xpos (3,) and xquat (4,) of the body.
             point: (3,) in the world.
         """
+        where, quat = pose
+        # What the engine tells is of the origin of the link, where its last joint is.
+        origin = where + dense.times(matrix_from_quat(quat), urdf.anchor(self._raw, body))
         zeros, angles = [0.0] * len(tree.joints), q[7 * tree.free :]
-        moving, turning = pb.calculateJacobian(
-            tree.body, tree.links[body], (0.0, 0.0, 0.0), angles, zeros, zeros, self.client
-        )
-        moving, turning = np.array(moving), np.array(turning)
+        if tree.joints:
+            rows = pb.calculateJacobian(
+                tree.body, tree.links[body], (0.0, 0.0, 0.0), angles, zeros, zeros, self.client
+            )
+        else:  # of a body without joints it tells nothing
+            rows, origin = (np.eye(6)[3:], np.eye(6)[:3]), np.array(q[:3])
+        moving, turning = (np.array(part) for part in rows)
         if tree.free:
             axes, turn = _base_axes(q, len(tree.dofs)), matrix_from_quat(np.array(q[3:7]))
             moving, turning = (
                 dense.product(turn, dense.product(rows, axes)) for rows in (moving, turning)
             )
-        # What the engine tells is of the origin of the link, where its last joint is.
-        where, quat = pose
-        origin = where + dense.times(matrix_from_quat(quat), urdf.anchor(self._raw, body))
         return np.vstack([moving + np.cross(turning, point - origin, axisa=0).T, turning])
 
     def push(self, tree: Tree, q: Sequence[float], force: Array) -> None:
