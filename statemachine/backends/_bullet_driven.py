@@ -19,7 +19,8 @@ from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
 from . import _dense as dense
 from ._bullet_client import pb
 from ._bullet_contacts import contacts_of
-from ._bullet_law import Law, in_force
+from ._bullet_drives import in_force
+from ._bullet_law import Law
 from ._bullet_plan import Plan
 from ._bullet_world import Tree, World
 from ._hidden_world import HiddenWorld, Memory, Moment, Read, bounded

@@ -43,6 +43,7 @@ from ._bullet_constraints import (
     softness,
     springs,
 )
+from ._bullet_drives import Drives
 from ._bullet_medium import Medium
 from ._bullet_world import Tree, World
 
@@ -88,21 +89,26 @@ class Law:
             self._inertia[1] += self._later * damp * tendons.near
             passive[:, len(dofs) : -1] -= damp
         self._zeros, self._nothing = [0.0] * len(dofs), np.zeros(len(dofs))
-        feedback = self._take_actuators(raw, joints, off)
+        self.drives = Drives(raw, tree, tendons, off, self._later, self._inertia)
         self._medium = Medium(raw, world, tree, off)
         self._equalities = Equalities(raw, world, tree, tendons, off)
 
+        self._take_constraints(raw, joints, off)
+        damped = np.zeros(passive.shape)
+        damped[:, len(dofs) : -1] = np.diag(self._rub_b)
+        self._linear = np.vstack([passive, damped, self.drives.feedback])
+
+    def _take_constraints(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> None:
+        """What is known of the dry friction and the limits of joints."""
+        dofs = self.tree.dofs
         rub = not (off["friction"] or off["constraint"])
         self._frictionloss = raw.dof_frictionloss[dofs] * rub
         self._least_rub = -self._frictionloss
         self._steady = _STEADY**2 * dense.dot(self._frictionloss, self._frictionloss)
         weight = raw.dof_invweight0[dofs]
-        floor = 0.0 if off["refsafe"] else 2 * h
+        floor = 0.0 if off["refsafe"] else 2 * self._timestep
         solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
         self._rub_b, _ = springs(solref, solimp, floor)
-        damped = np.zeros(passive.shape)
-        damped[:, len(dofs) : -1] = np.diag(self._rub_b)
-        self._linear = np.vstack([passive, damped, feedback])
         still = [impedance(curve, 0.0) for curve in curves(solimp)]
         self._rub_r = np.array([softness(*pair) for pair in zip(still, weight, strict=True)])
         self._rub_weight = weight + self._rub_r
@@ -111,7 +117,7 @@ class Law:
         # Joints with friction: softness, -b, most.
         columns = np.column_stack([self._rub_r, -self._rub_b, self._frictionloss])
         self._rub_rows = list(zip(rubs.tolist(), columns[rubs].tolist(), strict=True))
-        self._coupled = bool(self._equalities) or tendons.rubs
+        self._coupled = bool(self._equalities) or self._tendons.rubs
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
         # A limit acts from its margin on, and as if it were there.
@@ -120,37 +126,6 @@ class Law:
         self._ranges: tuple[list[float], list[float]] = low.tolist(), high.tolist()
         solref, solimp = raw.jnt_solref[joints], raw.jnt_solimp[joints]
         self._stops = soft(solref, solimp, weight, floor)
-
-    def _take_actuators(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> Array:
-        """Force = clip(gain·clip(ctrl) + b₀ + b₁·length + b₂·speed); length = gear·q."""
-        on_tendon = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
-        target = raw.actuator_trnid[:, 0]
-        driven = np.where(on_tendon, np.isin(target, self._tendons.ids), np.isin(target, joints))
-        ids = np.flatnonzero(driven & (not off["actuation"]) & in_force(raw))
-        self._ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
-        self._gear = np.zeros((len(joints), len(ids)))
-        for column, a in enumerate(ids):
-            moment = self._tendons.moments.get(target[a]) if on_tendon[a] else joints == target[a]
-            self._gear[:, column] = raw.actuator_gear[raw.actuator_outadr[a], 0] * moment
-        affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
-        bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
-        self._gain = raw.actuator_gainprm[ids, 0]
-        feedback = [bias[:, k, None] * self._gear.T for k in (1, 2)]
-        self._slope = -self._later * self._gear * bias[:, 2]
-        self._unsaturated = self._with_slope(np.ones(len(ids)))
-        limited = raw.actuator_forcelimited[ids].astype(bool)
-        self._low_force, self._high_force = bounds_of(raw.actuator_forcerange[ids], limited)
-        fenced = raw.jnt_actfrclimited[joints].astype(bool)
-        self._fence = bounds_of(raw.jnt_actfrcrange[joints], fenced) if fenced.any() else None
-        self._straight = np.array_equal(self._gear, np.eye(len(joints)))
-        return np.column_stack([*feedback, bias[:, 0]])
-
-    def _with_slope(self, free: Array) -> Array:
-        """Both inertias, with the slope of the actuators that are not at their limit."""
-        inertias = self._inertia.copy()
-        slope = dense.product(self._slope * free, self._gear.T.copy())
-        inertias[1] += slope * self._tendons.near
-        return inertias
 
     def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
         """Start from a state; contact and friction (n,) are those of the step before it."""
@@ -161,6 +136,7 @@ class Law:
         """Take over what the engine made of the last step."""
         self._take(*self._world.read_tree(self.tree))
         self._contact = None
+        self.drives.pass_step()
 
     def _take(self, q: Sequence[float], v: Sequence[float]) -> None:
         self._q, self._v = q, v
@@ -196,7 +172,7 @@ class Law:
 
     def command(self, ctrl: Array) -> None:
         """Take a new command (nu,) of the whole model, within range."""
-        self._aim = self._gain * ctrl[self._ids]
+        self.drives.command(ctrl)
 
     def drive(self, afresh: bool = False) -> None:
         """Give the engine the torque of the next step.
@@ -219,19 +195,8 @@ class Law:
         bias = np.array(self._ghost.needed(tree, self._q, v, self._zeros))
         q, speed = self._angles, x[n:-1]
         linear = dense.times(self._linear, x)
-        passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + self._aim
-        force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
-        actuator = force if self._straight else dense.times(self._gear, force)
-        inertia = self._unsaturated
-        if force.tobytes() != wanted.tobytes():
-            inertia = self._with_slope(force == wanted)
-        if self._fence is not None:  # of whole joints: what drives one beyond it has no slope
-            within = np.minimum(np.maximum(actuator, self._fence[0]), self._fence[1])
-            if within.tobytes() != actuator.tobytes():
-                beyond = np.asarray(within != actuator, dtype=np.float64)
-                held = dense.times(np.abs(self._gear.T), beyond) > 0
-                inertia = self._with_slope((force == wanted) & ~held)
-                actuator = within
+        passive, damped = linear[:n], linear[n : 2 * n]
+        actuator, inertia = self.drives.forces(linear[2 * n :])
         if self._medium:
             drag, slope = self._medium.forces(self._q, speed)
             passive = passive + drag
@@ -243,13 +208,8 @@ class Law:
             passive = passive + self._tendons.spring_force(x[:n])
         others = actuator + passive - bias + contact
         limit = equality = self._nothing
-        low, high = self._ranges
-        within = all(map(le, low, q)) and all(map(ge, high, q))
-        hit = [] if within else [i for i in range(n) if not low[i] <= q[i] <= high[i]]
-        rows = [self._stop(i, q[i], float(speed[i])) for i in hit]
-        if self._tendons.limited:
-            rows += self._tendons.stops(x[:n], speed)
-        solve = afresh or bool(rows) or self._coupled
+        stops = self._stops_reached(q, x[:n], speed)
+        solve = afresh or bool(stops) or self._coupled
         if not solve and len(self._rubs):
             # One sweep from the last step's friction, of all joints at once: enough where
             # it hardly changes, as in a joint that rests or slides.
@@ -264,11 +224,13 @@ class Law:
             rubbing = [
                 Row(self._unit[i], soft, damping * speed[i], -most, most)
                 for i, (soft, damping, most) in self._rub_rows
-            ] + self._tendons.rubbing(speed)
-            tied = self._equalities.rows(self._q, x[:n], speed) if self._equalities else []
-            friction, limit, equality = self._constrained(
-                explicit, others, friction, (rubbing, rows, tied)
+            ]
+            kinds = (
+                rubbing + self._tendons.rubbing(speed),
+                stops,
+                self._equalities.rows(self._q, x[:n], speed),
             )
+            friction, limit, equality = self._constrained(explicit, others, friction, kinds)
             others = others + limit + equality
         self.friction = friction
         self._parts = bias, actuator, passive, friction, limit, equality
@@ -296,12 +258,18 @@ class Law:
         ends = np.cumsum([0, *map(len, kinds)]).tolist()
         return [dense.times(jacobian[a:b].T.copy(), force[a:b]) for a, b in pairwise(ends)]
 
-    def _stop(self, joint: int, place: float, speed: float) -> Row:
-        """The row of the limit that a joint is beyond."""
+    def _stops_reached(self, q: Sequence[float], angles: Array, speed: Array) -> list[Row]:
+        """Rows of the limits that joints and tendons are beyond."""
         low, high = self._ranges
-        above, below = place - low[joint], high[joint] - place
-        side, gap = (1.0, above) if above < below else (-1.0, below)
-        return soft_row(self._stops[joint], side * self._unit[joint], gap, side * speed)
+        rows = self._tendons.stops(angles, speed) if self._tendons.limited else []
+        if all(map(le, low, q)) and all(map(ge, high, q)):
+            return rows
+        for i, (least, place, most) in enumerate(zip(low, q, high, strict=True)):
+            if not least <= place <= most:
+                side, gap = min((place - least, 1.0), (most - place, -1.0))[::-1]
+                rate = side * float(speed[i])
+                rows.append(soft_row(self._stops[i], side * self._unit[i], gap, rate))
+        return rows
 
 
 _FLAGS = {
@@ -315,10 +283,3 @@ _FLAGS = {
     "refsafe": _OFF.mjDSBL_REFSAFE,
     "eulerdamp": _OFF.mjDSBL_EULERDAMP,
 }
-
-
-def in_force(raw: mujoco.MjModel) -> Any:
-    """(nactuator,) bool: which actuators the model's file does not turn off."""
-    groups = raw.actuator_group
-    off = (groups >= 0) & (groups < 31) & ((raw.opt.disableactuator >> (groups & 31)) & 1 > 0)
-    return ~off & (not raw.opt.disableflags & int(_OFF.mjDSBL_ACTUATION))

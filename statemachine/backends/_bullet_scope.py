@@ -12,7 +12,7 @@ from ..errors import UnsupportedError
 from ..interface import Array, JointType
 from ..measures.text import few
 from ._bullet_contacts import NO_CONTACT, PLANE, damping_ratios
-from ._bullet_law import in_force
+from ._bullet_drives import DYNAMICS, in_force
 from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, ends_of, linear_sum, roughness
 from ._bullet_urdf import parts, roots
 
@@ -111,13 +111,18 @@ def _of_actuators(raw: mujoco.MjModel) -> Rows:
     between = (raw.actuator_delay != 0) & (raw.actuator_history[:, 1] != 0)
     straight = raw.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED)
     straight &= np.isin(raw.actuator_biastype, _AFFINE)
-    stateful = raw.actuator_dyntype != int(mujoco.mjtDyn.mjDYN_NONE)
+    stateful = ~np.isin(raw.actuator_dyntype, [int(mujoco.mjtDyn.mjDYN_NONE), *DYNAMICS])
     name, says = "actuator", "has it: give it to the joint"
     return [
         (name, "actuator armature or damping", own, says),
         (name, "actuator transmission", used & ~(on_joint | on_tendon), "drives no joint"),
         (name, "actuator of a free joint", used & turning, "is one"),
-        (name, "actuator dynamics", used & stateful, "has a state of its own"),
+        (
+            name,
+            "actuator dynamics",
+            used & stateful,
+            "has a state of a kind that is not known here",
+        ),
         (name, "interpolated latency", used & between, "acts between two commands"),
         (name, "actuator gain", used & ~straight, "has one that is not constant"),
     ]
