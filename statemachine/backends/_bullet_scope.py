@@ -32,16 +32,19 @@ _SOLIDS = [
 ] + list(HULLS)
 
 
-def check(plan: Plan, backend: str) -> None:
+def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     """Raise UnsupportedError, naming all that PyBullet cannot be told of a model.
 
     Args:
         plan: The compiled model and what can touch what in it.
         backend: For the message.
+        as_it_comes: Whether nothing is emulated: then the law of the tree is not there either.
     """
     raw = plan.raw
     problems = _of_the_whole(raw)
     rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw), *_of_ties(raw)]
+    if as_it_comes:
+        problems += _of_the_law(raw)
     if not raw.opt.disableflags & NO_CONTACT:
         rows += _of_geoms(plan)
     problems += [
@@ -70,6 +73,20 @@ def _of_the_whole(raw: mujoco.MjModel) -> list[tuple[str, str]]:
     }
     problems = [(feature, f"the model has {count}") for feature, count in counts.items() if count]
     return problems
+
+
+def _of_the_law(raw: mujoco.MjModel) -> list[tuple[str, str]]:
+    """What the adapter emulates, and the engine as it comes has nothing of."""
+    tendons = raw.tendon_stiffness.any() or raw.tendon_damping.any() or raw.tendon_limited.any()
+    features = {
+        "equality constraint": raw.eq_active0.any(),
+        "tendon": tendons or raw.tendon_frictionloss.any() or raw.tendon_armature.any(),
+        "actuator transmission": raw.actuator_trntype.any(),
+        "actuator dynamics": raw.na,
+        "gravity compensation": raw.ngravcomp,
+        "fluid": raw.opt.density or raw.opt.viscosity,
+    }
+    return [(name, "the engine as it comes has none") for name, has in features.items() if has]
 
 
 # A kind of element, what it may have, which ones have it (a mask), and how that is said.
@@ -115,13 +132,13 @@ def _of_actuators(raw: mujoco.MjModel) -> Rows:
     name, says = "actuator", "has it: give it to the joint"
     return [
         (name, "actuator armature or damping", own, says),
-        (name, "actuator transmission", used & ~(on_joint | on_tendon), "drives no joint"),
+        (name, "actuator transmission", used & ~(on_joint | on_tendon), "does not drive a joint"),
         (name, "actuator of a free joint", used & turning, "is one"),
         (
             name,
             "actuator dynamics",
             used & stateful,
-            "has a state of a kind that is not known here",
+            "has a state of its own",
         ),
         (name, "interpolated latency", used & between, "acts between two commands"),
         (name, "actuator gain", used & ~straight, "has one that is not constant"),

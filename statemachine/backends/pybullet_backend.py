@@ -173,7 +173,7 @@ def load(
         raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
         raw = with_room(raw)
     plan = Plan(raw)
-    check(plan, "pybullet")
+    check(plan, "pybullet", defaults == "engine")
     model = PybulletModel(
         plan, Path(path), substeps, defaults, checked.get("max_qvel"), there=there
     )
@@ -275,7 +275,7 @@ class PybulletModel(HiddenModel):
 
     def _of(self, raw: mujoco.MjModel, substeps: int, asked: Array | None) -> PybulletModel:
         plan = Plan(raw)
-        check(plan, "pybullet")
+        check(plan, "pybullet", self.defaults == "engine")
         return PybulletModel(
             plan, self.path, substeps, self.defaults, asked, self.acts, self._there
         )

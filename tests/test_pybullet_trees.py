@@ -1,0 +1,249 @@
+"""Trees that float, what ties them and what acts on them: PyBullet against MuJoCo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import UnsupportedError
+
+from .conftest import refused
+from .small_models import loaded
+
+pytestmark = pytest.mark.usefixtures("bullet")
+
+BASES = {
+    "fixed": "",
+    "floating": "<freejoint/>",
+    "dragged": '<joint type="free" armature=".1" damping=".3" frictionloss=".2"/>',
+}
+TREE = """<body name="base" pos=".1 .2 1" euler="10 20 30"> {base}
+ <inertial pos=".02 -.01 .03" mass="3" fullinertia=".03 .04 .05 .002 .001 -.003"/>
+ <body name="upper" pos=".2 0 .05" euler=".3 .2 .1">
+  <joint name="a" axis="0 1 0" pos=".01 .02 0" armature=".01" damping=".05"/>
+  <inertial pos=".1 0 0" mass=".7" diaginertia=".002 .003 .004"/>
+  <body name="lower" pos=".2 0 0">
+   <joint name="s" type="slide" axis="1 0 .2" stiffness="40" damping="1"/>
+   <joint name="b" axis="1 0 .2" frictionloss=".02" damping=".05"/>
+   <inertial pos="0 .05 .1" quat="1 .2 .3 .1" mass=".4" diaginertia=".001 .0015 .002"/>
+   <site name="tip" pos=".1 .1 .02" quat="1 .1 .2 .3"/>
+  </body>
+ </body>
+ <body name="side" pos="-.2 0 .05"><joint name="c" axis="0 1 0" damping=".02"/>
+  <inertial pos="-.1 .02 0" mass=".5" diaginertia=".002 .002 .003"/><site name="mark"/></body>
+</body>
+<body name="target" mocap="true" pos=".4 .5 1" quat="1 .3 .2 .1"/>
+<site name="home" pos=".3 .2 .9"/>"""
+SUM = '<joint joint="a" coef="1"/><joint joint="c" coef="-.7"/></fixed>'
+# What stands behind the tree.
+TIES = {
+    "nothing": "",
+    "joints": '<equality><joint joint1="a" joint2="c" polycoef=".1 .5 .3 .2 .1"/></equality>',
+    "one joint": '<equality><joint joint1="a" polycoef=".3 0 0 0 0" solref=".05 .7"/></equality>',
+    "spring": f'<tendon><fixed stiffness="3" damping=".3" springlength="0 .1">{SUM}</tendon>',
+    "armature": f'<tendon><fixed armature=".02">{SUM}</tendon>',
+    "friction": f'<tendon><fixed frictionloss=".05">{SUM}</tendon>',
+    "limit": f'<tendon><fixed range="-.1 .05" margin=".01">{SUM}</tendon>',
+    "tendons": f'<tendon><fixed name="t">{SUM}<fixed name="u"><joint joint="b" coef="1"/></fixed>'
+    '</tendon><equality><tendon tendon1="t" tendon2="u" polycoef=".1 1 .2 0 0"/></equality>',
+    "motor": f'<tendon><fixed name="t">{SUM}</tendon><actuator><position tendon="t" kp="3" kv=".3" '
+    'gear="1.5" forcerange="-.4 .4"/><motor joint="b" gear=".2"/></actuator>',
+    "filters": '<actuator><position joint="a" kp="5" kv=".2" timeconst=".1"/><general joint="b" '
+    'dyntype="filter" dynprm=".05" gainprm=".3"/><intvelocity joint="c" kp="2" actrange="-.2 .3"/>'
+    '<general joint="s" dyntype="integrator" actearly="true" gainprm="9"/></actuator>',
+    "connect": '<equality><connect body1="lower" anchor="0 .1 0"/></equality>',
+    "loop": '<equality><connect body1="lower" body2="side" anchor="0 .1 0"/></equality>',
+    "weld": '<equality><weld body1="lower" body2="target" torquescale=".7"/></equality>',
+    "mocap first": '<equality><weld body1="target" body2="lower" relpose=".1 0 .2 1 .2 .1 .1" '
+    'anchor=".02 .03 .1"/></equality>',
+    "weld within": '<equality><weld body1="side" body2="lower" solref=".03 1"/></equality>',
+    "sites": '<equality><weld site1="tip" site2="home"/></equality>',
+    "sites within": '<equality><connect site1="tip" site2="mark"/></equality>',
+}  # fmt: skip
+MEDIA = ('density="1000"', 'viscosity="2"', 'density="1000" viscosity="1" wind=".3 .1 0"')
+
+
+def option(integrator: str, more: str = "") -> str:
+    return f'<option timestep="0.002" integrator="{integrator}" {more}/>'
+
+
+def gap(models: list[sm.Model], steps: int = 300) -> float:
+    """The largest gap of qpos under random commands; they move, and `forward` agrees at the end."""
+    random, worst, fastest = np.random.default_rng(0), 0.0, 0.0
+    with sm.make_data(models[0]) as left, sm.make_data(models[1]) as right:
+        for k in range(steps):
+            if k % 20 == 0:
+                left.ctrl[:] = right.ctrl[:] = random.uniform(-1, 1, models[0].nu)
+            sm.step(models[0], left)
+            sm.step(models[1], right)
+            worst = max(worst, float(np.abs(left.qpos - right.qpos).max()))
+            fastest = max(fastest, float(np.abs(left.qvel).max()))
+        assert fastest > 0.01
+        right.qpos, right.qvel = left.qpos, left.qvel
+        for model, data in zip(models, (left, right), strict=True):
+            sm.forward(model, data)
+        for name in ("xpos", "site_xpos", "qfrc_bias", "qfrc_passive", "qfrc_actuator", "qacc"):
+            ours, theirs = getattr(right, name), getattr(left, name)
+            assert np.abs(ours - theirs).max() < 1e-5 * max(1.0, np.abs(theirs).max()), name
+    return worst
+
+
+def both(folder: Path, world: str, rest: str, settings: str) -> list[sm.Model]:
+    return [
+        loaded(folder, world, rest, option=settings, backend=name)
+        for name in ("mujoco", "pybullet")
+    ]
+
+
+@pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("tie", TIES)
+def test_a_tree_moves_as_on_mujoco(tmp_path: Path, tie: str, base: str, integrator: str) -> None:
+    """1e-6 rad or m over 300 steps; 7e-7 was measured, of sites tied in a tree that is dragged."""
+    models = both(tmp_path, TREE.format(base=BASES[base]), TIES[tie], option(integrator))
+    assert gap(models) < 1e-6
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("medium", [*MEDIA, ""])
+def test_what_acts_on_each_body(tmp_path: Path, medium: str, base: str) -> None:
+    """Drag of a medium that is still or moves, and compensation of gravity."""
+    world = TREE.format(base=BASES[base]) + (
+        '<body name="stone" pos="1 1 1"><freejoint/>'
+        '<inertial mass="1" pos=".1 0 0" diaginertia=".01 .012 .013"/></body>'
+    )
+    if not medium:
+        for name, part in (("lower", 0.7), ("base", 0.3), ("stone", 1)):
+            world = world.replace(f'name="{name}"', f'name="{name}" gravcomp="{part}"')
+    models = both(tmp_path, world, "", option("implicitfast", medium))
+    assert gap(models) < 1e-6
+    raw = models[0].compiled
+    assert raw.ngravcomp or raw.opt.density or raw.opt.viscosity
+
+
+PAIRED = """<geom name="floor" type="plane" size="3 3 .1" contype="0" conaffinity="0"/>
+<body name="two" pos="0 0 .3"><freejoint/><geom name="low" size=".1" pos="0 0 -.1" mass="1" {low}/>
+<geom name="wide" type="box" size=".3 .3 .1" pos="0 0 .1" mass="1" {wide}/></body>"""
+HIDDEN, MASKED = 'contype="0" conaffinity="0"', 'contype="2" conaffinity="2"'
+
+
+@pytest.mark.parametrize(
+    ("low", "wide", "floor", "rest", "height"),
+    [
+        (HIDDEN, HIDDEN, "", '<contact><pair geom1="low" geom2="floor"/></contact>', 0.2),
+        (HIDDEN, HIDDEN, "", '<contact><pair geom1="floor" geom2="wide"/></contact>', 0.0),
+        ("", MASKED, 'contype="2" conaffinity="2"', "", 0.0),
+        ("", MASKED, 'contype="1" conaffinity="1"', "", 0.2),
+    ],
+)
+def test_geoms_of_one_body_meet_different_things(
+    tmp_path: Path, low: str, wide: str, floor: str, rest: str, height: float
+) -> None:
+    """A body rests on the geom that a pair names, or that the masks let meet the floor."""
+    world = PAIRED.format(low=low, wide=wide)
+    if floor:
+        world = world.replace('contype="0" conaffinity="0"/>', f"{floor}/>", 1)
+    for model in both(tmp_path, world, rest, option("implicitfast")):
+        with sm.make_data(model) as data:
+            data.qvel[:] = 0.0
+            sm.step(model, data, 1000)
+            assert data.qpos[2] == pytest.approx(height, abs=2e-3)
+            names = {model.compiled.geom(int(g)).name for g in np.ravel(data.contacts.geom)}
+            assert names == {"floor", "low" if height else "wide"}
+
+
+def test_a_state_carries_activations(tmp_path: Path) -> None:
+    """They act on, in a State, over a write to qpos, and in worlds."""
+    model = both(tmp_path, TREE.format(base=""), TIES["filters"], option("Euler"))[1]
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        data.ctrl[:] = 1.0
+        sm.step(model, data, 50)
+        state = sm.get_state(model, data)
+        act = state["act"]
+        assert np.abs(act).min() > 0.1
+        other.ctrl[:] = 1.0
+        sm.set_state(model, other, state)
+        for run in (data, other):
+            run.qpos[0] += 0.01
+            sm.step(model, run, 20)
+        assert np.array_equal(data.qpos, other.qpos)
+        assert (sm.get_state(model, data)["act"] != act).any()
+        sm.reset(model, data)
+        assert not sm.get_state(model, data)["act"].any()
+
+
+def test_a_keyframe_has_activations(tmp_path: Path) -> None:
+    key = '<keyframe><key qpos="0 0 0 0" act=".1 .2 .3 .4"/></keyframe>'
+    models = both(tmp_path, TREE.format(base=""), TIES["filters"] + key, option("Euler"))
+    with sm.make_data(models[0]) as left, sm.make_data(models[1]) as right:
+        for model, data in zip(models, (left, right), strict=True):
+            sm.reset(model, data, keyframe=0)
+            sm.step(model, data, 20)
+        assert np.abs(left.qpos - right.qpos).max() < 1e-9
+
+
+TWO = '<body name="x"><joint name="x"/><geom size=".1"/></body><body pos="1 0 0"><joint name="y"/>'
+REFUSED = {
+    "spatial tendon: tendon number 0 goes through space": (
+        "", '<tendon><spatial><site site="tip"/><site site="mark"/></spatial></tendon>',
+    ),
+    "equality between trees: equality tied ties two trees": (
+        TWO, '<equality><joint name="tied" joint1="x" joint2="y"/></equality>',
+    ),
+    "tendon between trees: tendon sum is of joints of several": (
+        TWO, '<tendon><fixed name="sum"><joint joint="x" coef="1"/><joint joint="y" coef="1"/>'
+        "</fixed></tendon>",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("says", REFUSED)
+def test_what_no_single_tree_can_do_is_refused(tmp_path: Path, says: str) -> None:
+    world, rest = REFUSED[says]
+    world = f'{world}<geom size=".1"/></body>' if world else TREE.format(base="")
+    loaded(tmp_path, world, rest)
+    refused((UnsupportedError, says, lambda: loaded(tmp_path, world, rest, backend="pybullet")))
+
+
+@pytest.mark.parametrize("tie", ["joints", "spring", "motor", "filters"])
+def test_as_it_comes_the_engine_has_no_law(tmp_path: Path, tie: str) -> None:
+    world = TREE.format(base="<freejoint/>")
+
+    def load() -> sm.Model:
+        return loaded(tmp_path, world, TIES[tie], backend="pybullet", defaults="engine")
+
+    refused((UnsupportedError, "the engine as it comes has none", load))
+
+
+def test_a_tree_floats_on_the_engine_as_it_comes(tmp_path: Path) -> None:
+    """It falls, by the law of its own, as MuJoCo's does in a vacuum; and tells where it is."""
+    world = TREE.format(base="<freejoint/>").replace("damping", "user")
+    settings = {"defaults": "engine", "gravity": (0, 0, -9.81), "timestep": 0.002}
+    model = loaded(tmp_path, world, backend="pybullet", **settings)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 100)
+        assert data.qpos[2] - 1 == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=0.05)
+        sm.forward(model, data)
+        assert data.xpos[1] == pytest.approx(data.qpos[:3])
+        assert np.isfinite(data.qfrc_bias).all()
+
+
+def test_mujoco_has_room_for_pairs_that_carry_each_other_only(tmp_path: Path) -> None:
+    """Of two branches, a tendon's armature adds to each, and nothing between them."""
+    raw = loaded(tmp_path, TREE.format(base=""), TIES["armature"]).compiled
+    bare = loaded(tmp_path, TREE.format(base=""), TIES["spring"]).compiled
+    mass = []
+    for each in (raw, bare):
+        data = mujoco.MjData(each)
+        mujoco.mj_forward(each, data)
+        full = np.zeros((each.nv, each.nv))
+        mujoco.mj_fullM(each, data, full)
+        mass.append(full)
+    added = mass[0] - mass[1]
+    assert added[0, 0] == pytest.approx(0.02)
+    assert added[3, 3] == pytest.approx(0.02 * 0.7**2)
+    assert added[0, 3] == 0
