@@ -25,7 +25,7 @@ _EQ = mujoco.mjtEq
 _INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
 
 
-class Row(NamedTuple):
+class SoftRow(NamedTuple):
     """One constraint, which has a force F along J.
 
     Attributes:
@@ -60,7 +60,7 @@ def soft_row(
     speed: float,
     bounds: tuple[float, float] = (0.0, math.inf),
     distance: float | None = None,
-) -> Row:
+) -> SoftRow:
     """The row of a constraint.
 
     Args:
@@ -74,7 +74,7 @@ def soft_row(
     curve, (damping, stiffness, weight) = kind
     strength = impedance(curve, gap if distance is None else distance)
     goal = -damping * speed - stiffness * strength * gap
-    return Row(jacobian, softness(strength, weight), goal, *bounds)
+    return SoftRow(jacobian, softness(strength, weight), goal, *bounds)
 
 
 def related(raw: mujoco.MjModel, a: int, b: int) -> bool:
@@ -135,7 +135,7 @@ class Tendons:
         slack = np.minimum(np.maximum(length, self._slack[0]), self._slack[1])
         return dense.times(self._across, self._stiffness * (slack - length))
 
-    def stops(self, angles: Array, speed: Array) -> list[Row]:
+    def stops(self, angles: Array, speed: Array) -> list[SoftRow]:
         """Rows of the limits that tendons are beyond."""
         rows = []
         length, rate = dense.times(self._moment, angles), dense.times(self._moment, speed)
@@ -147,7 +147,7 @@ class Tendons:
                     )
         return rows
 
-    def rubbing(self, speed: Array) -> list[Row]:
+    def rubbing(self, speed: Array) -> list[SoftRow]:
         """Rows of dry friction."""
         if not self.rubs:
             return []
@@ -172,7 +172,7 @@ class Equalities:
     ) -> None:
         self._raw, self._world, self._tree = raw, world, tree
         self._sums: list[tuple[Soft, list[Array], list[float], list[float]]] = []
-        self._places: list[tuple[int, list[Soft], list[Place]]] = []
+        self._places: list[tuple[int, list[Soft], list[TiedPlace]]] = []
         shortest = 0.0 if off["refsafe"] else 2 * raw.opt.timestep
         active = raw.eq_active0 & (not (off["equality"] or off["constraint"]))
         for eq in np.flatnonzero(active).tolist():
@@ -185,7 +185,7 @@ class Equalities:
                 weights = raw.body_invweight0[bodies].sum(axis=0)
                 move, turn = (soft(*style, weights[[k]], shortest) for k in (0, 1))
                 kinds = move * 3 + turn * 3 * int(kind == _EQ.mjEQ_WELD)
-                places = [Place(raw, eq, side, body) for side, body in enumerate(bodies)]
+                places = [TiedPlace(raw, eq, side, body) for side, body in enumerate(bodies)]
                 self._places.append((eq, kinds, places))
                 continue
             ends = [int(end) for end in ends if end >= 0]
@@ -202,7 +202,7 @@ class Equalities:
     def __bool__(self) -> bool:
         return bool(self._sums or self._places)
 
-    def rows(self, q: Sequence[float], angles: Array, speed: Array) -> list[Row]:
+    def rows(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
         """Their rows, where the tree's qpos are q, its angles (n,) and its velocities (n,)."""
         rows, free = [], (-math.inf, math.inf)
         for kind, moments, zero, factors in self._sums:
@@ -225,7 +225,7 @@ class Equalities:
         return rows
 
     def _apart(
-        self, eq: int, places: list[Place], q: Sequence[float], speed: Array
+        self, eq: int, places: list[TiedPlace], q: Sequence[float], speed: Array
     ) -> tuple[Array, Array, Array]:
         """By how much two places differ (6,), J (6, n) of that, and what J's change does (6,).
 
@@ -278,7 +278,7 @@ class Equalities:
         return whole, faster
 
 
-class Place:
+class TiedPlace:
     """What one side of a connect or a weld holds.
 
     Attributes:

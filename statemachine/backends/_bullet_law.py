@@ -33,7 +33,7 @@ from ..interface import Array
 from . import _dense as dense
 from ._bullet_constraints import (
     Equalities,
-    Row,
+    SoftRow,
     Tendons,
     bounds_of,
     curves,
@@ -222,7 +222,7 @@ class Law:
             solve = dense.dot(change, change) > self._steady
         if solve:
             rubbing = [
-                Row(self._unit[i], soft, damping * speed[i], -most, most)
+                SoftRow(self._unit[i], soft, damping * speed[i], -most, most)
                 for i, (soft, damping, most) in self._rub_rows
             ]
             kinds = (
@@ -237,7 +237,7 @@ class Law:
         return dense.solved(implicit, others + friction)
 
     def _constrained(
-        self, factor: Array, others: Array, friction: Array, kinds: Sequence[Sequence[Row]]
+        self, factor: Array, others: Array, friction: Array, kinds: Sequence[Sequence[SoftRow]]
     ) -> list[Array]:
         """Friction, limit and equality force (n,), by pivoting between free and bounded rows.
 
@@ -258,7 +258,7 @@ class Law:
         ends = np.cumsum([0, *map(len, kinds)]).tolist()
         return [dense.times(jacobian[a:b].T.copy(), force[a:b]) for a, b in pairwise(ends)]
 
-    def _stops_reached(self, q: Sequence[float], angles: Array, speed: Array) -> list[Row]:
+    def _stops_reached(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
         """Rows of the limits that joints and tendons are beyond."""
         low, high = self._ranges
         rows = self._tendons.stops(angles, speed) if self._tendons.limited else []

@@ -413,20 +413,29 @@ class World:
         """
         if not tree.free:
             return pb.calculateInverseDynamics(tree.body, q, v, rate, 0, self.client)
-        w, x, y, z = q[3:7]
-        pose, back = (x, y, z, w), (-x, -y, -z, w)
-        with HiddenWorld.lock:  # gravity is all worlds' of a client
+        (centre, axes), (w, x, y, z) = self._frames[tree.body], q[3:7]
+        own = (x, y, z, w)
+        pose, inward = times(own, axes), (-axes[0], -axes[1], -axes[2], axes[3])
+        back, lift = (-pose[0], -pose[1], -pose[2], pose[3]), rate[:3]
+        if any(centre):  # only of a tree as it comes: of others the base is the body's origin
+            spin = np.array(v[3:6])
+            swing = np.cross(rate[3:6], centre) + np.cross(spin, np.cross(spin, centre))
+            lift = np.add(lift, turned(own, swing.tolist())).tolist()
+        with HiddenWorld.lock:  # gravity is all trees' of a client
             pb.setGravity(*turned(back, self._gravity), self.client)
             force = pb.calculateInverseDynamics(
                 tree.body,
                 [*_ORIGIN, *q[7:]],
-                [*v[3:6], 0.0, 0.0, 0.0, *v[6:]],
-                [*rate[3:6], *turned(back, rate[:3]), *rate[6:]],
+                [*turned(inward, v[3:6]), 0.0, 0.0, 0.0, *v[6:]],
+                [*turned(inward, rate[3:6]), *turned(back, lift), *rate[6:]],
                 0,
                 self.client,
             )
             pb.setGravity(*self._gravity, self.client)
-        return [*turned(pose, force[:3]), *force[3:]]
+        moment = turned(axes, force[3:6])
+        if any(centre):
+            moment = np.add(moment, np.cross(centre, turned(axes, force[:3]))).tolist()
+        return [*turned(pose, force[:3]), *moment, *force[6:]]
 
     def mass_matrix(self, tree: Tree, q: Sequence[float]) -> Array:
         """M (n, n) of a tree where its `qpos` are q, in the coordinates of its `qvel`."""
@@ -436,8 +445,22 @@ class World:
         mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
         if not tree.free:
             return mass
-        axes = _base_axes(q, n)
+        axes = self._base_axes(tree, q)
         return dense.product(np.ascontiguousarray(axes.T), dense.product(mass, axes))
+
+    def _base_axes(self, tree: Tree, q: Sequence[float]) -> Array:
+        """T (n, n), by which the engine's velocities of a tree that floats are T·qvel.
+
+        Its base turns, then moves, in its own axes.
+        """
+        centre, axes = self._frames[tree.body]
+        inward = matrix_from_quat(wxyz_from_xyzw(np.array(axes))).T
+        back = matrix_from_quat(np.array(q[3:7])).T
+        change = np.eye(len(tree.dofs))
+        change[:3, :3], change[:3, 3:6] = 0.0, inward
+        change[3:6, :3] = dense.product(inward, back)
+        change[3:6, 3:6] = dense.product(inward, np.cross(np.eye(3), centre).T.copy())
+        return change
 
     def body_pose(self, tree: Tree, body: int) -> tuple[Array, Array]:
         """The xpos (3,) and xquat (4,) of a body that is not the engine's base."""
@@ -470,7 +493,7 @@ class World:
             rows, origin = (np.eye(6)[3:], np.eye(6)[:3]), np.array(q[:3])
         moving, turning = (np.array(part) for part in rows)
         if tree.free:
-            axes, turn = _base_axes(q, len(tree.dofs)), matrix_from_quat(np.array(q[3:7]))
+            axes, turn = self._base_axes(tree, q), matrix_from_quat(np.array(q[3:7]))
             moving, turning = (
                 dense.product(turn, dense.product(rows, axes)) for rows in (moving, turning)
             )
@@ -494,17 +517,6 @@ class World:
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""
         return pb.getContactPoints(physicsClientId=self.client)
-
-
-def _base_axes(q: Sequence[float], n: int) -> Array:
-    """T (n, n), by which the engine's velocities of a tree that floats are T·qvel.
-
-    Its base turns, then moves, in its own axes.
-    """
-    axes = np.eye(n)
-    axes[:6, :6] = 0.0
-    axes[:3, 3:6], axes[3:6, :3] = np.eye(3), matrix_from_quat(np.array(q[3:7])).T
-    return axes
 
 
 ENGINE_TIMESTEP = 1 / 240

@@ -57,7 +57,6 @@ class PybulletEngine(RawEngine):
 
         NaN for free bodies, of which the engine does not tell it, and between trees.
         """
-        from ...backends._bullet_client import pb
         from ...backends._bullet_driven import ghost_of
 
         # What is stepped carries the armature in links of its own: the ghost is the true arm.
@@ -66,9 +65,8 @@ class PybulletEngine(RawEngine):
         armature = model.capabilities.behaviours["armature"].support != "unsupported"
         mass = super().mass_matrix(model, data, qpos)
         for tree in world.trees:
-            if tree.joints:
-                places = qpos[tree.qpos].tolist()
-                own = np.array(pb.calculateMassMatrix(tree.body, places, 0, world.client))
+            if tree.driven:
+                own = world.mass_matrix(tree, qpos[tree.qpos].tolist())
                 if armature:
                     own += np.diag(model.dof_armature[tree.dofs])
                 mass[np.ix_(tree.dofs, tree.dofs)] = own

@@ -54,7 +54,8 @@ def terms(model: Model) -> tuple[Term, ...]:
 
 def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
     """The numbers of the joints, and of the fixed ones among them."""
-    for index, place in zip(tree.joints, model.compiled.dof_jntid[tree.dofs], strict=False):
+    joints = model.compiled.dof_jntid[tree.dofs[tree.base :]]
+    for index, place in zip(tree.joints, joints, strict=True):
         thing, slot = f"joint {model.joint_names[place]}", int(model.jnt_qposadr[place])
         yield Term(thing, f"qpos[{slot}]", f"joint {index} of body {tree.body}")
     infos = joint_infos(world.client, tree.body)
@@ -70,19 +71,19 @@ def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
     qpos, qvel = np.zeros(model.nq), np.zeros(model.nv)
     for _, start in model._quaternions:
         qpos[start : start + 4] = (np.sqrt(0.5), 0, 0, np.sqrt(0.5))
-    qvel[tree.qvel] = (0, 0, 0, 1, 0, 0)
+    qvel[tree.dofs[3]] = 1.0
     world.put(qpos, qvel)
     name = model.body_names[tree.root]
     _, quat = pb.getBasePositionAndOrientation(tree.body, world.client)
     _, spin = pb.getBaseVelocity(tree.body, world.client)
     yield Term(
         f"{name}, turned by 90° about z",
-        f"w x y z: {_figures(qpos[tree.qpos][3:])}",
+        f"w x y z: {_figures(qpos[tree.qpos][3:7])}",
         f"x y z w: {_figures(quat)}",
     )
     yield Term(
         f"{name}, spinning about its x",
-        f"own axes: {_figures(qvel[tree.qvel][3:])}",
+        f"own axes: {_figures(qvel[tree.qvel][3:6])}",
         f"world axes: {_figures(spin)}",
     )
 
@@ -160,6 +161,7 @@ def _explicit(world: World, tree: Tree) -> float:
     places = [state[0] for state in pb.getJointStates(tree.body, tree.joints, world.client)]
     mass = np.array(pb.calculateMassMatrix(tree.body, places, physicsClientId=world.client))
     damping = [pb.getJointInfo(tree.body, i, world.client)[6] for i in tree.joints]
+    damping = [0.0] * tree.base + damping
     return float(
         np.linalg.eigvals(np.linalg.solve(mass, np.diag(damping))).real.max() * ENGINE_TIMESTEP
     )
@@ -168,7 +170,7 @@ def _explicit(world: World, tree: Tree) -> float:
 def _joint(world: World, model: Model, joint: int) -> tuple[Tree, int]:
     dof = int(model.jnt_dofadr[joint])
     tree = next(tree for tree in world.trees if tree.joints and dof in tree.dofs)
-    return tree, tree.joints[tree.dofs.tolist().index(dof)]
+    return tree, tree.joints[tree.dofs.tolist().index(dof) - tree.base]
 
 
 class _AsLoaded(PybulletDriver):

@@ -221,13 +221,10 @@ class PybulletDriver(Driver):
         def dynamics(machine: Client) -> None:
             qpos, _ = machine.world.read()
             for tree in machine.world.trees:
-                if tree.joints:
-                    places = qpos[tree.qpos].tolist()
-                    none = [0.0] * len(places)
-                    pb.calculateInverseDynamics(
-                        tree.body, places, none, none, physicsClientId=machine.client
-                    )
-                    pb.calculateMassMatrix(tree.body, places, physicsClientId=machine.client)
+                if tree.driven:
+                    places, none = qpos[tree.qpos].tolist(), [0.0] * len(tree.dofs)
+                    machine.world.needed(tree, places, none, none)
+                    machine.world.mass_matrix(tree, places)
 
         return (
             Disturbance("getLinkState, forward kinematics", links),
