@@ -46,13 +46,13 @@ def place_of(model, name):
 class Simulation:
     """One simulation."""
 
-    keeps_memory, untold = True, UNTOLD
+    untold = UNTOLD
 
     def __init__(self, model):
         import mujoco
 
         self.engine, self.model, self.data = mujoco, model, mujoco.MjData(model)
-        self.memory = [("warmstart", model.nv)]
+        self.memory, self.kept_memory = [("warmstart", model.nv)], ["warmstart"]
 
     def place(self, vector):
         data, nq, nv = self.data, self.model.nq, self.model.nv

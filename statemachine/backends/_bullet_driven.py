@@ -62,6 +62,9 @@ class DrivenWorld(HiddenWorld):
         else:
             self._arms = [Law(raw, world, tree, ghost_of(plan)) for tree in trees]
             self.memory_layout = (("contact", self._nv), ("friction", self._nv))
+            if raw.na:
+                self.memory_layout += (("act", int(raw.na)),)
+                self.kept_memory = ("act",)
         # Whether the arrays of one arm, in their order, are those of the whole model.
         self._alone = not self._free and [type(tree.qpos) for tree in trees] == [slice]
         self._driven = False
@@ -76,7 +79,9 @@ class DrivenWorld(HiddenWorld):
         place = self.raw.put if self._kind == "engine" else self.raw.place
         place(qpos, qvel)
         for arm in self._arms:
-            arm.place(qpos, qvel, *(part[arm.tree.qvel] for part in memory))
+            arm.place(qpos, qvel, *(part[arm.tree.qvel] for part in memory[:2]))
+            if len(memory) > 2:
+                arm.drives.act = memory[2][arm.drives.places]
 
     def command(self, ctrl: Array) -> None:
         """To every arm."""
@@ -125,16 +130,25 @@ class DrivenWorld(HiddenWorld):
 
     @property
     def memory(self) -> Memory:
-        """Contact and friction (nv,) of the last step; the engine as it comes has none."""
+        """Contact and friction (nv,) of the last step, and activations; as it comes, none."""
         if self._kind == "engine":
             return ()
-        if self._alone:
+        if self._alone and not self.kept_memory:
             return self._arms[0].contact, self._arms[0].friction
-        contact, friction = np.zeros(self._nv), np.zeros(self._nv)
+        contact, friction, *act = (np.zeros(size) for _, size in self.memory_layout)
         for arm in self._arms:
             own = arm.tree.qvel
             contact[own], friction[own] = arm.contact, arm.friction
-        return contact, friction
+            for values in act:
+                values[arm.drives.places] = arm.drives.act
+        return contact, friction, *act
+
+    def memory_at(self, key: int | None) -> Memory:
+        """A keyframe has activations."""
+        memory = super().memory_at(key)
+        if key is None or not self.kept_memory:
+            return memory
+        return *memory[:2], self._plan.raw.key_act[key]
 
     def look(self, moment: Moment) -> None:
         """Take one step from it, whose law is solved as if there had been none before."""

@@ -23,8 +23,8 @@ class SentWorld:
 
     def __init__(self, model) -> None:
         self.world = world = model()
-        self.memory, self.keeps_memory = world.memory_layout, world.keeps_memory
-        self.untold = world.untold
+        self.memory, self.untold = world.memory_layout, world.untold
+        self.kept_memory = tuple(world.kept_memory)
 
     def _moment(self, vector):
         nq, lengths = len(self.world.qpos0), [length for _, length in self.memory]

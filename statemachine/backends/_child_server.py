@@ -7,9 +7,9 @@ only, and imports nothing of this package. Its argument is a file that knows the
   said of it, "version" of the engine at least; and numeric fields of those names, if the engine has
   such;
 - `Simulation(model)`: a world; those of a model share it. `memory` is name and length of each
-  array that the engine remembers from step to step beside qpos and qvel, `keeps_memory` whether
-  a write into qpos or qvel leaves them as they are, `untold` names of derived arrays that it does
-  not tell.
+  array that the engine remembers from step to step beside qpos and qvel, `kept_memory` names
+  of those that a write into qpos or qvel leaves as they are, `untold` names of derived arrays that
+  it does not tell.
   `place(vector)` takes qpos, qvel and the memory in a row, so that nothing of before is left;
   `state()` gives the same vector; `command(ctrl)` takes a command. `advance(steps, fastest)` takes
   engine steps, up to one after which a position is beyond 1e10 or a velocity beyond `fastest`, and
@@ -104,7 +104,7 @@ class Answerer:
     def make(self, job, _):
         """A world of a model."""
         world = self.engine.Simulation(self.things[job["model"]])
-        said = {name: getattr(world, name) for name in ("memory", "keeps_memory", "untold")}
+        said = {name: getattr(world, name) for name in ("memory", "kept_memory", "untold")}
         return {"world": self.keep(world), **said}, {}
 
     def run(self, job, arrays):

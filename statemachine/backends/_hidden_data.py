@@ -213,9 +213,15 @@ class Machine:
 
     def _remembered(self, written: bool) -> Memory:
         """What the world is to know, at the present, of the step before."""
-        if written and not self.world.keeps_memory:  # it belongs to another state
-            return self.world.memory_at(None)
-        return self._memory if self._world_is_elsewhere else self.world.memory
+        world = self.world
+        now = self._memory if self._world_is_elsewhere else world.memory
+        if not written:
+            return now
+        names, fresh = dict(world.memory_layout), world.memory_at(None)
+        return [
+            old if name in world.kept_memory else new  # what belongs to another state
+            for name, old, new in zip(names, now, fresh, strict=True)
+        ]
 
     def present(self) -> Moment:
         """All that decides the next engine step, with the command that acts in it."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,8 +49,8 @@ class HiddenWorld(ABC):
         errors: What the engine raises when it gives up.
         untold: Names of `records.DERIVED`, and "contacts", that this engine does not tell.
         memory_layout: Name and length of each array of `memory`, which a State then has.
-        keeps_memory: Whether a write into qpos or qvel leaves that as it is; else it is then
-            that of the default state.
+        kept_memory: Names of those that a write into qpos or qvel leaves as they are; others
+            are then those of the default state.
         timestep: Simulated time of one engine step [s].
         qpos0: (nq,) positions of the default state.
         raw: The engine's own object, which `Data.raw` gives.
@@ -60,7 +60,7 @@ class HiddenWorld(ABC):
     errors: tuple[type[Exception], ...] = ()
     untold: frozenset[str] = frozenset()
     memory_layout: tuple[tuple[str, int], ...] = ()
-    keeps_memory = False
+    kept_memory: Collection[str] = ()
     timestep: float
     qpos0: Array
     raw: Any

@@ -39,7 +39,7 @@ PARTS = {
 class Simulation:
     """One MjData, and how its State is put and read."""
 
-    keeps_memory, untold = True, ()
+    untold = ()
 
     def __init__(self, model) -> None:
         self.model, self.data = model, mujoco.MjData(model)
@@ -48,6 +48,7 @@ class Simulation:
         self.cuts = np.cumsum([len(part) for part in self.parts])[:-1]
         self.alarms = memoryview(self.data.warning.number)[ALARMS[0] : ALARMS[-1] + 1]
         self.memory = [(name, len(parts[name])) for _, name in STATE[2:] if len(parts[name])]
+        self.kept_memory = [name for name, _ in self.memory]
 
     def place(self, vector) -> None:
         """Take qpos, qvel and the memory, so that nothing of before is left."""

@@ -185,7 +185,7 @@ class ServedWorld(HiddenWorld):
         # No call: it may be collected in the midst of another.
         self._end = weakref.finalize(self, server.forgotten.append, self._world)
         self.memory_layout = tuple((name, int(length)) for name, length in said["memory"])
-        self.keeps_memory, self.untold = said["keeps_memory"], frozenset(said["untold"])
+        self.kept_memory, self.untold = said["kept_memory"], frozenset(said["untold"])
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
