@@ -26,10 +26,13 @@ class Medium:
         self, raw: mujoco.MjModel, world: World, tree: Tree, off: Mapping[str, bool]
     ) -> None:
         self._raw, self._world, self._tree = raw, world, tree
-        wet = bool(raw.opt.density or raw.opt.viscosity) and not off["damper"]
+        wet = bool(raw.opt.density or raw.opt.viscosity)
         self._lift = -gravity(raw) * (raw.body_mass * raw.body_gravcomp)[:, None]
+        passive = not (off["damper"] and off["spring"])  # as MuJoCo, which then skips all of it
         self._bodies = [
-            body for body in tree.links if raw.body_mass[body] and (wet or self._lift[body].any())
+            body
+            for body in tree.links
+            if passive and raw.body_mass[body] and (wet or self._lift[body].any())
         ]
         self._wet = wet
         i, j, k = np.maximum(raw.body_inertia.T, 0.0)

@@ -154,7 +154,7 @@ def _of_ties(raw: mujoco.MjModel) -> Rows:
         several[tendon] = len(set(raw.body_rootid[bodies])) > 1
     poly = raw.tendon_stiffnesspoly.any(axis=1) | raw.tendon_dampingpoly.any(axis=1)
     strange, apart = np.zeros((2, raw.neq), dtype=bool)
-    for eq in np.flatnonzero(raw.eq_active0):
+    for eq in np.flatnonzero(raw.eq_active0).tolist():
         bodies = ends_of(raw, eq)
         strange[eq] = not bodies
         apart[eq] = len({int(raw.body_rootid[b]) for b in bodies if raw.body_treeid[b] >= 0}) > 1

@@ -459,7 +459,8 @@ class World:
         change = np.eye(len(tree.dofs))
         change[:3, :3], change[:3, 3:6] = 0.0, inward
         change[3:6, :3] = dense.product(inward, back)
-        change[3:6, 3:6] = dense.product(inward, np.cross(np.eye(3), centre).T.copy())
+        lever = np.array(np.cross(np.eye(3), centre).T, dtype=np.float64)  # times w: w × centre
+        change[3:6, 3:6] = dense.product(inward, lever.copy())
         return change
 
     def body_pose(self, tree: Tree, body: int) -> tuple[Array, Array]:
