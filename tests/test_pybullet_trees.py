@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import mujoco
@@ -247,3 +248,14 @@ def test_mujoco_has_room_for_pairs_that_carry_each_other_only(tmp_path: Path) ->
     assert added[0, 0] == pytest.approx(0.02)
     assert added[3, 3] == pytest.approx(0.02 * 0.7**2)
     assert added[0, 3] == 0
+
+
+def test_the_mocap_pose_of_a_keyframe_is_told(tmp_path: Path) -> None:
+    for pose, told in ((".4 .5 1", 0), (".4 .5 2", 1)):
+        key = f'<keyframe><key mpos="{pose}" mquat="1 .3 .2 .1"/></keyframe>'
+        with warnings.catch_warnings(record=True) as texts:
+            warnings.simplefilter("always")
+            loaded(tmp_path, TREE.format(base=""), key, backend="pybullet")
+        assert (
+            sum("mocap pose of a keyframe has no effect" in str(t.message) for t in texts) == told
+        )

@@ -197,6 +197,7 @@ def ignored(plan: Plan) -> list[str]:
         "noslip_iterations": raw.opt.noslip_iterations,
         "the override of contact parameters": raw.opt.enableflags & int(override),
         "sleep": raw.opt.enableflags & int(sleep),
+        "the mocap pose of a keyframe": _moves_mocap(raw),
     }
     sentences += [f"{what} has no effect" for what, there in settings.items() if there]
     if raw.jnt_springyield.any():
@@ -217,6 +218,15 @@ def ignored(plan: Plan) -> list[str]:
             sentences.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
         sentences += _bounces(plan)
     return sentences
+
+
+def _moves_mocap(raw: mujoco.MjModel) -> bool:
+    """Whether a keyframe has a mocap body elsewhere than where the file has it."""
+    bodies = np.flatnonzero(raw.body_mocapid >= 0)
+    bodies = bodies[np.argsort(raw.body_mocapid[bodies])]
+    where = raw.key_mpos - raw.body_pos[bodies].ravel()
+    turned = raw.key_mquat - raw.body_quat[bodies].ravel()
+    return bool((np.abs(np.hstack([where, turned])) > 1e-9).any())
 
 
 def _bounces(plan: Plan) -> list[str]:
