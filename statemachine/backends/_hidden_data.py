@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DivergedError, EngineError
-from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Ints, Model, State
+from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Ints, Keyframe, Model, State
 from ..interface.options import HUGE, check_entries, check_writable, engine_steps, unsupported
 from ._hidden_world import HiddenWorld, LookAhead, Memory, Moment, bounded
 
@@ -74,30 +74,27 @@ class Machine:
 
     def reset(self, key: int | None) -> None:
         """Be in the default state, or in a keyframe's."""
-        if key is None:
-            still, silent = np.zeros(len(self.qvel)), np.zeros(len(self.ctrl))
-            start = Moment(self.world.qpos0, still, silent, self.world.memory_at(None))
-            self.restart(0.0, start)
-        else:
-            frame = self._model.keyframes[key]
-            start = Moment(frame.qpos, frame.qvel, frame.ctrl, self.world.memory_at(key))
-            silent = np.zeros((self._longest_delay, len(self.ctrl)))
-            self.restart(frame.time, start, None if self._model._holds_start else silent)
+        silent, still = np.zeros(len(self.ctrl)), np.zeros(len(self.qvel))
+        default = Keyframe("", 0.0, self.world.qpos0, still, silent)
+        frame = default if key is None else self._model.keyframes[key]
+        start = Moment(frame.qpos, frame.qvel, frame.ctrl, self.world.memory_at(key))
+        before = frame.ctrl if self._model._holds_start else silent
+        self.restart(frame.time, start, np.tile(before, (self._longest_delay, 1)))
 
-    def restart(self, time: float, start: Moment, given: Array | None = None) -> None:
+    def restart(self, time: float, start: Moment, given: Array) -> None:
         """Take a state whole; nothing of before has any part in what follows.
 
         Args:
             time: Of the state [s].
             start: The state; its ctrl is that of the Data.
-            given: The commands before it; by default they were that of the state.
+            given: The commands before it; see `given` of the class.
         """
         if self._used:
             self.world = self.world.renewed()
             self._used = False
         self.time = time
         self.qpos[:], self.qvel[:], self.ctrl[:] = start.qpos, start.qvel, start.ctrl
-        self.given = np.tile(start.ctrl, (self._longest_delay, 1)) if given is None else given
+        self.given = given
         self._place(start.memory)
         self._command()
         self.moment: Moment | None = None
