@@ -43,15 +43,17 @@ def convergence(
         progress: Told the fraction that is done.
 
     Returns:
-        labels: The two sides.
-        steps: The engine's steps of the left side and of the right one [s], as given; they are
-            halved and quartered.
-        until: The last moment that is compared [s].
-        touch: When something touches first in any of the runs [s]; None if nothing does.
-        before: Each quantity until then, see `_limit`; of a run that begins with a touch there is
-            none.
-        whole: Each quantity over all of the run; the same as `before` if nothing touches.
-        vanishes: Whether no gap is more than discretisation, over the whole run.
+        What was found, by name.
+
+        - labels: The two sides.
+        - steps: The engine's steps of the left side and of the right one [s], as given; they are
+          halved and quartered.
+        - until: The last moment that is compared [s].
+        - touch: When something touches first in any of the runs [s]; None if nothing does.
+        - before: Each quantity until then, see `_limit`; of a run that begins with a touch there is
+          none.
+        - whole: Each quantity over all of the run; the same as `before` if nothing touches.
+        - vanishes: Whether no gap is more than discretisation, over the whole run.
 
     Raises:
         EndedEarlyError: A run ends before its time.

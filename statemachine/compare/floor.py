@@ -49,11 +49,13 @@ def chaos_floor(
         progress: Told the fraction that is done.
 
     Returns:
-        runs: How many perturbed runs of the left side it is made of; seed: of what was drawn.
-        rounding: What starts and commands were changed by, relative.
-        uncertain: What the start is uncertain by besides.
-        ended: How many of the runs ended early; from then on the band has no bound.
-        bands: One for each quantity that is compared; see `_band`.
+        What was found, by name.
+
+        - runs: How many perturbed runs of the left side it is made of; seed: of what was drawn.
+        - rounding: What starts and commands were changed by, relative.
+        - uncertain: What the start is uncertain by besides.
+        - ended: How many of the runs ended early; from then on the band has no bound.
+        - bands: One for each quantity that is compared; see `_band`.
 
     Raises:
         BadInputError: As `perturbed_runs`.

@@ -50,14 +50,16 @@ def one_step(
         progress: Told the fraction that is done.
 
     Returns:
-        moments: From how many states; every: each so many-th row of the run.
-        until: The time of the last of them [s].
-        relative: The tolerance, relative to the scale of a stage.
-        stages: In the order in which a step computes them; see `_gap`.
-        first: The first of them that differs at any moment; None if none does.
-        spikes: The moments that stand out, the largest first; see `_spikes`.
-        primed: What of the step before the right side was given; "" for nothing.
-        notes: What a reader must know.
+        What was found, by name.
+
+        - moments: From how many states; every: each so many-th row of the run.
+        - until: The time of the last of them [s].
+        - relative: The tolerance, relative to the scale of a stage.
+        - stages: In the order in which a step computes them; see `_gap`.
+        - first: The first of them that differs at any moment; None if none does.
+        - spikes: The moments that stand out, the largest first; see `_spikes`.
+        - primed: What of the step before the right side was given; "" for nothing.
+        - notes: What a reader must know.
 
     Raises:
         BadInputError: `moments` is less than 1, or the two have no joint in common.
