@@ -1,4 +1,4 @@
-"""MuJoCo's servo, armature, friction and limits on an engine that has none of them.
+"""MuJoCo's servos, armature, friction, limits and equality constraints on an engine without them.
 
 PyBullet knows no armature, and a servo law in plain torque diverges on a light arm.
 So the law is solved here, implicitly, for the true arm; the engine's own arm is made to
@@ -8,12 +8,14 @@ Let M, c be mass matrix and bias of the true arm (the "ghost"), A its armature, 
 damping, K its springs, h the timestep, w the force of its actuators with slope -kv in
 velocity. Each step solves
 
-    (M + A + h·(D + kv)) · a = w - K·(q - q₀) - D·v - c + f + l + e
+    (M + A + h·(D + kv)) · a = w - K·(q - q₀) - D·v - c + f + l + t + e
 
 for the acceleration a (without kv under MuJoCo's Euler integrator), where f is dry
-friction, l the force of the joint limits (both soft, as in MuJoCo's manual, chapter
-Computation, section Constraint model, and solved with M + A alone) and e the generalised
-force of contacts. The engine then gets the torque that gives its arm this
+friction, l the force of limits, t that of equality constraints (all soft, as in MuJoCo's
+manual, chapter Computation, section Constraint model, and solved with M + A alone) and e
+the generalised force of contacts. Tendons add to A, D, K, f and l, the medium and the
+compensation of gravity to the right side. A tree that floats has the six degrees of
+freedom of its free joint first, in MuJoCo's coordinates. The engine then gets the torque that gives its arm this
 acceleration without contacts, less e. Its arm has a share of the armature as inertia of
 its links, so that contact acts on about the true inertia. What that arm did beyond the
 torque it got, by inverse dynamics, is the e of the next step.
@@ -71,10 +73,8 @@ class Law:
         self._timestep = h = float(raw.opt.timestep)
         armature = raw.dof_armature[dofs]
         damping = raw.dof_damping[dofs] * (not off["damper"])
-        scalar = np.arange(len(dofs)) >= tree.base
-        places = raw.jnt_qposadr[joints] + ~scalar
-        stiffness = raw.jnt_stiffness[joints] * (scalar & (not off["spring"]))
-        rest = stiffness * raw.qpos_spring[places]
+        stiffness = raw.jnt_stiffness[joints] * (not off["spring"])
+        rest = stiffness * raw.qpos_spring[raw.jnt_qposadr[joints]]
         # Linear in x, which is positions (of a free joint: zeros), velocities and 1.
         passive = np.column_stack([-np.diag(stiffness), -np.diag(damping), rest])
         euler = raw.opt.integrator in _EXPLICIT
