@@ -15,10 +15,11 @@ friction, l the force of limits, t that of equality constraints (all soft, as in
 manual, chapter Computation, section Constraint model, and solved with M + A alone) and e
 the generalised force of contacts. Tendons add to A, D, K, f and l, the medium and the
 compensation of gravity to the right side. A tree that floats has the six degrees of
-freedom of its free joint first, in MuJoCo's coordinates. The engine then gets the torque that gives its arm this
-acceleration without contacts, less e. Its arm has a share of the armature as inertia of
-its links, so that contact acts on about the true inertia. What that arm did beyond the
-torque it got, by inverse dynamics, is the e of the next step.
+freedom of its free joint first, in MuJoCo's coordinates. The engine then gets the
+torque that gives its arm this acceleration without contacts, less e. Its arm has a
+share of the armature as inertia of its links, so that contact acts on about the true
+inertia. What that arm did beyond the torque it got, by inverse dynamics, is the e of
+the next step.
 """
 
 from __future__ import annotations
