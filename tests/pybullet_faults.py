@@ -92,7 +92,7 @@ def forward_steps_the_world_itself(right: Any, self: Any, name: str) -> Any:
         return right(self, name)
     present = self.present()
     found = _parts().hidden.LookAhead(lambda: self.world).at(moment)
-    self.restart(self.time, present)
+    self.restart(self.time, present, self.given)
     self.moment = moment
     return found
 

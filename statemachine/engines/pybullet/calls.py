@@ -21,7 +21,10 @@ from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries,
 # How many arguments come before `physicsClientId` where it is given by its place, which the
 # engine's functions do not tell. It is the last one in all of these.
 _BEFORE_CLIENT = {
+    "applyExternalForce": 5,
+    "applyExternalTorque": 4,
     "calculateInverseDynamics": 5,
+    "calculateJacobian": 6,
     "calculateMassMatrix": 3,
     "changeDynamics": 24,
     "disconnect": 0,
