@@ -35,7 +35,7 @@ class Medium:
             if passive and raw.body_mass[body] and (wet or self._lift[body].any())
         ]
         self._wet = wet
-        i, j, k = np.maximum(raw.body_inertia.T, 0.0)
+        i, j, k = raw.body_inertia.T
         mass = np.maximum(raw.body_mass, mujoco.mjMINVAL)
         sides = [np.maximum(two, mujoco.mjMINVAL) for two in (j + k - i, i + k - j, i + j - k)]
         a, b, c = boxes = np.sqrt(6.0 * np.array(sides) / mass)

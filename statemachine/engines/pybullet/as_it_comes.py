@@ -160,8 +160,8 @@ def _explicit(world: World, tree: Tree) -> float:
     """The largest eigenvalue of h·D/M where the tree stands."""
     places = [state[0] for state in pb.getJointStates(tree.body, tree.joints, world.client)]
     mass = np.array(pb.calculateMassMatrix(tree.body, places, physicsClientId=world.client))
-    damping = [pb.getJointInfo(tree.body, i, world.client)[6] for i in tree.joints]
-    damping = [0.0] * tree.base + damping
+    damping = [0.0] * tree.base
+    damping += [pb.getJointInfo(tree.body, i, world.client)[6] for i in tree.joints]
     return float(
         np.linalg.eigvals(np.linalg.solve(mass, np.diag(damping))).real.max() * ENGINE_TIMESTEP
     )
