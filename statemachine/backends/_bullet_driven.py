@@ -82,6 +82,7 @@ class DrivenWorld(HiddenWorld):
             arm.place(qpos, qvel, *(part[arm.tree.qvel] for part in memory[:2]))
             if len(memory) > 2:
                 arm.drives.act = memory[2][arm.drives.places]
+        self._act = memory[2:]
 
     def command(self, ctrl: Array) -> None:
         """To every arm."""
@@ -135,7 +136,8 @@ class DrivenWorld(HiddenWorld):
             return ()
         if self._alone and not self.kept_memory:
             return self._arms[0].contact, self._arms[0].friction
-        contact, friction, *act = (np.zeros(size) for _, size in self.memory_layout)
+        contact, friction = np.zeros(self._nv), np.zeros(self._nv)
+        act = [values.copy() for values in self._act]  # of what is off, as it was
         for arm in self._arms:
             own = arm.tree.qvel
             contact[own], friction[own] = arm.contact, arm.friction

@@ -63,6 +63,8 @@ class Drives:
             moment = tendons.moments.get(target[a]) if on_tendon[a] else joints == target[a]
             self._gear[:, column] = raw.actuator_gear[raw.actuator_outadr[a], 0] * moment
         self._across = self._gear.T.copy()
+        # What has no slope where its joint is beyond its range: MuJoCo asks by joints.
+        self._on_joints = np.abs(self._across) * ~on_tendon[ids, None]
         affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
@@ -130,7 +132,7 @@ class Drives:
             within = np.minimum(np.maximum(actuator, self._fence[0]), self._fence[1])
             if within.tobytes() != actuator.tobytes():
                 beyond = np.asarray(within != actuator, dtype=np.float64)
-                held = dense.times(np.abs(self._across), beyond) > 0
+                held = dense.times(self._on_joints, beyond) > 0
                 inertia = self._with_slope((force == wanted) & ~held)
                 actuator = within
         return actuator, inertia

@@ -45,8 +45,7 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw), *_of_ties(raw)]
     if as_it_comes:
         problems += _of_the_law(raw)
-    if not raw.opt.disableflags & NO_CONTACT:
-        rows += _of_geoms(plan)
+    rows += _of_geoms(plan)
     problems += [
         (feature, f"{kind} {_name(raw, kind, k)} {says}")
         for kind, feature, which, says in rows
@@ -186,7 +185,12 @@ def _of_geoms(plan: Plan) -> Rows:
 def ignored(plan: Plan) -> list[str]:
     """Settings of a model that have no counterpart, and do not make it another robot."""
     raw = plan.raw
-    override, sleep = mujoco.mjtEnableBit.mjENBL_OVERRIDE, mujoco.mjtEnableBit.mjENBL_SLEEP
+    enabled = {
+        name: raw.opt.enableflags & int(getattr(mujoco.mjtEnableBit, f"mjENBL_{name}"))
+        for name in ("OVERRIDE", "SLEEP", "DIAGEXACT")
+    }
+    touches = not raw.opt.disableflags & NO_CONTACT
+    slide, _, roll = np.split(raw.pair_friction, [2, 3], axis=1)
     integrator = {
         int(mujoco.mjtIntegrator.mjINT_IMPLICIT): "implicit acts as implicitfast",
         int(mujoco.mjtIntegrator.mjINT_RK4): "RK4 acts as Euler",
@@ -195,14 +199,21 @@ def ignored(plan: Plan) -> list[str]:
     sentences = [f"the integrator {integrator}"] if integrator else []
     settings = {
         "noslip_iterations": raw.opt.noslip_iterations,
-        "the override of contact parameters": raw.opt.enableflags & int(override),
-        "sleep": raw.opt.enableflags & int(sleep),
+        "the override of contact parameters": enabled["OVERRIDE"],
+        "sleep": enabled["SLEEP"],
+        "diagexact": enabled["DIAGEXACT"],
+        "springyield of a tendon": raw.tendon_springyield.any(),
+        "adhesion": touches and (raw.geom_adhesion.any() or raw.pair_adhesion.any()),
+        "the margin of a pair": touches and raw.pair_margin.any(),
+        "the second friction of a pair": touches and np.ptp(slide, axis=1).any(),
+        "the second rolling friction of a pair": touches and np.ptp(roll, axis=1).any(),
+        "solref, solimp or solreffriction of a pair": touches and _own_softness(raw),
         "the mocap pose of a keyframe": _moves_mocap(raw),
     }
     sentences += [f"{what} has no effect" for what, there in settings.items() if there]
     if raw.jnt_springyield.any():
         sentences.append(f"springyield has no effect ({_list(raw, 'joint', raw.jnt_springyield)})")
-    if not raw.opt.disableflags & NO_CONTACT:
+    if touches:
         touching = plan.surfaces.touching
         margins = raw.geom_margin * touching
         if margins.any():
@@ -218,6 +229,12 @@ def ignored(plan: Plan) -> list[str]:
             sentences.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
         sentences += _bounces(plan)
     return sentences
+
+
+def _own_softness(raw: mujoco.MjModel) -> bool:
+    """Whether a pair of geoms has a softness of its own."""
+    own = (raw.pair_solref != _SOLREF).any() or (raw.pair_solimp != _SOLIMP).any()
+    return bool(own or raw.pair_solreffriction.any())
 
 
 def _moves_mocap(raw: mujoco.MjModel) -> bool:

@@ -363,7 +363,9 @@ def _effort(raw: mujoco.MjModel, joint: int) -> float:
     forces = [
         np.abs(raw.actuator_forcerange[a]).max()
         for a in range(raw.nactuator)
-        if raw.actuator_trnid[a, 0] == joint and raw.actuator_forcelimited[a]
+        if raw.actuator_trntype[a] == int(mujoco.mjtTrn.mjTRN_JOINT)
+        and raw.actuator_trnid[a, 0] == joint
+        and raw.actuator_forcelimited[a]
     ]
     return float(max(forces, default=UNLIMITED))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from itertools import chain
 from typing import Any, Literal
 
@@ -39,6 +40,7 @@ from .compiled import gravity
 _PUSHES = 0.03  # of an overlap that a contact undoes in a step; the engine's own is 0.08
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
+_NO_LOCK = nullcontext()
 _ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # a pose, as the engine has them
 _REST = math.sqrt(1 - 2 * _TILT**2)
 
@@ -142,6 +144,7 @@ class World:
             if tree.free
         }
         self._last: dict[int, Quat] = dict.fromkeys(self._frames, (0.0, 0.0, 0.0, 1.0))
+        self._turns_gravity = any(tree.free and tree.driven for tree in self.trees)
         with silence():  # what it has to say of a tree, it says the first time
             for tree in self.trees:
                 if tree.driven:
@@ -412,7 +415,8 @@ class World:
             rate: (n,) its acceleration, as qacc.
         """
         if not tree.free:
-            return pb.calculateInverseDynamics(tree.body, q, v, rate, 0, self.client)
+            with HiddenWorld.lock if self._turns_gravity else _NO_LOCK:
+                return pb.calculateInverseDynamics(tree.body, q, v, rate, 0, self.client)
         (centre, axes), (w, x, y, z) = self._frames[tree.body], q[3:7]
         own = (x, y, z, w)
         pose, inward = times(own, axes), (-axes[0], -axes[1], -axes[2], axes[3])
@@ -422,16 +426,18 @@ class World:
             swing = np.cross(rate[3:6], centre) + np.cross(spin, np.cross(spin, centre))
             lift = np.add(lift, turned(own, swing.tolist())).tolist()
         with HiddenWorld.lock:  # gravity is all trees' of a client
-            pb.setGravity(*turned(back, self._gravity), self.client)
-            force = pb.calculateInverseDynamics(
-                tree.body,
-                [*_ORIGIN, *q[7:]],
-                [*turned(inward, v[3:6]), 0.0, 0.0, 0.0, *v[6:]],
-                [*turned(inward, rate[3:6]), *turned(back, lift), *rate[6:]],
-                0,
-                self.client,
-            )
-            pb.setGravity(*self._gravity, self.client)
+            try:
+                pb.setGravity(*turned(back, self._gravity), self.client)
+                force = pb.calculateInverseDynamics(
+                    tree.body,
+                    [*_ORIGIN, *q[7:]],
+                    [*turned(inward, v[3:6]), 0.0, 0.0, 0.0, *v[6:]],
+                    [*turned(inward, rate[3:6]), *turned(back, lift), *rate[6:]],
+                    0,
+                    self.client,
+                )
+            finally:
+                pb.setGravity(*self._gravity, self.client)
         moment = turned(axes, force[3:6])
         if any(centre):
             moment = np.add(moment, np.cross(centre, turned(axes, force[:3]))).tolist()

@@ -64,7 +64,9 @@ _EMULATED = {
     "dry friction": "by the adapter, MuJoCo's soft friction; the engine ignores that of a URDF",
     "joint limits": "by the adapter, MuJoCo's soft limits; the engine's own are off",
     "free joint conventions": "converted: the engine speaks of the centre of mass, and x y z w; "
-    "it turns a body wrongly beyond 45° a step",
+    "it turns a body wrongly beyond 45° a step. A free body alone is the engine's own, whose steps "
+    "are of its centre of mass, and explicit: a spinning one parts from MuJoCo's by what vanishes "
+    "with the timestep",
     "forces by part": "contact: what a step did beyond all other forces; those as solved",
 }
 _NATIVE = {
