@@ -134,9 +134,9 @@ def refused(
     return raised
 
 
-def after(model: Model, nstep: int, keyframe: int | str | None = None) -> np.ndarray:
-    """qpos (nq,) after so many steps from the default state or from a keyframe."""
-    with opened(model, keyframe, nstep=nstep) as (_, data):
+def after(model: Model, nstep: int, keyframe: int | str | None = None, **inputs: Any) -> np.ndarray:
+    """qpos (nq,) after so many steps from the default state or a keyframe, with such inputs."""
+    with opened(model, keyframe, nstep=nstep, **inputs) as (_, data):
         return data.qpos.copy()
 
 

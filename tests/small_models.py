@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import statemachine as sm
 
 from .conftest import written
+
+IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
 
 
 def mjcf(worldbody: str, rest: str = "", option: str = "") -> str:
@@ -31,6 +36,43 @@ def loaded(
 ) -> sm.Model:
     """A model of what stands in its world, behind that and before."""
     return model_of(folder, mjcf(worldbody, rest, option), name, **options)
+
+
+def on_both(source: str | Path, **options: Any) -> list[sm.Model]:
+    """A model on MuJoCo, and on PyBullet."""
+    return [sm.load(source, backend=backend, **options) for backend in ("mujoco", "pybullet")]
+
+
+def both(
+    folder: Path, worldbody: str, rest: str = "", option: str = IMPLICIT, **options: Any
+) -> list[sm.Model]:
+    """A model of what stands in its world and behind that, on MuJoCo and on PyBullet."""
+    return on_both(written(folder / "m.xml", mjcf(worldbody, rest, option)), **options)
+
+
+def largest_gap(
+    models: Sequence[sm.Model], data: Sequence[sm.Data], steps: int, every: int, most: float = 1.0
+) -> float:
+    """The largest gap of qpos under random commands, each for `every` steps, which move them."""
+    random, gap, fastest = np.random.default_rng(0), 0.0, 0.0
+    left, right = data
+    for k in range(steps):
+        if k % every == 0:
+            left.ctrl[:] = right.ctrl[:] = random.uniform(-most, most, models[0].nu)
+        sm.step(models[0], left)
+        sm.step(models[1], right)
+        gap = max(gap, float(np.abs(left.qpos - right.qpos).max()))
+        fastest = max(fastest, float(np.abs(left.qvel).max()))
+    assert fastest > 0.01
+    return gap
+
+
+def forward_at_one_state(models: Sequence[sm.Model], data: Sequence[sm.Data]) -> None:
+    """What follows from the state of the first, on each."""
+    left, right = data
+    right.qpos, right.qvel = left.qpos, left.qvel
+    sm.forward(models[0], left)
+    sm.forward(models[1], right)
 
 
 def crowded(folder: Path, boxes: int, memory: str) -> sm.Model:

@@ -173,16 +173,16 @@ def test_what_makes_no_sense_is_refused_with_what_does(model: Any) -> None:
     )
 
 
-def test_sentences_are_true_of_the_robot(model: Any) -> None:
+def test_sentences_are_true_of_the_robot(
+    model: Any, mujoco_arm: sm.Model, mujoco_scene: sm.Model
+) -> None:
     says = {name: SCENARIOS[name].on(model(FLOATING)).says for name in ("hold", "gravity", "fall")}
     assert "or is left at the start's ctrl" in says["hold"]
     assert says["gravity"].startswith("No actuator acts")
     assert "nothing can touch anything" in says["fall"]
-    bare = sm.load("so101")  # the arm, without a floor
-    assert SCENARIOS["hold"].on(bare).says.startswith("Each position servo")
-    assert "floor" not in SCENARIOS["gravity"].on(bare).says
-    scene = sm.load("so101/scene")
-    assert all(each.on(scene) is each for each in SCENARIOS.values())
+    assert SCENARIOS["hold"].on(mujoco_arm).says.startswith("Each position servo")
+    assert "floor" not in SCENARIOS["gravity"].on(mujoco_arm).says
+    assert all(each.on(mujoco_scene) is each for each in SCENARIOS.values())
 
 
 def test_gravity_takes_a_joint_with_a_servo(model: Any) -> None:

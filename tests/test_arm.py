@@ -43,12 +43,11 @@ def test_collision_shapes_are_primitives() -> None:
     assert all(raw.geom(int(g)).name for g in np.flatnonzero(touching))
 
 
-def test_scene_box_has_the_sizes_of_the_course() -> None:
-    model = sm.load("so101/scene_box")
-    assert_has(model, nq=13, nv=12, nu=6, joint_names=(*JOINTS, "box"), actuator_names=JOINTS)
-    assert model.jnt_qposadr.tolist() == [0, 1, 2, 3, 4, 5, 6]
-    assert model.jnt_type.tolist() == [JointType.HINGE] * 6 + [JointType.FREE]
-    assert [frame.name for frame in model.keyframes] == ["held", "pickup"]
+def test_scene_box_has_the_sizes_of_the_course(mujoco_box: sm.Model) -> None:
+    assert_has(mujoco_box, nq=13, nv=12, nu=6, joint_names=(*JOINTS, "box"), actuator_names=JOINTS)
+    assert mujoco_box.jnt_qposadr.tolist() == [0, 1, 2, 3, 4, 5, 6]
+    assert mujoco_box.jnt_type.tolist() == [JointType.HINGE] * 6 + [JointType.FREE]
+    assert [frame.name for frame in mujoco_box.keyframes] == ["held", "pickup"]
 
 
 def _touching(model: sm.Model, data: sm.Data) -> tuple[int, set[str]]:

@@ -42,12 +42,11 @@ def _saved(folder: Path) -> Path:
     return folder / "arm.mjb"
 
 
-def test_what_this_process_wrote_is_read(tmp_path: Path, cache: Path) -> None:
-    plain = sm.load("so101/scene_box")
+def test_what_this_process_wrote_is_read(tmp_path: Path, cache: Path, mujoco_box: sm.Model) -> None:
     file = _saved(tmp_path)
     with warnings.catch_warnings(action="error"):
         model = sm.load(file)
-    assert np.array_equal(after(plain, 20), after(model, 20))
+    assert np.array_equal(after(mujoco_box, 20), after(model, 20))
 
 
 def test_another_process_of_the_user_reads_it_too(tmp_path: Path, cache: Path) -> None:

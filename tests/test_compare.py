@@ -180,18 +180,17 @@ def test_what_becomes_of_a_contact(box: Trace, hold: Trace) -> None:
     assert touches(hold, box)[0].two.first is None
 
 
-def test_the_whole_force_of_a_contact_is_the_engines(box: Trace) -> None:
+def test_the_whole_force_of_a_contact_is_the_engines(box: Trace, mujoco_box: sm.Model) -> None:
     """Friction and all, added as vectors; on the box the two jaws and its weight balance."""
-    model = sm.load("so101/scene_box")
     row = len(box) - 1
-    with sm.make_data(model) as data:
+    with sm.make_data(mujoco_box) as data:
         data.qpos, data.qvel, data.ctrl = box.qpos[row], box.qvel[row], box.ctrl[row]
-        sm.forward(model, data)
+        sm.forward(mujoco_box, data)
         found: dict[tuple[int, ...], Any] = {}
         for geoms, frame, force in zip(
             data.contacts.geom, data.contacts.frame, data.contacts.force, strict=True
         ):
-            bodies = [int(model.geom_bodyid[geom]) for geom in geoms]
+            bodies = [int(mujoco_box.geom_bodyid[geom]) for geom in geoms]
             push = frame.reshape(3, 3).T @ force * (1 if bodies[0] < bodies[1] else -1)
             found[tuple(sorted(bodies))] = found.get(tuple(sorted(bodies)), 0.0) + push
     given, normal = total_forces(box), normal_forces(box)

@@ -358,13 +358,13 @@ def test_a_function_imports_what_lies_beside_it(files: Path) -> None:
 )
 def test_a_mistake_in_a_function_is_one_line_about_it(files: Path, name: str, says: str) -> None:
     arm = Side(str(files / "arm.xml"))
-    refused((BadInputError, says, lambda: run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))))
     refused(
+        (BadInputError, says, lambda: run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))),
         (
             BadInputError,
             r"no controller file.*Did you mean own.py",
             lambda: function_scenario(str(files / "owm.py:hold")),
-        )
+        ),
     )
 
 

@@ -36,7 +36,9 @@ def trace() -> Trace:
     return record_scenario(SCENARIOS["hold"], sm.load("so101/scene"), seconds=0.5)
 
 
-def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(trace: Trace) -> None:
+def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(
+    trace: Trace, mujoco_scene: sm.Model
+) -> None:
     name = "gripper on floor"
     found = compare(trace, trace)
     assert {each.name for each in found.agreements if each.kind == "contact"} == {
@@ -46,16 +48,15 @@ def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(trace: T
     assert {event.what for event in events_of(found) if event.what} == {name}
     assert list(of_trace(trace).touches) == [name]
     # The lesson and freshness also say which of the gripper's geoms it is.
-    model = sm.load("so101/scene")
-    lesson = lesson_result("hold", model, seconds=0.5)
+    lesson = lesson_result("hold", mujoco_scene, seconds=0.5)
     assert lesson.touched
     assert all(touch.startswith(f"{name} (") for touch in lesson.touched)
-    with sm.make_data(model) as data:
+    with sm.make_data(mujoco_scene) as data:
         row = int(trace["contact_row"][-1])
         data.qpos, data.qvel, data.ctrl = trace.qpos[row], trace.qvel[row], trace.ctrl[row]
-        sm.forward(model, data)
+        sm.forward(mujoco_scene, data)
         data.qpos[1] -= 0.5
-        gaps = sm.freshness(model, data)["contacts"].gaps
+        gaps = sm.freshness(mujoco_scene, data)["contacts"].gaps
         assert [gap.where for gap in gaps if gap.unit == "vanishes"] == [lesson.touching[0]]
 
 

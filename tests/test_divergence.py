@@ -19,7 +19,7 @@ from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.options import HUGE
 from statemachine.report import compare as report
 
-from .conftest import need_engine, refused, written
+from .conftest import after, need_engine, opened, refused, written
 from .small_models import ROTOR, STUCK_POST
 
 
@@ -37,9 +37,7 @@ def test_what_is_fast_is_no_divergence(tmp_path: Path, timestep: float) -> None:
     """A rotor at 2000 rad/s, every coordinate but a free body's turning at 1e4, a long fall."""
     model = loaded(tmp_path, ROTOR.format(timestep=timestep, actuator=""))
     for speed in (2000.0, 1e4):
-        with sm.make_data(model) as data:
-            data.qvel[:5] = speed
-            sm.step(model, data, 200)
+        with opened(model, qvel=[*[speed] * 5, 0, 0, 0], nstep=200) as (_, data):
             assert data.qvel[0] == pytest.approx(speed, rel=1e-6)
             assert np.abs(data.qvel[1:5]).max() == pytest.approx(speed, rel=0.02)
     fall = np.sqrt(2 * 9.81 * HUGE)  # where it leaves the positions that engines can compute with
@@ -66,9 +64,7 @@ def test_no_motor_drives_a_joint_beyond_the_bound(
     )
     model = loaded(tmp_path, text)
     assert bound(model)[0] == pytest.approx(fastest, rel=1e-3)
-    with sm.make_data(model) as data:
-        data.ctrl[:] = 1
-        sm.step(model, data, 100)
+    after(model, 100, ctrl=1)
 
 
 def test_the_bound_follows_the_timestep_and_the_size(tmp_path: Path) -> None:
@@ -117,9 +113,7 @@ def test_the_bound_can_be_set(tmp_path: Path) -> None:
             data.qvel[0] = top + 2
             says = r"qvel\[0\] \(rotor\) = .* went beyond max_"
             refused((DivergedError, says, partial(sm.step, variant, data)))
-    with sm.make_data(each) as data:  # another joint may be faster
-        data.qvel[1] = 5000
-        sm.step(each, data, 3)
+    after(each, 3, qvel=[0, 5000, *[0] * 6])  # another joint may be faster
 
 
 @pytest.mark.parametrize(
@@ -140,14 +134,13 @@ def test_a_bad_bound_is_refused_in_a_line(tmp_path: Path, value: object, says: s
     refused((BadInputError, says, lambda: loaded(tmp_path, text, max_qvel=value)))
 
 
-def test_the_record_shows_the_bound(tmp_path: Path) -> None:
+def test_the_record_shows_the_bound(tmp_path: Path, mujoco_arm: sm.Model) -> None:
     text = ROTOR.format(timestep=0.002, actuator="")
     for options, told in ({}, "5e+05 to 1.1e+06"), ({"max_qvel": 700}, "700"):
         record = str(loaded(tmp_path, text, **options).capabilities)
         assert f"where qvel is beyond {told} (max_qvel)" in record
-    model = sm.load("so101")
-    assert "beyond 1e+10, the engine's own bound" in str(model.capabilities)
-    refused((UnsupportedError, "max_qvel", lambda: model.replace(max_qvel=1e5)))
+    assert "beyond 1e+10, the engine's own bound" in str(mujoco_arm.capabilities)
+    refused((UnsupportedError, "max_qvel", lambda: mujoco_arm.replace(max_qvel=1e5)))
 
 
 @pytest.mark.usefixtures("bullet")

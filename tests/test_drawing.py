@@ -190,17 +190,16 @@ def test_a_model_of_another_engine_has_the_same_drawing() -> None:
         np.testing.assert_array_equal(a.vertices, b.vertices)
 
 
-def test_the_eye_is_where_the_engines_camera_is() -> None:
-    model = sm.load("so101/scene_box")
-    drawing = drawing_of(model)
+def test_the_eye_is_where_the_engines_camera_is(mujoco_box: sm.Model) -> None:
+    drawing = drawing_of(mujoco_box)
     assert (drawing.azimuth, drawing.elevation) == (140, -18)
     camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
     camera.azimuth, camera.elevation, camera.distance = drawing.azimuth, drawing.elevation, 0.7
     camera.lookat[:] = drawing.center
-    scene = mujoco.MjvScene(model.raw, 1000)
-    data = mujoco.MjData(model.raw)
+    scene = mujoco.MjvScene(mujoco_box.raw, 1000)
+    data = mujoco.MjData(mujoco_box.raw)
     everything = mujoco.mjtCatBit.mjCAT_ALL.value
-    mujoco.mjv_updateScene(model.raw, data, option, None, camera, everything, scene)
+    mujoco.mjv_updateScene(mujoco_box.raw, data, option, None, camera, everything, scene)
     eye = (scene.camera[0].pos + scene.camera[1].pos) / 2  # of the two eyes
     np.testing.assert_allclose(
         Camera(drawing.center, 0.7, drawing.azimuth, drawing.elevation).eye, eye, atol=1e-6

@@ -48,15 +48,14 @@ def test_forces_sum_with_the_bias_on_the_other_side() -> None:
     assert summed({**forces, "actuator": None})["total"] is None
 
 
-def test_gravity_is_read_at_the_moment_of_the_end() -> None:
-    model = sm.load("so101/scene")
-    found = lesson_result("gravity", model, seconds=1.0)
-    with opened(model, nstep=200) as (_, data):
-        sm.forward(model, data)
+def test_gravity_is_read_at_the_moment_of_the_end(mujoco_scene: sm.Model) -> None:
+    found = lesson_result("gravity", mujoco_scene, seconds=1.0)
+    with opened(mujoco_scene, nstep=200) as (_, data):
+        sm.forward(mujoco_scene, data)
         assert found.servos_on.forces["actuator"] == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()
     touch = found.servos_off.touches["gripper on floor (fixed_stud_1)"]
-    with opened(model.replace(actuation=False)) as (limp, data):
+    with opened(mujoco_scene.replace(actuation=False)) as (limp, data):
         while data.time < touch - 1e-9:
             sm.forward(limp, data)
             assert len(data.contacts) == 0
@@ -79,22 +78,21 @@ def test_hold_that_ends_at_the_first_touch_says_so() -> None:
     assert found.first_contact == pytest.approx(whole.first_contact)
 
 
-def test_replay_compares_what_it_says() -> None:
-    model = sm.load("so101/scene_box")
-    found = lesson_result("replay", model, steps=30, **{"break": "late-ctrl"})
-    with started(model) as one, started(model) as two:
+def test_replay_compares_what_it_says(mujoco_box: sm.Model) -> None:
+    found = lesson_result("replay", mujoco_box, steps=30, **{"break": "late-ctrl"})
+    with started(mujoco_box) as one, started(mujoco_box) as two:
         one.time = two.time = 0.0
         one.ctrl = found.ctrl
         for k in range(30):
-            sm.step(model, one)
-            sm.step(model, two)
+            sm.step(mujoco_box, one)
+            sm.step(mujoco_box, two)
             two.ctrl = found.ctrl
             gap = one.qpos - two.qpos
             assert found.difference[k + 1] == np.abs(gap).max()
             assert found.apart[k + 1] == np.linalg.norm(gap[6:9], axis=-1)  # without BLAS
         assert one.time == pytest.approx(0.15)
     assert found.identical is False
-    assert lesson_result("replay", model, steps=5).close is True
+    assert lesson_result("replay", mujoco_box, steps=5).close is True
 
 
 def test_speed_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,10 +34,9 @@ def test_a_warning_is_given_only_the_first_time() -> None:
     assert data.warning[int(mujoco.mjtWarning.mjWARN_BADCTRL)].number == 0
 
 
-def test_automatic_reset_is_off_and_would_rewind_time() -> None:
-    model = sm.load("so101")
+def test_automatic_reset_is_off_and_would_rewind_time(mujoco_arm: sm.Model) -> None:
     flag = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    assert model.raw.opt.disableflags & flag
+    assert mujoco_arm.raw.opt.disableflags & flag
     native = sm.load("so101", defaults="engine").raw
     assert not native.opt.disableflags & flag
     data = mujoco.MjData(native)
@@ -83,8 +82,7 @@ def test_without_a_range_an_infinite_ctrl_is_refused(
         "<actuator><position joint='j' kp='5'/></actuator>",
         backend=backend,
     )
-    with sm.make_data(model) as data:
-        data.ctrl[0] = huge
+    with opened(model, ctrl=huge) as (_, data):
         _refuses_ctrl(model, data, 0)
 
 

@@ -122,9 +122,7 @@ def test_after_a_write_everything_is_of_before(model: Model) -> None:
 
 def test_each_array_has_its_own_inputs(model: Model) -> None:
     """Found by value: poses do not hear of qvel and ctrl, nor the bias of ctrl."""
-    with sm.make_data(model) as data:
-        data.qpos[:] = TARGET
-        data.ctrl[:] = TARGET
+    with opened(model, qpos=TARGET, ctrl=TARGET) as (_, data):
         sm.forward(model, data)
         data.ctrl[1] += 1e-3
         by_ctrl = set(sm.freshness(model, data).stale)
@@ -208,9 +206,7 @@ def test_a_body_in_the_air(box: Model) -> None:
 @pytest.mark.parametrize("centre", ["0 0 0", ".1 0 0"])
 def test_a_body_that_turns(backend: str, integrator: str, centre: str, tmp_path: Path) -> None:
     path = written(tmp_path / "body.xml", BODY.format(integrator=integrator, centre=centre))
-    with opened(sm.load(path, backend=backend)) as (model, data):
-        data.qvel[:] = (1, 2, 3, 4, 5, 6)
-        sm.step(model, data, 7)
+    with opened(sm.load(path, backend=backend), qvel=range(1, 7), nstep=7) as (model, data):
         found = sm.freshness(model, data)
         spin = data.qvel[3:].copy()
     row = found["xquat"]
@@ -662,18 +658,19 @@ def test_the_name_is_the_function_and_its_module_is_loaded_when_it_is_asked_for(
     runs_in_silence(f"import statemachine as sm; {code}", ROOT, printed)
 
 
-def test_rotations_are_compared_as_rotations() -> None:
+def test_rotations_are_compared_as_rotations(mujoco_arm: sm.Model) -> None:
     """A quaternion and its negative are one rotation, of other bits."""
-    model = sm.load("so101")
-    one = np.tile([1.0, 0, 0, 0], (model.nbody, 1))
+    one = np.tile([1.0, 0, 0, 0], (mujoco_arm.nbody, 1))
     two = one.copy()
     two[2] = (np.cos(0.1), np.sin(0.1), 0, 0)
-    (gap,) = gaps(model, "xquat", one, two)
-    assert (gap.size, gap.where) == (pytest.approx(0.2), model.body_names[2])
-    (gap,) = gaps(model, "xquat", one, -one)
+    (gap,) = gaps(mujoco_arm, "xquat", one, two)
+    assert (gap.size, gap.where) == (pytest.approx(0.2), mujoco_arm.body_names[2])
+    (gap,) = gaps(mujoco_arm, "xquat", one, -one)
     assert gap.size == 0
-    mats = matrix_from_quat(two)[: model.nsite].reshape(-1, 9)
-    (gap,) = gaps(model, "site_xmat", np.tile(np.eye(3).ravel(), (model.nsite, 1)), -mats + 0)
+    mats = matrix_from_quat(two)[: mujoco_arm.nsite].reshape(-1, 9)
+    (gap,) = gaps(
+        mujoco_arm, "site_xmat", np.tile(np.eye(3).ravel(), (mujoco_arm.nsite, 1)), -mats + 0
+    )
     assert gap.size != 0
 
 
@@ -686,9 +683,7 @@ def test_a_model_without_names_sites_or_motors(tmp_path: Path) -> None:
         '<body pos=".4 0 0"><joint type="slide" axis="0 1 0"/><geom size=".05" mass="1"/>'
         "</body></body></worldbody></mujoco>",
     )
-    with opened(sm.load(path)) as (model, data):
-        data.qvel[:] = (1, 2, 3, 0.5)
-        sm.step(model, data, 30)
+    with opened(sm.load(path), qvel=(1, 2, 3, 0.5), nstep=30) as (model, data):
         found = sm.freshness(model, data)
         assert found["xpos"].of == "1 step ago"
         assert "the poses of body 1, body 2" in " ".join(str(found).split())

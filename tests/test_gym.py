@@ -211,8 +211,7 @@ def test_every_way_to_start_anew_is_gymnasiums(
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_a_world_that_diverges_starts_anew_and_the_others_go_on(mode: str, backend: str) -> None:
     envs = _make_vec(REACH, backend, 3, autoreset_mode=mode)
-    with warnings.catch_warnings(), closing(envs):
-        warnings.simplefilter("error", DivergedWarning)
+    with warnings.catch_warnings(action="error", category=DivergedWarning), closing(envs):
         seen, _ = envs.reset(seed=0)
         still = np.zeros((3, 6), dtype=np.float32)
         envs.worlds.qvel[1] = 1e12

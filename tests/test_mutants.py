@@ -20,7 +20,17 @@ from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
 from statemachine.report.grading import mutants_page
 
-from .conftest import ROOT, Cli, assert_has, of_python, opened, refused, shown, written_all
+from .conftest import (
+    ROOT,
+    Cli,
+    assert_has,
+    assert_in,
+    of_python,
+    opened,
+    refused,
+    shown,
+    written_all,
+)
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -342,8 +352,7 @@ def test_the_command_says_what_survives(cli: Cli) -> None:
     only = ("--only", "xyzw", "--only", "degrees")
     done = cli("check", "--mutants", str(EXERCISE), *only)
     assert (done.returncode, done.stderr) == (1, "")
-    assert "1 of 2 faults caught" in done.stdout
-    assert MUTANTS["xyzw"].hint in done.stdout
+    assert_in(done.stdout, "1 of 2 faults caught", MUTANTS["xyzw"].hint)
     assert cli("check", "--mutants", str(EXERCISE), *only[2:]).returncode == 0
 
 

@@ -53,10 +53,12 @@ def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
         "statemachine/_models/so101/so101.xml",
         "statemachine/_models/so101/look/base_print.stl",
         "statemachine/py.typed",
+        *(
+            f"statemachine/report/html/{name}"
+            for name in ("page.html", "page.css", "page.js", "scene.js", "gl.js")
+        ),
+        "statemachine/runs/recorded/hold.pybullet.npz",
     )
-    for name in ("page.html", "page.css", "page.js", "scene.js", "gl.js"):
-        assert f"statemachine/report/html/{name}" in names
-    assert "statemachine/runs/recorded/hold.pybullet.npz" in names
     tops = {name.split("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == {
         "statemachine",

@@ -29,6 +29,7 @@ from statemachine.rotations import matrix_from_quat
 
 from .conftest import (
     ROOT,
+    after,
     assert_in,
     bullet_clients,
     opened,
@@ -37,7 +38,7 @@ from .conftest import (
     runs_in_silence,
     written,
 )
-from .small_models import REFS, TREES, TWO_ROOTS
+from .small_models import REFS, TREES, TWO_ROOTS, forward_at_one_state, largest_gap, on_both
 from .test_golden import angles
 
 Golden = Callable[[str], np.ndarray]
@@ -124,12 +125,9 @@ def _world(inside: str) -> str:
 
 def zoo(folder: Path, turn: float = 1.0) -> list[tuple[sm.Model, sm.Data]]:
     """A model with one of everything, in one random state, on MuJoCo and on PyBullet."""
-    file, random = mjcf(folder, TREES), np.random.default_rng(0)
-    made = []
-    for backend in ("mujoco", "pybullet"):
-        model = sm.load(file, backend=backend)
-        made.append((model, sm.make_data(model)))
-    qpos = made[0][1].qpos.copy()
+    random = np.random.default_rng(0)
+    pairs = [(model, sm.make_data(model)) for model in on_both(mjcf(folder, TREES))]
+    qpos = pairs[0][1].qpos.copy()
     qpos[:5] = random.uniform(-0.5, 0.5, 5)
     qpos[5] = 0.4
     for start in (6, 13):
@@ -137,10 +135,10 @@ def zoo(folder: Path, turn: float = 1.0) -> list[tuple[sm.Model, sm.Data]]:
         qpos[start + 3 : start + 7] = quat / np.linalg.norm(quat)
     qvel = random.uniform(-1, 1, 18)
     qvel[15:] *= turn
-    for model, data in made:
+    for model, data in pairs:
         data.qpos, data.qvel, data.ctrl = qpos, qvel, (0.1, 0.3, -0.2, 0.1)
         sm.forward(model, data)
-    return made
+    return pairs
 
 
 def test_zoo_is_what_mujoco_says(tmp_path: Path) -> None:
@@ -298,8 +296,8 @@ def test_what_it_cannot_do_is_refused_by_name(feature: str, tmp_path: Path) -> N
 def test_an_ellipsoid_that_touches_nothing_is_taken(tmp_path: Path) -> None:
     egg = '<geom type="ellipsoid" size="0.1 0.2 0.3" mass="1" contype="0" conaffinity="0"/>'
     model = load(mjcf(tmp_path, _world(f"<body><joint/>{egg}</body>")))
-    with opened(model, qvel=1.0, nstep=10) as (_, data):
-        assert data.qpos[0] == pytest.approx(10 * model.timestep)  # nothing brakes it
+    # Nothing brakes it.
+    assert after(model, 10, qvel=1.0)[0] == pytest.approx(10 * model.timestep)
 
 
 def test_all_problems_of_a_file_are_named(tmp_path: Path) -> None:
@@ -314,25 +312,14 @@ def test_all_problems_of_a_file_are_named(tmp_path: Path) -> None:
 
 def test_a_joints_zero_need_not_be_the_files_pose(tmp_path: Path) -> None:
     """Joints with `ref`: the same numbers on both engines, from the default state on."""
-    file = mjcf(tmp_path, REFS)
-    models = [sm.load(file, backend=backend) for backend in ("mujoco", "pybullet")]
-    with sm.make_data(models[0]) as one, sm.make_data(models[1]) as two:
-        assert two.qpos.tolist() == pytest.approx([0.3, math.radians(40), math.radians(-75)])
-        draw = np.random.default_rng(0)
-        worst = 0.0
-        for k in range(400):
-            if k % 50 == 0:
-                one.ctrl[:] = two.ctrl[:] = draw.uniform(-2, 2, 2)
-            for model, data in zip(models, (one, two), strict=True):
-                sm.step(model, data)
-            worst = max(worst, float(np.abs(one.qpos - two.qpos).max()))
-        assert worst < 1e-9
-        assert np.ptp(one.qpos) > 0.3  # it moved
-        two.qpos = one.qpos
-        for model, data in zip(models, (one, two), strict=True):
-            sm.forward(model, data)
-        assert np.abs(one.site_xpos - two.site_xpos).max() < 1e-12
-        assert np.abs(one.qfrc_bias - two.qfrc_bias).max() < 1e-12
+    models = on_both(mjcf(tmp_path, REFS))
+    with sm.make_data(models[0]) as left, sm.make_data(models[1]) as right:
+        assert right.qpos.tolist() == pytest.approx([0.3, math.radians(40), math.radians(-75)])
+        assert largest_gap(models, (left, right), steps=400, every=50, most=2.0) < 1e-9
+        assert np.ptp(left.qpos) > 0.3  # it moved
+        forward_at_one_state(models, (left, right))
+        assert np.abs(left.site_xpos - right.site_xpos).max() < 1e-12
+        assert np.abs(left.qfrc_bias - right.qfrc_bias).max() < 1e-12
 
 
 def test_a_contact_margin_is_told(tmp_path: Path) -> None:

@@ -11,18 +11,11 @@ import pytest
 import statemachine as sm
 from statemachine.errors import EngineWarning, UnsupportedError
 
-from .conftest import assert_in, opened, path, refused, started
-from .small_models import loaded
+from .conftest import after, assert_in, opened, path, refused, started
+from .small_models import both
 
-IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
 FLOOR = '<geom name="floor" type="plane" size="1 1 .1"/>'
 pytestmark = pytest.mark.usefixtures("bullet")
-
-
-def both(folder: Path, body: str, option: str = IMPLICIT, rest: str = "") -> list[sm.Model]:
-    """The model on MuJoCo and on PyBullet."""
-    backends = ("mujoco", "pybullet")
-    return [loaded(folder, body, rest, option=option, backend=name) for name in backends]
 
 
 def chain(joint: str, count: int = 3, height: float = 1.0) -> str:
@@ -39,8 +32,8 @@ def chain(joint: str, count: int = 3, height: float = 1.0) -> str:
 
 def apart(models: list[sm.Model], steps: int, qpos: float, ctrl: float = 0.0) -> float:
     """The largest difference of a joint's position on the way."""
-    one, two = (path(model, steps, qpos=qpos, ctrl=ctrl) for model in models)
-    return float(np.abs(one - two).max())
+    left, right = (path(model, steps, qpos=qpos, ctrl=ctrl) for model in models)
+    return float(np.abs(left - right).max())
 
 
 def driven(kind: str, joints: int = 3, gains: str = "") -> str:
@@ -92,7 +85,7 @@ def test_the_integrator_of_the_file(tmp_path: Path, flag: str) -> None:
     """Under Euler a servo's kv is explicit, and joint damping is not, or is."""
     servos = driven("position", 3, 'kp="5" kv=".1"')
     option = f'<option timestep="0.005" integrator="Euler">{flag}</option>'
-    models = both(tmp_path, chain('armature=".02" damping=".05"'), option, servos)
+    models = both(tmp_path, chain('armature=".02" damping=".05"'), servos, option)
     assert apart(models, 200, 0.2) < 1e-9
     fast = both(tmp_path, chain('armature=".02" damping=".05"'), rest=servos)
     assert apart([models[0], fast[0].replace(timestep=0.005)], 200, 0.2) > 1e-5
@@ -118,7 +111,7 @@ def test_light_joints_before_a_heavy_motor_rest_on_the_floor(tmp_path: Path, arm
         text = text.replace(f'name="j{k}"', f'name="j{k}" armature="{value}"')
     servos = driven("position", 3, 'kp="20" kv=".5"')
     option = '<option timestep="0.005" integrator="implicitfast"/>'
-    _, model = both(tmp_path, FLOOR + text, option, servos)
+    _, model = both(tmp_path, FLOOR + text, servos, option)
     with opened(model, ctrl=0.8, nstep=1500) as (_, data):
         fastest = 0.0
         for _ in range(200):
@@ -201,8 +194,7 @@ def test_everything_rests_at_its_own_height(tmp_path: Path, geom: str) -> None:
     """Round and pointed shapes come with a millimetre of their own unless told otherwise."""
     body = f'{FLOOR}<body pos="0 0 .052"><freejoint/><geom {geom}/></body>'
     _, model = both(tmp_path, body, rest=HULLS)
-    with opened(model, nstep=1000) as (_, data):
-        assert data.qpos[2] == pytest.approx(0.05, abs=5e-5)
+    assert after(model, 1000)[2] == pytest.approx(0.05, abs=5e-5)
 
 
 @pytest.mark.parametrize(
@@ -223,11 +215,11 @@ def test_friction_of_a_pair_is_the_models(
         f'<geom type="plane" size="1 1 .1" {floor}/>'
         f'<body pos="0 0 .05"><freejoint/><geom type="box" size=".05 .05 .05" {box}/></body>'
     )
-    _, model = both(tmp_path, body, option)
-    with opened(model, nstep=500) as (_, data):
-        moved = float(data.qpos[0])
+    _, model = both(tmp_path, body, option=option)
     friction = 0.1 if "priority" in floor else 0.0
-    assert moved == pytest.approx((1.96 - friction * 9.81) / 2 if slides else 0.0, abs=0.01)
+    assert after(model, 500)[0] == pytest.approx(
+        (1.96 - friction * 9.81) / 2 if slides else 0.0, abs=0.01
+    )
 
 
 def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:
@@ -359,10 +351,10 @@ def test_a_joint_on_its_limit_is_no_slower(tmp_path: Path) -> None:
     ],
 )
 def test_what_has_no_effect_is_named(tmp_path: Path, option: str, word: str) -> None:
-    two = (
+    frictions = (
         '<geom type="plane" size="1 1 .1" friction=".05"/><body pos="0 0 .05"><freejoint/>'
         '<geom type="box" size=".05 .05 .05" friction=".05"/>'
         '<geom type="box" size=".05 .05 .05" pos="0 0 .1" friction="1"/></body>'
     )
     with pytest.warns(EngineWarning, match=word):
-        both(tmp_path, chain("") if option else two, option)
+        both(tmp_path, chain("") if option else frictions, option=option)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -12,8 +13,8 @@ import pytest
 import statemachine as sm
 from statemachine.errors import UnsupportedError
 
-from .conftest import refused
-from .small_models import loaded
+from .conftest import opened, refused
+from .small_models import both, forward_at_one_state, largest_gap, loaded
 
 pytestmark = pytest.mark.usefixtures("bullet")
 
@@ -74,32 +75,15 @@ def option(integrator: str, more: str = "") -> str:
     return f'<option timestep="0.002" integrator="{integrator}" {more}/>'
 
 
-def gap(models: list[sm.Model], steps: int = 300) -> float:
-    """The largest gap of qpos under random commands; they move, and `forward` agrees at the end."""
-    random, worst, fastest = np.random.default_rng(0), 0.0, 0.0
+def gap(models: list[sm.Model]) -> float:
+    """The largest gap of qpos under random commands; `forward` agrees at the end."""
     with sm.make_data(models[0]) as left, sm.make_data(models[1]) as right:
-        for k in range(steps):
-            if k % 20 == 0:
-                left.ctrl[:] = right.ctrl[:] = random.uniform(-1, 1, models[0].nu)
-            sm.step(models[0], left)
-            sm.step(models[1], right)
-            worst = max(worst, float(np.abs(left.qpos - right.qpos).max()))
-            fastest = max(fastest, float(np.abs(left.qvel).max()))
-        assert fastest > 0.01
-        right.qpos, right.qvel = left.qpos, left.qvel
-        for model, data in zip(models, (left, right), strict=True):
-            sm.forward(model, data)
+        gap = largest_gap(models, (left, right), steps=300, every=20)
+        forward_at_one_state(models, (left, right))
         for name in ("xpos", "site_xpos", "qfrc_bias", "qfrc_passive", "qfrc_actuator", "qacc"):
             ours, theirs = getattr(right, name), getattr(left, name)
             assert np.abs(ours - theirs).max() < 1e-5 * max(1.0, np.abs(theirs).max()), name
-    return worst
-
-
-def both(folder: Path, world: str, rest: str, settings: str) -> list[sm.Model]:
-    return [
-        loaded(folder, world, rest, option=settings, backend=name)
-        for name in ("mujoco", "pybullet")
-    ]
+    return gap
 
 
 @pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
@@ -154,9 +138,7 @@ def test_geoms_of_one_body_meet_different_things(
     if floor:
         world = world.replace('contype="0" conaffinity="0"/>', f"{floor}/>", 1)
     for model in both(tmp_path, world, rest, option("implicitfast")):
-        with sm.make_data(model) as data:
-            data.qvel[:] = 0.0
-            sm.step(model, data, 1000)
+        with opened(model, nstep=1000) as (_, data):
             assert data.qpos[2] == pytest.approx(height, abs=2e-3)
             names = {model.compiled.geom(int(g)).name for g in np.ravel(data.contacts.geom)}
             assert names == {"floor", "low" if height else "wide"}
@@ -218,10 +200,7 @@ def test_what_no_single_tree_can_do_is_refused(tmp_path: Path, says: str) -> Non
 @pytest.mark.parametrize("tie", ["joints", "spring", "motor", "filters"])
 def test_as_it_comes_the_engine_has_no_law(tmp_path: Path, tie: str) -> None:
     world = TREE.format(base="<freejoint/>")
-
-    def load() -> sm.Model:
-        return loaded(tmp_path, world, TIES[tie], backend="pybullet", defaults="engine")
-
+    load = partial(loaded, tmp_path, world, TIES[tie], backend="pybullet", defaults="engine")
     refused((UnsupportedError, "the engine as it comes has none", load))
 
 
@@ -230,8 +209,7 @@ def test_a_tree_floats_on_the_engine_as_it_comes(tmp_path: Path) -> None:
     world = TREE.format(base="<freejoint/>").replace("damping", "user")
     settings = {"defaults": "engine", "gravity": (0, 0, -9.81), "timestep": 0.002}
     model = loaded(tmp_path, world, backend="pybullet", **settings)
-    with sm.make_data(model) as data:
-        sm.step(model, data, 100)
+    with opened(model, nstep=100) as (_, data):
         assert data.qpos[2] - 1 == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=0.05)
         sm.forward(model, data)
         assert data.xpos[1] == pytest.approx(data.qpos[:3])
@@ -240,16 +218,14 @@ def test_a_tree_floats_on_the_engine_as_it_comes(tmp_path: Path) -> None:
 
 def test_mujoco_has_room_for_pairs_that_carry_each_other_only(tmp_path: Path) -> None:
     """Of two branches, a tendon's armature adds to each, and nothing between them."""
-    raw = loaded(tmp_path, TREE.format(base=""), TIES["armature"]).compiled
-    bare = loaded(tmp_path, TREE.format(base=""), TIES["spring"]).compiled
-    mass = []
-    for each in (raw, bare):
-        data = mujoco.MjData(each)
-        mujoco.mj_forward(each, data)
-        full = np.zeros((each.nv, each.nv))
-        mujoco.mj_fullM(each, data, full)
-        mass.append(full)
-    added = mass[0] - mass[1]
+    masses = []
+    for tie in ("armature", "spring"):
+        raw = loaded(tmp_path, TREE.format(base=""), TIES[tie]).compiled
+        data, mass = mujoco.MjData(raw), np.zeros((raw.nv, raw.nv))
+        mujoco.mj_forward(raw, data)
+        mujoco.mj_fullM(raw, data, mass)
+        masses.append(mass)
+    added = masses[0] - masses[1]
     assert added[0, 0] == pytest.approx(0.02)
     assert added[3, 3] == pytest.approx(0.02 * 0.7**2)
     assert added[0, 3] == 0
@@ -281,8 +257,7 @@ TOLD = {
 def test_what_has_no_effect_is_told(tmp_path: Path, setting: str) -> None:
     geom, rest = TOLD[setting]
     world = TOUCHING.format(geom=geom) if geom else TREE.format(base="")
-    with warnings.catch_warnings(record=True) as texts:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as texts:
         loaded(tmp_path, world, rest, backend="pybullet")
     told = " ".join(str(text.message) for text in texts)
     assert (f"{setting} has no effect" in told) == (setting not in ("", "nothing"))

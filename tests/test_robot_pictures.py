@@ -20,7 +20,7 @@ from statemachine.report import markdown as md
 from statemachine.report import robot_pictures, site, terminal
 from statemachine.report.quiz import Reader
 
-from .conftest import assert_has
+from .conftest import assert_has, assert_in
 from .rendering import rendering_environment
 
 
@@ -90,9 +90,8 @@ def test_without_a_renderer_a_page_has_the_words(
     )
     path = site._write(tmp_path, "page", Page("t", "o", [_picture()]), "", "x")  # pyright: ignore
     text = path.read_text()
-    assert "the words" in text
+    assert_in(text, "the words", "*the title* Live: `statemachine view`")
     assert "![" not in text
-    assert "*the title* Live: `statemachine view`" in text
 
 
 def test_it_is_a_picture_with_its_words_where_there_is_one() -> None:

@@ -18,7 +18,7 @@ from statemachine.lessons import LESSONS
 from statemachine.probes.phrasebook import CONCEPTS
 from statemachine.report.conventions import OURS, REMEMBER
 
-from .conftest import ROOT, refused
+from .conftest import ROOT, assert_not_in, refused
 from .exercises import WRONG
 
 sys.path.insert(0, str(ROOT / "teaching"))
@@ -55,8 +55,7 @@ def test_the_students_kit_has_no_solution(built: Path, tmp_path: Path) -> None:
         text = (ROOT / "teaching" / "solutions" / file).read_text()
         functions = re.findall(r"^def (?:demo|test)_.*?(?=^def |\Z)", text, re.M | re.S)
         assert len(functions) >= 4
-        for function in functions:
-            assert function.encode() not in whole
+        assert_not_in(whole, *(function.encode() for function in functions))
     again = tmp_path / "again.zip"
     make_kits.write(again, make_kits.student_kit(built))
     assert again.read_bytes() == target.read_bytes()

@@ -432,14 +432,13 @@ def test_a_recorded_trace_is_what_the_engine_does_here(
 @pytest.mark.network
 @pytest.mark.usefixtures("old_releases")
 def test_the_recorded_run_of_an_older_release_is_what_it_does(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, mujoco_scene: sm.Model
 ) -> None:
     monkeypatch.syspath_prepend(ROOT / "models" / "so101")
     _is_as_recorded(f"hold.{OLDER}")
-    model = sm.load("so101/scene")
-    here = take(LESSONS["hold"], model, "mujoco", {}).result.older
+    here = take(LESSONS["hold"], mujoco_scene, "mujoco", {}).result.older
     monkeypatch.setenv("STATEMACHINE_ENGINES", "nowhere")
-    recorded = vars(take(LESSONS["hold"], model, "mujoco", {}).result.older)
+    recorded = vars(take(LESSONS["hold"], mujoco_scene, "mujoco", {}).result.older)
     assert recorded | {"recorded": False} == vars(here)
     assert np.degrees(here.gap) == pytest.approx(6.12, abs=0.01)
 

@@ -35,7 +35,7 @@ from statemachine.view.session import (
 from statemachine.view.viser_front import readout, warning
 
 from .conftest import ROOT, assert_has, assert_in, in_its_own_python, one_line, opened, refused
-from .small_models import ODD_DRIVES, model_of
+from .small_models import ODD_DRIVES, model_of, on_both
 
 SCENE = "so101/scene_box"
 
@@ -138,7 +138,7 @@ def test_what_cannot_be_done_is_refused_and_changes_nothing(
 
 @pytest.mark.usefixtures("bullet")
 def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
-    models = [sm.load(SCENE, backend=name) for name in ("mujoco", "pybullet")]
+    models = on_both(SCENE)
     with LiveSession(models) as session:
         session.set_ctrl(1, -0.6)
         session.set_ctrl(2, 1.2)
@@ -182,8 +182,7 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
-    models = [sm.load("so101/scene", backend=name) for name in ("mujoco", "pybullet")]
-    with LiveSession(models) as session:
+    with LiveSession(on_both("so101/scene")) as session:
         session._arms[1][1].qvel[0] = math.nan
         session.play()
         session.advance()

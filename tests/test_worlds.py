@@ -179,8 +179,7 @@ def test_a_world_that_diverges_leaves_the_others_alone(
     SPOILS[what](SimpleNamespace(**row))
     wanted = single_error(model, SPOILS[what], 1 if recorded else 20)
     rows = {}
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as told:
         if recorded:
             rows = many.record(worlds, 20, ("qpos", "time"))
         else:
@@ -513,13 +512,14 @@ def test_a_record_goes_on_past_a_warning_that_ends_nothing(tmp_path: Path) -> No
     floor = '<geom type="plane" size="2 2 .1"/>'
     model = loaded(tmp_path, floor + balls, '<size memory="60K"/>')
     data = sm.make_data(model)
-    with warnings.catch_warnings(record=True) as single:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as single:
         for _ in range(10):
             sm.step(model, data)
     assert single
-    with worlds_of(model, 3) as worlds, warnings.catch_warnings(record=True) as ours:
-        warnings.simplefilter("always")
+    with (
+        worlds_of(model, 3) as worlds,
+        warnings.catch_warnings(record=True, action="always") as ours,
+    ):
         rows = many.record(worlds, 10)
         equal(worlds, [data] * 3)
         assert np.array_equal(rows["qpos"][2, -1], data.qpos)
