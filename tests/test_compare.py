@@ -29,7 +29,7 @@ from statemachine.report import compare as report
 from statemachine.runs import Trace, record, write
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import Cli, assert_has, assert_in, one_line, refused
+from .conftest import Cli, assert_has, assert_in, one_line, opened, refused
 from .small_models import NAMELESS_JOINTS, STILL, model_of
 from .test_strange_traces import added, changed
 from .test_strange_traces import named as by_name
@@ -183,8 +183,10 @@ def test_what_becomes_of_a_contact(box: Trace, hold: Trace) -> None:
 def test_the_whole_force_of_a_contact_is_the_engines(box: Trace, mujoco_box: sm.Model) -> None:
     """Friction and all, added as vectors; on the box the two jaws and its weight balance."""
     row = len(box) - 1
-    with sm.make_data(mujoco_box) as data:
-        data.qpos, data.qvel, data.ctrl = box.qpos[row], box.qvel[row], box.ctrl[row]
+    with opened(mujoco_box, qpos=box.qpos[row], qvel=box.qvel[row], ctrl=box.ctrl[row]) as (
+        _,
+        data,
+    ):
         sm.forward(mujoco_box, data)
         found: dict[tuple[int, ...], Any] = {}
         for geoms, frame, force in zip(

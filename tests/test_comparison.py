@@ -27,7 +27,7 @@ from statemachine.report.plot import of_trace
 from statemachine.runs import Trace, record, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import Cli, lesson_result
+from .conftest import Cli, lesson_result, opened
 from .small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
 
 
@@ -51,9 +51,11 @@ def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(
     lesson = lesson_result("hold", mujoco_scene, seconds=0.5)
     assert lesson.touched
     assert all(touch.startswith(f"{name} (") for touch in lesson.touched)
-    with sm.make_data(mujoco_scene) as data:
-        row = int(trace["contact_row"][-1])
-        data.qpos, data.qvel, data.ctrl = trace.qpos[row], trace.qvel[row], trace.ctrl[row]
+    row = int(trace["contact_row"][-1])
+    with opened(mujoco_scene, qpos=trace.qpos[row], qvel=trace.qvel[row], ctrl=trace.ctrl[row]) as (
+        _,
+        data,
+    ):
         sm.forward(mujoco_scene, data)
         data.qpos[1] -= 0.5
         gaps = sm.freshness(mujoco_scene, data)["contacts"].gaps

@@ -107,9 +107,7 @@ def test_the_bound_can_be_set(tmp_path: Path) -> None:
     assert np.array_equal(bound(model.replace(timestep=0.001)), bound(model))
     each = model.replace(max_qvel=[1000, *[1e5] * 7])
     for variant, top in ((model, 499), (each, 999)):
-        with sm.make_data(variant) as data:
-            data.qvel[0] = top
-            sm.step(variant, data, 3)
+        with opened(variant, qvel=[top, *[0] * 7], nstep=3) as (_, data):
             data.qvel[0] = top + 2
             says = r"qvel\[0\] \(rotor\) = .* went beyond max_"
             refused((DivergedError, says, partial(sm.step, variant, data)))

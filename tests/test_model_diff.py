@@ -223,8 +223,8 @@ def test_fixed_links_weigh_what_mujoco_makes_of_them(
 ) -> None:
     """However a rigid part is cut: MuJoCo fuses fixed links when it imports a URDF."""
     texts = ['<robot name="r"><link name="root"/>']
-    for k, (mass, figures, moments) in enumerate(links):
-        x, y, z = moments  # of masses on the axes: such moments are those of a solid
+    # x, y, z: moments of masses on the axes. Such moments are those of a solid.
+    for k, (mass, figures, (x, y, z)) in enumerate(links):
         at, turn, com, spin = (" ".join(map(repr, figures[i : i + 3])) for i in range(0, 12, 3))
         on = "root" if not k else f"l{random.randrange(k)}"
         kind = "fixed" if k else "continuous"

@@ -13,7 +13,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import UnsupportedError
 
-from .conftest import opened, refused
+from .conftest import after, opened, refused
 from .small_models import both, forward_at_one_state, largest_gap, loaded
 
 pytestmark = pytest.mark.usefixtures("bullet")
@@ -167,11 +167,8 @@ def test_a_state_carries_activations(tmp_path: Path) -> None:
 def test_a_keyframe_has_activations(tmp_path: Path) -> None:
     key = '<keyframe><key qpos="0 0 0 0" act=".1 .2 .3 .4"/></keyframe>'
     models = both(tmp_path, TREE.format(base=""), TIES["filters"] + key, option("Euler"))
-    with sm.make_data(models[0]) as left, sm.make_data(models[1]) as right:
-        for model, data in zip(models, (left, right), strict=True):
-            sm.reset(model, data, keyframe=0)
-            sm.step(model, data, 20)
-        assert np.abs(left.qpos - right.qpos).max() < 1e-9
+    left, right = (after(model, 20, keyframe=0) for model in models)
+    assert np.abs(left - right).max() < 1e-9
 
 
 TWO = '<body name="x"><joint name="x"/><geom size=".1"/></body><body pos="1 0 0"><joint name="y"/>'
@@ -268,9 +265,7 @@ def test_an_activation_that_is_off_stays_as_it_was(tmp_path: Path) -> None:
     key = '<keyframe><key qpos="0 0 0 0" act=".4"/></keyframe>'
     off = '<option actuatorgroupdisable="3"/>'
     model = loaded(tmp_path, TREE.format(base=""), OFF_GROUP + key, option=off, backend="pybullet")
-    with sm.make_data(model) as data:
-        sm.reset(model, data, keyframe=0)
-        sm.step(model, data, 3)
+    with opened(model, 0, nstep=3) as (_, data):
         assert sm.get_state(model, data)["act"].tolist() == [0.4]
 
 

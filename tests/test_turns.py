@@ -26,6 +26,7 @@ from statemachine.interface import DERIVED
 
 from .conftest import (
     ROOT,
+    after,
     bits,
     interrupted_at,
     opened,
@@ -108,8 +109,7 @@ def test_another_data_is_not_refused(model: sm.Model) -> None:
             sm.step(model, other, 5)
             sm.forward(model, other)
             assert other.qacc.any()
-            with sm.make_data(model) as third:
-                sm.step(model, third)
+            after(model, 1)
 
         raised = _meanwhile(data, use)
         sm.step(model, data)
