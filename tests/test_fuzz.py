@@ -97,11 +97,11 @@ def test_what_is_no_good_end_of_a_command_is_said(tmp_path: Path) -> None:
 # Writes in place, and the second file after a moment.
 IN_PLACE = """
 import contextlib, time
-from statemachine.runs import csv_files, whole
+from statemachine.runs import files, whole
 @contextlib.contextmanager
 def beside(*targets):
     yield [str(target) for target in targets]
-whole.beside = csv_files.beside = beside
+whole.beside = files.beside = beside
 """
 
 

@@ -57,8 +57,13 @@ GOOD = """<mujoco><option timestep='0.002'/><worldbody>
 <body name='hand' pos='0.4 0 0'><joint name='k' axis='0 1 0' damping='0.1'/>
 <geom type='sphere' size='0.05'/></body></body></worldbody>
 <actuator><position joint='j' kp='5' ctrlrange='-1 1'/></actuator></mujoco>"""
-TENDON = GOOD.replace(
-    "</mujoco>", "<tendon><fixed name='t'><joint joint='j' coef='1'/></fixed></tendon></mujoco>"
+TENDON = (
+    GOOD.replace("<geom name", "<site name='s'/><geom name")
+    .replace("<geom type='sphere'", "<site name='t'/><geom type='sphere'")
+    .replace(
+        "</mujoco>",
+        "<tendon><spatial><site site='s'/><site site='t'/></spatial></tendon></mujoco>",
+    )
 )
 URDF = """<robot name='r'><link name='base'/><link name='tip'><inertial><mass value='1'/>
 <inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>
@@ -229,7 +234,7 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
     assert gap.hinge < 1e-9
     assert gap.slide is None
     tendon = rows["tendon.xml"].backends
-    assert_has(tendon["pybullet"], features=("tendon",))
+    assert_has(tendon["pybullet"], features=("spatial tendon",))
     assert "tendon" in tendon["pybullet"].refusal
     assert tendon["mujoco"].equals_engine
     assert "cannot read" in rows["broken.xml"].backends["mujoco"].refusal
