@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -273,7 +274,7 @@ def test_gravity_is_turned_back_when_a_step_is_interrupted(tmp_path: Path) -> No
     """The copy whose dynamics are asked is that of all Data of a Model."""
     from statemachine.backends import _bullet_world as world
 
-    model = loaded(tmp_path, TREE.format(base="<freejoint/>"), backend="pybullet")
+    model: Any = loaded(tmp_path, TREE.format(base="<freejoint/>"), backend="pybullet")
     with (
         sm.make_data(model) as data,
         sm.make_data(model) as other,
