@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+INVERSE: Array = np.array([1.0, -1.0, -1.0, -1.0])  # times a unit quaternion, its inverse
+
 
 def wxyz_from_xyzw(quat: ArrayLike) -> Array:
     """Reorder quaternions (..., 4) from (x, y, z, w) to (w, x, y, z)."""

@@ -15,14 +15,13 @@ import mujoco
 import numpy as np
 
 from ..interface import Array
-from ..rotations import matrix_from_quat, times
+from ..rotations import INVERSE, matrix_from_quat, times
 from . import _dense as dense
 from ._bullet_plan import PLACES, SITE, ends_of, linear_sum
 from ._bullet_world import Tree, World
 
 _TINY = 1e-300  # for a power that is too small for a float
 _EQ = mujoco.mjtEq
-_INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
 
 
 class SoftRow(NamedTuple):
@@ -77,12 +76,13 @@ def soft_row(
     return SoftRow(jacobian, softness(strength, weight), goal, *bounds)
 
 
-def related(raw: mujoco.MjModel, a: int, b: int) -> bool:
-    """Whether one of two degrees of freedom carries the other."""
-    low, high = min(a, b), max(a, b)
-    while high > low:
-        high = int(raw.dof_parentid[high])
-    return high == low
+def _related(raw: mujoco.MjModel, dofs: Any) -> Any:
+    """(n, n): of which pairs of degrees of freedom one carries the other."""
+    carriers = np.eye(raw.nv, dtype=bool)
+    for dof, parent in enumerate(raw.dof_parentid.tolist()):  # what carries comes first
+        if parent >= 0:
+            carriers[dof] |= carriers[parent]
+    return (carriers | carriers.T)[np.ix_(dofs, dofs)]
 
 
 class Tendons:
@@ -108,7 +108,7 @@ class Tendons:
         self.ids = ids = list(self.moments)
         self._moment = np.array([*self.moments.values()]).reshape(len(ids), len(tree.dofs))
         self._across = self._moment.T.copy()
-        self.near = np.array([[related(raw, a, b) for b in tree.dofs] for a in tree.dofs])
+        self.near = _related(raw, tree.dofs)
         self.armature = raw.tendon_armature[ids]
         self.damping = raw.tendon_damping[ids] * (not off["damper"])
         self._stiffness = raw.tendon_stiffness[ids] * (not off["spring"])
@@ -243,7 +243,7 @@ class Equalities:
                 moves[k] = self._world.jacobian(tree, q, place.body, pose, point)
                 spins[k, 1:], drifts[k] = self._drift(moves[k], speed)
         jacobian, drift = moves[0] - moves[1], drifts[0] - drifts[1]
-        scale, back = 0.5 * float(self._raw.eq_data[eq, 10]), quats[1] * _INVERSE
+        scale, back = 0.5 * float(self._raw.eq_data[eq, 10]), quats[1] * INVERSE
 
         def turned(spin: Array) -> Array:
             """What a spin (…, 3) does to the quaternion from one place to the other (…, 3)."""

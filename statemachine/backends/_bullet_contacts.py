@@ -48,7 +48,6 @@ class Surfaces:
     Attributes:
         solids: All that can touch; planes first.
         touching: (ngeom,) which geoms may touch any other.
-        meets: (ngeom, ngeom) which may touch which.
         pairs: Of two solids, by their places, whether they meet.
         meeting: The geoms that do, two by two.
         slide, spin, roll: Each solid's friction.
@@ -57,17 +56,17 @@ class Surfaces:
 
     def __init__(self, raw: mujoco.MjModel) -> None:
         self._raw = raw
-        self.meets = _meets(raw)
+        meets = _meets(raw)
         touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
         touching[[*raw.pair_geom1, *raw.pair_geom2]] = True
         self.touching = touching & (not raw.opt.disableflags & NO_CONTACT)
-        self.solids = _solids(raw, self.meets, self.touching)
+        self.solids = _solids(raw, meets, self.touching)
         several: list[str] = []
         self.pairs: dict[tuple[int, int], bool] = {}
         self.meeting: list[tuple[int, int]] = []
         wanted = []  # friction (3,) of each pair that meets
         for (i, left), (j, right) in combinations(enumerate(self.solids), 2):
-            meet = self.pairs[i, j] = bool(self.meets[left.geoms[0], right.geoms[0]])
+            meet = self.pairs[i, j] = bool(meets[left.geoms[0], right.geoms[0]])
             if meet:
                 meeting = [(a, b) for a in left.geoms for b in right.geoms]
                 self.meeting += meeting

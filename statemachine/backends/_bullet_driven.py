@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from ..interface import DERIVED, POSES, Array
-from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
+from ..rotations import INVERSE, matrix_from_quat, times, wxyz_from_xyzw
 from . import _dense as dense
 from ._bullet_client import pb
 from ._bullet_contacts import contacts_of
@@ -27,7 +27,6 @@ from ._hidden_world import HiddenWorld, Memory, Moment, Read, bounded
 from .compiled import gravity
 
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, by PyBullet as it comes
-_INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
 Act = Callable[[World], None]  # sets something in a world that was opened
 
 
@@ -277,7 +276,7 @@ class Ghost(World):
         xpos, xquat = (array.copy() for array in self.still[:2])
         for tree, (where, turned) in zip(self.trees, self._states(qpos), strict=True):
             bodies = list(tree.links)
-            xquat[bodies] = times(wxyz_from_xyzw(turned), raw.body_iquat[bodies] * _INVERSE)
+            xquat[bodies] = times(wxyz_from_xyzw(turned), raw.body_iquat[bodies] * INVERSE)
             turns = matrix_from_quat(xquat[bodies])
             xpos[bodies] = where - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies])
         for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):

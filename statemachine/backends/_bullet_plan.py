@@ -51,6 +51,7 @@ class Plan:
         names: What everything is called in a URDF.
         ghost: See `_bullet_driven`; None until it is needed.
         described: Gives the text and the files of a tree of bodies; see `_describe`.
+        driven: Tells whether a law drives a tree; see `_has_law`.
     """
 
     def __init__(self, raw: mujoco.MjModel) -> None:
@@ -59,20 +60,22 @@ class Plan:
         self.names = urdf.Names(raw)
         self.ghost: Any = None
         self.described = cache(self._describe)
+        self.driven = cache(self._has_law)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Plan, (self.raw,)
 
-    def rigid(self, root: int) -> bool:
-        """Whether a tree is one free body that nothing but gravity and contact moves."""
+    def _has_law(self, root: int) -> bool:
+        """Whether more than gravity and contact moves a tree: all but one free body by itself."""
         raw = self.raw
-        if not urdf.floats(raw, root) or len(urdf.tree(raw, root)) > 1:
-            return False
+        bodies = urdf.tree(raw, root)
+        if not urdf.floats(raw, root) or len(bodies) > 1:
+            return urdf.floats(raw, root) or any(urdf.axes(raw, body) for body in bodies)
         own = slice(raw.body_dofadr[root], raw.body_dofadr[root] + 6)
         laws = raw.dof_armature, raw.dof_damping, raw.dof_frictionloss
         medium = raw.opt.density or raw.opt.viscosity or raw.body_gravcomp[root]
         tied = root in raw.body_rootid[[b for eq in range(raw.neq) for b in ends_of(raw, eq)]]
-        return not (medium or tied or any(law[own].any() for law in laws))
+        return bool(medium or tied or any(law[own].any() for law in laws))
 
     @cached_property
     def padding(self) -> Array:
@@ -117,13 +120,13 @@ class Plan:
         if kind == "engine":  # as it comes, meshes come from their files
             meshes = {geom: int(raw.geom_dataid[geom]) for geom in hulls}
             hulls = {g for g, mesh in meshes.items() if mesh < 0 or raw.mesh_pathadr[mesh] < 0}
-        loose = kind == "engine" and urdf.floats(raw, root)
+        loose = urdf.floats(raw, root) and (kind == "engine" or not self.driven(root))
         dialect = urdf.Dialect(
             capsules=True,
             looks=False,
             solids=kind != "ghost" and bool(self.surfaces.solids),
             dynamics=kind == "engine",
-            anchored=bool(root) and not (self.rigid(root) or loose),
+            anchored=bool(root) and not loose,
             padding=self.padding if kind == "stepped" else None,
             tips=kind != "stepped" and urdf.parts(raw, root) + sites <= MOST_PARTS,
             hulls=frozenset(hulls),

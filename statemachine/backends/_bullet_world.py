@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..interface import Array
-from ..rotations import matrix_from_quat, wxyz_from_xyzw, xyzw_from_wxyz
+from ..rotations import INVERSE, matrix_from_quat, wxyz_from_xyzw, xyzw_from_wxyz
 from ..rotations import times as quat_times
 from ..silence import silence
 from . import _bullet_urdf as urdf
@@ -82,7 +82,7 @@ class Tree:
         by_name = {names.joints[j]: j for b in bodies for j in urdf.axes(raw, b)}
         moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]
         self.joints = [index for index, _ in moving]
-        self.driven = bool(self.joints) or (self.free and not plan.rigid(root))
+        self.driven = plan.driven(root)
         self.base = 6 * self.free
         first = int(raw.body_jntadr[root])
         ids = [joint for _, joint in moving]
@@ -134,9 +134,7 @@ class World:
         self.trees: list[Tree] = []
         self._planes: dict[int, int] = {}  # PyBullet's body of each plane of the world
         for root in (0, *urdf.roots(raw)):
-            jointed = any(urdf.axes(raw, b) for b in urdf.tree(raw, root))
-            floating = urdf.floats(raw, root) and not plan.rigid(root)
-            if jointed or floating or kind != "ghost":
+            if plan.driven(root) or kind != "ghost":
                 self._load(root, kind)
         self._frames = {  # of free bodies: the inertial frame in the body's own
             tree.body: pb.getDynamicsInfo(tree.body, -1, self.client)[3:5]
@@ -473,7 +471,7 @@ class World:
         """The xpos (3,) and xquat (4,) of a body that is not the engine's base."""
         raw = self._raw
         where, axes, *_ = pb.getLinkState(tree.body, tree.links[body], 0, 1, self.client)
-        quat = quat_times(wxyz_from_xyzw(np.array(axes)), raw.body_iquat[body] * [1, -1, -1, -1])
+        quat = quat_times(wxyz_from_xyzw(np.array(axes)), raw.body_iquat[body] * INVERSE)
         return where - dense.times(matrix_from_quat(quat), raw.body_ipos[body]), quat
 
     def jacobian(
