@@ -67,8 +67,9 @@ def shape(value: Any) -> Any:
     if isinstance(value, list):
         shapes = {json.dumps(shape(inner), sort_keys=True) for inner in value}
         return [json.loads(text) for text in sorted(shapes)]
-    kinds = {bool: "true or false", int: "number", float: "number", str: "text"}
-    return kinds.get(type(value), "null")
+    return {bool: "true or false", int: "number", float: "number", str: "text"}.get(
+        type(value), "null"
+    )
 
 
 @pytest.mark.slow
