@@ -19,7 +19,7 @@ from statemachine.runs.rerun import Rerun
 from statemachine.runs.scenarios import scenario
 
 from .conftest import assert_has, assert_in, refused
-from .small_models import LINKS_AND_BALL, model_of
+from .small_models import LINKS_AND_BALL, TWO_LINKS, model_of
 
 CHANGES = {
     "kinematics": ('pos="0.3 0 0"><joint', 'pos="0.303 0 0"><joint', "lower"),
@@ -185,3 +185,20 @@ def test_an_engine_that_does_not_tell_a_stage_is_not_guessed_at() -> None:
     assert not found["passive"].told
     # It has no rotors, which the model's motors have.
     assert (found["mass matrix"].beyond, found["kinematics"].beyond) == (10, 0)
+
+
+@pytest.mark.usefixtures("bullet")
+@pytest.mark.parametrize("order", [("mujoco", "pybullet"), ("pybullet", "mujoco")])
+def test_activations_are_given_on(order: tuple[str, str], tmp_path: Path) -> None:
+    """They act on; the second file has its actuators in another order, one of another kind."""
+    drives = [
+        '<general name="a" joint="shoulder" dyntype="filter" dynprm="0.2" gainprm="3"/>',
+        '<general name="b" joint="elbow" dyntype="integrator" gainprm="5"/>',
+    ]
+    one, two = (
+        model_of(
+            tmp_path, TWO_LINKS.format(mass=0.3, drives="".join(rows), keys=""), name, backend=b
+        )
+        for name, b, rows in zip(("one.xml", "two.xml"), order, (drives, drives[::-1]), strict=True)
+    )
+    assert one_step(rerun(one), two).first is None

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from ..engines.description.tree import GroupTree
 from ..engines.records import BodyPair, Counterparts, Pairs
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
-from ..interface import Array, Model
+from ..interface import Array, Model, State
 from ..rotations import HERE
 from ..runs.rerun import SideStart
 
@@ -58,6 +60,18 @@ class Matched(Counterparts):
             self.ctrl(one.ctrl, two.ctrl),
         )
 
+    def state(self, one: State, two: State) -> State:
+        """The second Model's State `two` with what a State of the first tells of it.
+
+        Beside the time these are the arrays in `places` that both have.
+        """
+        given = {
+            name: _moved(one[name], two[name], *ends)
+            for name, ends in self.places.items()
+            if name in dict(one.layout) and name in dict(two.layout)
+        }
+        return two.with_parts(time=one["time"], **given)
+
     def qpos(self, values: Array, start: Array) -> Array:
         """Positions of the second Model, from those of the first.
 
@@ -65,15 +79,37 @@ class Matched(Counterparts):
             values: (nq,) or (n, nq) of the first.
             start: (nq,) of the second, for the joints that have no counterpart.
         """
-        return _moved(values, start, *self._spans("jnt_qposadr", "nq"))
+        return _moved(values, start, *self.places["qpos"])
 
     def qvel(self, values: Array, start: Array) -> Array:
         """Velocities of the second Model (nv,) or (n, nv), as `qpos`."""
-        return _moved(values, start, *self._spans("jnt_dofadr", "nv"))
+        return _moved(values, start, *self.places["qvel"])
 
     def ctrl(self, values: Array, start: Array) -> Array:
         """Commands to the second Model (nu,) or (n, nu), as `qpos`."""
-        return _moved(values, start, *([pair[k] for pair in self.actuators] for k in (0, 1)))
+        return _moved(values, start, *self.places["ctrl"])
+
+    @cached_property
+    def places(self) -> Mapping[str, list[list[int]]]:
+        """By array of a State, where in it on either side the counterparts are.
+
+        Activations are of actuators that have as many of them.
+        """
+        one, two = self.one.compiled, self.two.compiled
+        told = one is not None and two is not None
+        led = [
+            (int(one.body_mocapid[pair.left]), int(two.body_mocapid[pair.right]))
+            for pair in self.solids
+            if one.body_mocapid[pair.left] >= 0 <= two.body_mocapid[pair.right]
+        ]
+        return {
+            "qpos": self._spans("jnt_qposadr", "nq"),
+            "qvel": self._spans("jnt_dofadr", "nv"),
+            "ctrl": _ends(self.actuators),
+            "act": _ends(_activations(self.actuators, one, two) if told else ()),
+            "mocap_pos": _ends((3 * a + k, 3 * b + k) for a, b in led for k in range(3)),
+            "mocap_quat": _ends((4 * a + k, 4 * b + k) for a, b in led for k in range(4)),
+        }
 
     def _spans(self, start: str, end: str) -> list[list[int]]:
         """The places of the joints of both, in qpos or qvel."""
@@ -83,6 +119,24 @@ class Matched(Counterparts):
             for pair in self.joints:
                 places[side] += range(starts[pair[side]], starts[pair[side] + 1])
         return places
+
+
+def _ends(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
+    both = list(pairs)
+    return [[a for a, _ in both], [b for _, b in both]]
+
+
+def _activations(actuators: Pairs, one: Any, two: Any) -> list[tuple[int, int]]:
+    """Pairs of places in act."""
+    owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
+    pairs: set[tuple[int, int]] = set()
+    for a, b in actuators:
+        here, there = int(owner[0][a]), int(owner[1][b])
+        number = int(one.actuator_actnum[here])
+        if number == two.actuator_actnum[there]:
+            start = int(one.actuator_actadr[here]), int(two.actuator_actadr[there])
+            pairs |= {(start[0] + k, start[1] + k) for k in range(number)}
+    return sorted(pairs)
 
 
 def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None) -> Matched:

@@ -146,10 +146,7 @@ def _put(
     if (own.backend, own.fingerprint) == (state.backend, state.fingerprint):
         set_state(matched.two, data, state)
         return "all that a State of the left side holds"
-    data.qpos[:] = matched.qpos(state["qpos"], data.qpos)
-    data.qvel[:] = matched.qvel(state["qvel"], data.qvel)
-    data.ctrl[:] = matched.ctrl(state["ctrl"], data.ctrl)
-    data.time = state.time
+    set_state(matched.two, data, matched.state(state, own))
     return reader.prime(1, data, before)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, Literal
 
@@ -209,6 +209,11 @@ class State:
                 return self.vector[start : start + size]
             start += size
         raise unknown_name("part of the State", part, (name for name, _ in self.layout))
+
+    def with_parts(self, **parts: Array) -> State:
+        """The same with some parts in place of its own; what it has no part for is left out."""
+        arrays = [parts.get(name, self[name]) for name, _ in self.layout]
+        return replace(self, blob=np.concatenate(arrays, dtype=np.float64).tobytes())
 
     @property
     def time(self) -> float:

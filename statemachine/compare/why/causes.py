@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from ...engines import room
 from ...engines.records import Edit, ModelDifference
@@ -208,35 +205,16 @@ def _of_keyframe(matched: Matched, name: str) -> Iterator[ModelDifference]:
         values = (("time", times[0], times[1]),)
         edits: tuple[Edit, ...] = (("key_time", (keys[1],), times[0]),)
         yield ModelDifference("time of the start", "run", "", values, "s", edits)
-    led = [
-        (int(one.body_mocapid[pair.left]), int(two.body_mocapid[pair.right]))
-        for pair in matched.solids
-        if one.body_mocapid[pair.left] >= 0
-    ]
-    places = [(3 * a + k, 3 * b + k) for a, b in led for k in range(3)]
-    turns = [(4 * a + k, 4 * b + k) for a, b in led for k in range(4)]
-    for subject, field, pairs in (
-        ("ctrl", "key_ctrl", list(matched.actuators)),
-        ("activations", "key_act", _activations(matched, one, two)),
-        ("mocap places", "key_mpos", places),
-        ("mocap turns", "key_mquat", turns),
+    for subject, field, part in (
+        ("ctrl", "key_ctrl", "ctrl"),
+        ("activations", "key_act", "act"),
+        ("mocap places", "key_mpos", "mocap_pos"),
+        ("mocap turns", "key_mquat", "mocap_quat"),
     ):
         ours, theirs = getattr(one, field)[keys[0]], getattr(two, field)[keys[1]]
+        pairs = zip(*matched.places[part], strict=True)
         off = [(a, b) for a, b in pairs if abs(ours[a] - theirs[b]) > _SAME]
         if off:
             values = ((subject, tuple(ours[a] for a, _ in off), tuple(theirs[b] for _, b in off)),)
             edits = tuple((field, (keys[1], b), float(ours[a])) for a, b in off)
             yield ModelDifference(f"{subject} of the start", "run", "", values, "", edits)
-
-
-def _activations(matched: Matched, one: Any, two: Any) -> list[tuple[int, int]]:
-    """Pairs of places in act, of actuators that have as many."""
-    owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
-    pairs: set[tuple[int, int]] = set()
-    for a, b in matched.actuators:
-        here, there = int(owner[0][a]), int(owner[1][b])
-        number = int(one.actuator_actnum[here])
-        if number == two.actuator_actnum[there]:
-            start = int(one.actuator_actadr[here]), int(two.actuator_actadr[there])
-            pairs |= {(start[0] + k, start[1] + k) for k in range(number)}
-    return sorted(pairs)

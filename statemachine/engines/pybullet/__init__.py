@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast
 
@@ -76,12 +75,9 @@ class PybulletEngine(RawEngine):
         """The servo law knows the forces (nv,) of the step before."""
         from ...interface import get_state, set_state
 
-        state = get_state(model, data)
-        parts = {name: state[name].copy() for name, _ in state.layout}
-        for part, force in (("contact", "qfrc_contact"), ("friction", "qfrc_friction")):
-            if part in parts and force in before:
-                parts[part][:] = before[force]
-        set_state(model, data, replace(state, blob=np.concatenate(list(parts.values())).tobytes()))
+        forces = {"contact": "qfrc_contact", "friction": "qfrc_friction"}
+        given = {part: before[force] for part, force in forces.items() if force in before}
+        set_state(model, data, get_state(model, data).with_parts(**given))
 
     def opengl(self) -> str:
         """Nothing that it needs beside itself."""
