@@ -11,7 +11,11 @@ from ._common import EXCLUDES, PROGRAM, add_rules, add_table, json_of, say_missi
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
-    parser.description = "Ask the engines themselves, not our backends: every answer is measured."
+    parser.description = (
+        "Ask the engines themselves, not our backends: every answer is measured, on a small model "
+        "made for the question, so that it is known what should come out. Of a model of yours "
+        "`audit` and `compare` tell."
+    )
     add_table(
         parser,
         (

@@ -95,8 +95,8 @@ class Matched(Counterparts):
 
         Activations are of actuators that have as many of them.
         """
-        one, two = self.one.compiled, self.two.compiled
-        told = one is not None and two is not None
+        compiled: tuple[Any, Any] = self.one.compiled, self.two.compiled
+        one, two = compiled
         led = [
             (int(one.body_mocapid[pair.left]), int(two.body_mocapid[pair.right]))
             for pair in self.solids
@@ -106,7 +106,7 @@ class Matched(Counterparts):
             "qpos": self._spans("jnt_qposadr", "nq"),
             "qvel": self._spans("jnt_dofadr", "nv"),
             "ctrl": _ends(self.actuators),
-            "act": _ends(_activations(self.actuators, one, two) if told else ()),
+            "act": _ends(_activations(self.actuators, one, two) if None not in compiled else ()),
             "mocap_pos": _ends((3 * a + k, 3 * b + k) for a, b in led for k in range(3)),
             "mocap_quat": _ends((4 * a + k, 4 * b + k) for a, b in led for k in range(4)),
         }
