@@ -14,7 +14,7 @@ from collections import Counter
 from importlib.metadata import distributions
 from pathlib import Path
 
-from statemachine.report.markdown import body
+from statemachine.report.notebook import body
 from statemachine.report.robots import page
 from statemachine.robots import examine_all, find
 

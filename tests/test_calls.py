@@ -31,7 +31,7 @@ from statemachine.probes.calls import (
     record,
     recorded_engines,
 )
-from statemachine.report import calls as words
+from statemachine.report import conventions as words
 from statemachine.report.as_json import dumps
 
 from .conftest import Patch, around, assert_in, assert_not_in, need_engine, refused, shown
@@ -550,7 +550,7 @@ def page_of(*engines_: str, code: str = "") -> tuple[Page, str]:
     for each in engines_:
         need_engine(each)
     recordings = {each: record(SHORT.format(engine=each, code=code), each) for each in engines_}
-    page = Page("calls", "", words.blocks(recordings))
+    page = Page("calls", "", words.recorded_calls(recordings))
     assert dumps(recordings)
     return page, shown(page)
 

@@ -18,7 +18,7 @@ from statemachine.errors import BadInputError
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import page_of_lesson, take
 from statemachine.page import Heading, Page, Pipeline, Printed, Question, Slots, Table, Text, Traces
-from statemachine.report import markdown as md
+from statemachine.report import notebook as md
 from statemachine.report import terminal
 from statemachine.report.figures import svg
 from statemachine.report.notebook import _opening, build, lesson

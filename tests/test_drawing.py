@@ -12,7 +12,8 @@ import pytest
 
 import statemachine as sm
 from statemachine import rotations
-from statemachine.drawing import Drawing, Part, Surface, _shapes, drawing_of
+from statemachine.drawing import Drawing, Part, Surface, drawing_of
+from statemachine.drawing import _drawing as shapes
 from statemachine.drawing.scene import Camera
 
 from .conftest import refused, written
@@ -42,25 +43,25 @@ def _is_closed(shape: Surface | Part) -> bool:
     ("make", "volume", "area", "half"),
     [
         (
-            lambda n: _shapes.ellipsoid([0.3] * 3, n),
+            lambda n: shapes.ellipsoid([0.3] * 3, n),
             4 / 3 * math.pi * 0.3**3,
             4 * math.pi * 0.3**2,
             (0.3, 0.3, 0.3),
         ),
         (
-            lambda n: _shapes.ellipsoid([0.1, 0.2, 0.3], n),
+            lambda n: shapes.ellipsoid([0.1, 0.2, 0.3], n),
             4 / 3 * math.pi * 0.1 * 0.2 * 0.3,
             None,
             (0.1, 0.2, 0.3),
         ),
         (
-            lambda n: _shapes.cylinder(0.2, 0.5, n),
+            lambda n: shapes.cylinder(0.2, 0.5, n),
             math.pi * 0.2**2,
             2 * math.pi * 0.2 * (1 + 0.2),
             (0.2, 0.2, 0.5),
         ),
         (
-            lambda n: _shapes.capsule(0.2, 0.5, n),
+            lambda n: shapes.capsule(0.2, 0.5, n),
             math.pi * 0.2**2 + 4 / 3 * math.pi * 0.2**3,
             2 * math.pi * 0.2 + 4 * math.pi * 0.2**2,
             (0.2, 0.2, 0.7),
@@ -85,26 +86,26 @@ def test_round_shapes_approach_their_closed_forms(make, volume, area, half) -> N
 
 
 def test_flat_shapes_are_exact() -> None:
-    box = _shapes.box([0.1, 0.2, 0.3])
+    box = shapes.box([0.1, 0.2, 0.3])
     assert _is_closed(box)
     assert _volume(box) == pytest.approx(8 * 0.1 * 0.2 * 0.3)
     assert area_of(box) == pytest.approx(8 * (0.1 * 0.2 + 0.2 * 0.3 + 0.3 * 0.1))
-    rectangle = _shapes.rectangle(2, 3)
+    rectangle = shapes.rectangle(2, 3)
     assert area_of(rectangle) == pytest.approx(24)
     a, b, c = rectangle.vertices[rectangle.faces[0]]
     assert np.cross(b - a, c - a)[2] > 0
-    tilted = _shapes.terrain([[0, 1, 2], [0, 1, 2]], 1, 1)  # a plane that rises 1 m a metre
+    tilted = shapes.terrain([[0, 1, 2], [0, 1, 2]], 1, 1)  # a plane that rises 1 m a metre
     assert area_of(tilted) == pytest.approx(4 * math.sqrt(2))
     a, b, c = tilted.vertices[tilted.faces[-1]]
     assert np.cross(b - a, c - a)[2] > 0
 
 
 def test_welding_keeps_the_surface_and_drops_what_is_there_twice() -> None:
-    sphere = _shapes.ellipsoid([1, 1, 1])
+    sphere = shapes.ellipsoid([1, 1, 1])
     soup = sphere.vertices[sphere.faces].reshape(-1, 3)
     loose = np.arange(len(soup)).reshape(-1, 3)
     sliver = [(0, 0, 0)]  # of no area
-    welded = _shapes.welded(np.concatenate([soup, [(9, 9, 9)]]), np.concatenate([loose, sliver]))
+    welded = shapes.welded(np.concatenate([soup, [(9, 9, 9)]]), np.concatenate([loose, sliver]))
     assert len(welded.vertices) == len(sphere.vertices)
     assert len(welded.faces) == len(sphere.faces)
     assert _volume(welded) == pytest.approx(_volume(sphere))

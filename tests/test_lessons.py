@@ -47,8 +47,8 @@ from statemachine.page import (
     Traces,
     Verdict,
 )
-from statemachine.report import progress as bar
 from statemachine.report import quiz
+from statemachine.report import terminal as bar
 from statemachine.runs.rerun import record_scenario
 from statemachine.runs.scenarios import SCENARIOS
 

@@ -44,7 +44,7 @@ from statemachine.report.finding import events_of, headline
 from statemachine.report.html import Look, check_target, report, write_report
 from statemachine.report.html.geometry import bones_of, mesh_as_data, mesh_of
 from statemachine.report.html.scene import moments_of, rows_at
-from statemachine.report.markdown import markdown
+from statemachine.report.notebook import markdown
 from statemachine.report.over_time import CHARTS_SHOWN, charts_of
 from statemachine.report.sides import commanded
 from statemachine.report.why import answer, causes

@@ -16,8 +16,8 @@ from statemachine.errors import MissingEngineError
 from statemachine.lessons import PATH
 from statemachine.lessons.pictures import PICTURES, with_picture
 from statemachine.page import Page, Printed, Question, RobotPicture, Text
-from statemachine.report import markdown as md
-from statemachine.report import robot_pictures, site, terminal
+from statemachine.report import film, site, terminal
+from statemachine.report import notebook as md
 from statemachine.report.quiz import Reader
 
 from .conftest import assert_has, assert_in
@@ -86,7 +86,7 @@ def test_without_a_renderer_a_page_has_the_words(
     tmp_path: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        robot_pictures, "renderer_here", Mock(side_effect=MissingEngineError("nothing draws"))
+        film, "renderer_here", Mock(side_effect=MissingEngineError("nothing draws"))
     )
     path = site._write(tmp_path, "page", Page("t", "o", [_picture()]), "", "x")  # pyright: ignore
     text = path.read_text()
@@ -117,9 +117,9 @@ def test_a_terminal_says_how_to_look_at_it_to_who_sits_there(
 @pytest.mark.parametrize("name", PICTURES)
 def test_it_is_small_and_the_same_each_time(name: str, pillow: Any) -> None:
     rendering_environment()
-    content = robot_pictures.webp(PICTURES[name])
+    content = film.webp(PICTURES[name])
     assert len(content) < 150_000
-    assert content == robot_pictures.webp(PICTURES[name])
+    assert content == film.webp(PICTURES[name])
     with pillow.open(io.BytesIO(content)) as opened:
         assert_has(opened, size=(480, 360), n_frames=len(PICTURES[name].poses()[0]))
         assert np.asarray(opened.convert("RGB")).std() > 20

@@ -220,7 +220,7 @@ def on_each_backend(
         run: Called with the Model, the backend's name and what is told the fraction that is done.
     """
     from ..backends import backend_names, load
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     everyone = options.backend == "all"
     results: dict[str, Any] = {}

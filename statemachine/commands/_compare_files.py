@@ -5,12 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from ..errors import MissingEngineError, ModelFileError, StateMachineError, UnknownNameError
-from ..installed import PAIR
-from ._common import PARTS, PROGRAM, Row, complain, file_name
+from ._common import Row, complain, file_name
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -87,7 +85,7 @@ def checked(options: argparse.Namespace) -> Any:
 def _renderer(name: str | None) -> Any:
     """What draws a film; where nobody said which, a word if it is not the first choice."""
     from ..engines.pictures import renderer_here, renderers
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     with progress("looking for OpenGL"):
         asked = None if name == "auto" else name
@@ -99,7 +97,7 @@ def _renderer(name: str | None) -> Any:
 
 def write_tests(options: argparse.Namespace, comparisons: Sequence[Any]) -> None:
     """Write comparisons as tests where `--junit` says."""
-    from ..report.junit import junit
+    from ..report.compare import junit
     from ..runs.whole import replace_text
 
     if options.junit is not None:
@@ -125,7 +123,7 @@ def write_pictures(
         comparison: Of the two.
         floor: The chaos floor of the comparison, or None.
     """
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     if options.plot is not None:
         from ..report import plot
@@ -221,73 +219,3 @@ def write_page(options: argparse.Namespace, request: Any, traces: Sequence[Any],
     text = report(page, looks)
     target = write_report(options.html, text)
     print(f"wrote {target} ({len(text.encode()) / 1e6:.2f} MB)", file=sys.stderr)
-
-
-def for_page(
-    options: argparse.Namespace, request: Any, traces: Sequence[Any], ended: bool
-) -> dict[str, Any]:
-    """What a page says besides: causes, what each engine makes of the model, what was typed."""
-    more = {"models": _models(request, traces), "command": _typed(options, request)}
-    if options.no_why or ended:
-        return more
-    if any(trace.header.recorded for trace in traces):
-        says = (
-            "What causes it was not looked for: one side is a recorded run, and causes are found "
-            "by running both again."
-        )
-        return {**more, "why_not": says}
-    from ..report.progress import progress
-    from ._compare_why import explain
-
-    try:
-        with progress("why") as told:
-            return {**more, "explanation": explain(options, request, told)}
-    except StateMachineError as error:
-        return {**more, "why_not": f"What causes it could not be found: {error}."}
-
-
-def _models(request: Any, traces: Sequence[Any]) -> Any:
-    """The page of what each engine makes of the model; None where that cannot be read."""
-    recorded = [trace.header.provenance.model_file for trace in traces]
-    names = [side.path for side in request.sides] or recorded
-    engines = tuple(trace.header.backend for trace in traces)
-    if engines[0] == engines[1] and names[0] == names[1]:
-        return None
-    from ..compare.models import compare
-    from ..report.model_diff import page
-
-    files = [request.model or name for name in names]
-    given = {"engines": engines, "rename": request.names, "menagerie": request.menagerie}
-    try:
-        return page(compare(*files, **given))
-    except (StateMachineError, OSError):
-        return None
-
-
-def _typed(options: argparse.Namespace, request: Any) -> str:
-    """The command as typed, without folders of this machine."""
-    from ..measures.text import command
-
-    words = [PROGRAM, "compare", *(Path(word).name for word in request.what)]
-    words += [side.label for side in request.sides]
-    if not request.sides and tuple(request.backends) != PAIR:
-        words += ["--backends", *request.backends]
-    return command(
-        words,
-        ("--defaults", request.defaults, "model"),
-        ("--model", request.model and Path(request.model).name, None),
-        ("--menagerie", request.menagerie and "DIR", None),
-        ("--seconds", request.seconds, None),
-        ("--timestep", request.options.get("timestep"), None),
-        ("--seed", request.seed, 0),
-        ("--every", request.every, 1),
-        ("--keyframe", request.keyframe, None),
-        *(("--map", f"{a}={b}", None) for a, b in request.names.items()),
-        *(("--tolerance", text, None) for text in options.tolerance),
-        *((f"--{part}", getattr(options, part), None) for part in PARTS),
-        *(("--uncertainty", text, None) for text in options.uncertainty),
-        ("--no-chaos", options.no_chaos, False),
-        ("--quantity", options.quantity or None, None),
-        ("--no-why", options.no_why, False),
-        ("--html", Path(options.html).name, None),
-    )

@@ -135,7 +135,7 @@ def _mutants(options: argparse.Namespace) -> int:
     """A student's tests, on every mutant."""
     from ..grading.mutants.run import examine
     from ..report.grading import mutants_page
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     with progress("mutants") as report:
         examination = examine(options.mutants, options.backend, options.only, progress=report)
@@ -147,7 +147,7 @@ def _one(options: argparse.Namespace) -> int:
     from ..errors import BadInputError
     from ..grading import classroom, exercise
     from ..report.grading import grade_page
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     (file,) = options.files
     folder = Path(file) if Path(file).is_dir() else None
@@ -176,7 +176,7 @@ def _class(options: argparse.Namespace) -> int:
     """The files of a class."""
     from ..grading import classroom
     from ..report.grading import class_page
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     submitted = classroom.submissions(options.files)
     if options.roster:

@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import EndedEarlyError
 from ..installed import PAIR
 from . import _compare_files as files
-from . import _compare_models, _compare_steps, _compare_why
+from . import _compare_questions as questions
 from ._common import (
     DEFAULTS,
     EXCLUDES,
@@ -101,10 +101,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("--keyframe", "NAME", "where a FUNCTION starts, on both sides"),
     )
     for title, rows in (
-        ("why", _compare_why.OPTIONS),
-        ("is it a difference, and of what?", _compare_steps.OPTIONS),
+        ("why", questions.OF_WHY),
+        ("is it a difference, and of what?", questions.OF_STEPS),
         ("pictures", files.OF_PICTURES),
-        ("comparing descriptions of a robot", _compare_models.OPTIONS),
+        ("comparing descriptions of a robot", questions.OF_MODELS),
     ):
         add_table(parser.add_argument_group(title), *rows)
     parser.set_defaults(words_in="what")
@@ -261,7 +261,7 @@ def run(options: argparse.Namespace) -> int:
         )
     )
     if options.models is not None:
-        return _compare_models.run(options)
+        return questions.run_models(options)
     refuse(
         (
             not options.what,
@@ -279,11 +279,11 @@ def run(options: argparse.Namespace) -> int:
     )
     request, renderer = request_of(options), files.checked(options)
     if options.one_step or options.converge or options.versions is not None:
-        return _compare_steps.run(options, request)
+        return questions.run_steps(options, request)
     why_not = ""
     if why:
         try:
-            return _compare_why.run(options, request)
+            return questions.run_why(options, request)
         except EndedEarlyError as error:  # what there is until then, and no cause
             why_not = f"No cause is named: {error}."
     return _run_compare(options, request, renderer, uncertain, why_not)
@@ -295,7 +295,7 @@ def _run_compare(
     from ..compare import compare, run_sides, witness
     from ..measures import parse_tolerances
     from ..report import compare as report
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     tolerances = parse_tolerances(options.tolerance)
     if request.is_traces and len(request.what) == 2:
@@ -312,7 +312,7 @@ def _run_compare(
     }
     more: dict[str, Any] = {"why_not": "" if comparison.ended else why_not}  # the page says it
     if options.html:
-        more = files.for_page(options, request, run.traces, comparison.ended)
+        more = questions.for_page(options, request, run.traces, comparison.ended)
     given = run if request.sides else None
     page = report.page(comparison, said=run.said, run=given, played=played, **parts, **more)
     if options.html:
@@ -348,7 +348,7 @@ def _floor(options: argparse.Namespace, comparison: Any, rerun: Any, uncertain: 
         refuse((options.uncertainty, says))
         return None
     from ..compare import chaos_floor
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     with progress("chaos floor") as told:
         return chaos_floor(comparison, rerun, seed=options.seed, uncertain=uncertain, progress=told)

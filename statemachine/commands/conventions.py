@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     """Ask, and show."""
     from ..probes import conventions, phrasebook
     from ..report import conventions as report
-    from ..report.progress import progress
+    from ..report.terminal import progress
 
     conventions.check_questions(options.question)
     engines = _engines(options.backend)

@@ -225,13 +225,13 @@ def _compute(
         page = with_picture(page, lesson.name)
     if not options.calls:
         return page, {name: run.result for name, run in taken.items()}
-    from ..report import calls
+    from ..report import conventions
 
     recordings = {name: t.calls for name, t in taken.items() if t.calls and t.calls.statements}
     if recordings:
-        page = replace(page, blocks=[*page.blocks, *calls.blocks(recordings)])
+        page = replace(page, blocks=[*page.blocks, *conventions.recorded_calls(recordings)])
     for name in [name for name, run in taken.items() if run.calls is None]:
-        page = replace(page, blocks=[*page.blocks, calls.not_asked(name)])
+        page = replace(page, blocks=[*page.blocks, conventions.not_asked(name)])
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 
 

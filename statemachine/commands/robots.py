@@ -44,7 +44,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Examine, and show."""
     from ..report import robots as words
-    from ..report.progress import progress
+    from ..report.terminal import progress
     from ..robots import examine_all, find
     from ..robots.records import check_suffix
     from ..runs.whole import check_place

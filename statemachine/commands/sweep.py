@@ -143,7 +143,7 @@ def run(options: argparse.Namespace) -> int:
         found, page = _report(options, options.report)
         return show(page, found, options.json)
     from ..report import sweep_report as words
-    from ..report.progress import progress
+    from ..report.terminal import progress
     from ..sweep import prepared, run_sweep
 
     ready = prepared(_asked(options))
@@ -228,7 +228,7 @@ def _report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
     """The report of a dataset, and its page; what is to be written is written."""
     from ..measures import parse_tolerances
     from ..report import sweep_report as words
-    from ..report.progress import progress
+    from ..report.terminal import progress
     from ..sweep.analysis import FLOOR_CELLS, sweep_report
 
     with progress("report") as told:

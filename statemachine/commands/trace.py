@@ -108,7 +108,7 @@ def run_record(options: argparse.Namespace) -> int:
         ),
     )
     from ..backends import load
-    from ..report.progress import progress
+    from ..report.terminal import progress
     from ..runs import record_scenario
     from ..runs.controllers import function_scenario
     from ..runs.scenarios import scenario
@@ -143,7 +143,7 @@ def run_record(options: argparse.Namespace) -> int:
 def run_play(options: argparse.Namespace) -> int:
     """Play a trace's commands on an engine, and write what came of it."""
     from ..backends import load
-    from ..report.progress import progress
+    from ..report.terminal import progress
     from ..runs import model_file, play, read
 
     trace = read(options.file)
@@ -181,11 +181,11 @@ def run_play(options: argparse.Namespace) -> int:
 
 def run_show(options: argparse.Namespace) -> int:
     """What is in a trace."""
-    from ..report import trace as report
+    from ..report.sides import trace_page
     from ..runs import read
 
     trace = read(options.file)
-    return show(report.page(trace, Path(options.file).name), trace.header, options.json)
+    return show(trace_page(trace, Path(options.file).name), trace.header, options.json)
 
 
 def run_csv(options: argparse.Namespace) -> int:

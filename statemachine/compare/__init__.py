@@ -15,14 +15,12 @@ Two engines that agree prove nothing; neither side is the truth.
 from __future__ import annotations
 
 from ..runs.rerun import Rerun, rerun_of
-from .agreement import Agreement, Comparison, SideRun, compare
-from .floor import chaos_floor
+from .agreement import Agreement, Comparison, SideRun, compare, witness
 from .labels import Labels, labels_of
-from .perturbed import Uncertainty, perturbed_runs
+from .perturbed import Uncertainty, chaos_floor, perturbed_runs
 from .series import Series, default_tip, series, touches
 from .sides import Request, Side, parse_sides, split_words
 from .two_sides import SidesRun, prepare_sides, run_sides
-from .witness import witness
 
 __all__ = [
     "Agreement",

@@ -1,21 +1,37 @@
-"""How far two traces agree: figures and a verdict for each quantity."""
+"""How far two traces agree: figures and a verdict for each quantity.
+
+And how far the fingertip of each is from a third party's: two that agree may both be wrong.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from ..errors import TraceError
+from ..backends import load
+from ..errors import StateMachineError, TraceError
+from ..installed import WITNESS
 from ..interface import Array
-from ..measures import QUANTITIES, Deviation, Tolerance, common_moments, same_pairs, tolerance_of
+from ..kinematics import Kinematics, shared_joints
+from ..measures import (
+    QUANTITIES,
+    Deviation,
+    Tolerance,
+    common_moments,
+    distances,
+    same_pairs,
+    tolerance_of,
+)
 from ..measures.text import on
 from ..page import Figures
-from ..runs import Trace
+from ..runs import Header, Trace, model_file
+from ..runs.provenance import model_files
 from .labels import labels_of, notes_on
-from .series import Series, at_the_end, default_tip, series, touches
+from .series import Series, at_the_end, default_tip, joint_columns, series, touches
 
 Verdict = Literal["agrees", "settles", "differs"]
 # Of the header of a run, what the JSON of a comparison has.
@@ -250,3 +266,70 @@ def _first_touches(
         name, at = f"{touch.pair}, first touch", np.array([min(known)])
         agreements.append(_agreement(name, "contact", np.array([gap]), at, gap, allowed, note))
     return agreements
+
+
+def witness(one: Trace, two: Trace, path: Path | None = None) -> Figures | None:
+    """Pinocchio's forward kinematics of each trace's qpos, against the recorded site.
+
+    Args:
+        one: A trace.
+        two: Another, of the same model.
+        path: The model's file; by default the one that the headers name.
+
+    Returns:
+        by: The witness and its version.
+        site: Which site.
+        one: Largest distance at any row of the first trace [m]; two: of the second.
+        rows: How many poses were compared.
+        grade: "own reading" if the witness read the model's file with its own parser, "same
+            reading" if it computed from the numbers that the file was compiled to.
+
+        None where Pinocchio is missing, where neither it nor an engine that is here can read
+        the model, and where the file that the traces were recorded with is not here.
+    """
+    site = default_tip(one.header, two.header)
+    if not site or "site_xpos" not in one or "site_xpos" not in two:
+        return None
+    ours, theirs = (trace.header.provenance.model_sha256 for trace in (one, two))
+    if path is None and ours != theirs:
+        return None  # one model cannot be the witness of two
+    try:
+        file, same = (path, True) if path else model_file(one.header)
+        if not same:
+            return None
+        kinematics = _readable(file, one.header, site)
+        first, second = (_gap(kinematics, trace, site) for trace in (one, two))
+        if not np.isfinite([first, second]).all():
+            return None
+    except StateMachineError:
+        return None
+    return Figures(
+        by=f"{WITNESS} {kinematics.version}",
+        site=site,
+        one=first,
+        two=second,
+        rows=len(one) + len(two),
+        grade=kinematics.grade,
+    )
+
+
+def _readable(file: Path, header: Header, site: str) -> Kinematics:
+    """The robot from a scene's file, or from one that it includes, or from its numbers."""
+    for path in model_files(file):
+        try:
+            kinematics = Kinematics(path)
+            names = [header.joints[k] for k in shared_joints(kinematics, header.joints)]
+        except StateMachineError:
+            continue
+        if site in kinematics.site_names:
+            return kinematics if kinematics.joint_names == tuple(names) else Kinematics(path, names)
+    return Kinematics.same_reading(load(file))
+
+
+def _gap(kinematics: Kinematics, trace: Trace, site: str) -> float:
+    header = trace.header
+    joints = [header.joint_labels[k] for k in shared_joints(kinematics, header.joints)]
+    qpos = [trace.qpos[:, joint_columns(header, name).qpos] for name in joints]
+    theirs = kinematics.poses(np.concatenate([trace.qpos[:, :0], *qpos], axis=1), site).pos
+    ours, _ = trace.site(site)
+    return float(distances(ours, theirs).max())

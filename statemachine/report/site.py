@@ -23,8 +23,8 @@ from ..runs.scenarios import scenario
 from ..runs.whole import replace_bytes
 from . import compare as comparison
 from . import conventions, why
-from .markdown import markdown
-from .robot_pictures import drawn_picture
+from .film import drawn_picture
+from .notebook import markdown
 
 
 def make_path(

@@ -1,10 +1,10 @@
 """Why two sides differ: one explanation for files, engines and settings.
 
 - `explain`: the question, and its answer as a record
-- `causes`: what differs; `settings`: what an engine as it comes sets, and what can be left out
+- `causes`: what differs, and the line of the file that says it
+- `settings`: what an engine as it comes sets, and what can be left out
 - `trials`: the runs, each made once; `gap`: what they are measured by, and what touches first
-- `shapley`: shares of a gap among causes; `locate`: where the rest comes from
-- `places`: the line of the file that says what a cause is of
+- `shapley`: shares of a gap among causes, and where the rest comes from
 """
 
 from __future__ import annotations

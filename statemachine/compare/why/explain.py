@@ -20,11 +20,9 @@ from ...runs.scenarios import Scenario
 from ..labels import files_apart
 from ..matching import match_alike, match_models, missing_parts
 from ..perturbed import EXACT, Uncertainty
-from .causes import Cause, order_of_joints
+from .causes import Cause, order_of_joints, places_of
 from .gap import touched_at_start
-from .locate import locate
-from .places import places_of
-from .shapley import shapley
+from .shapley import locate, shapley
 from .trials import Measure, Trials
 
 # What the arithmetic of an engine makes of a run's positions: two arms that are built alike are

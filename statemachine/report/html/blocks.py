@@ -1,12 +1,17 @@
 """The blocks of a page as HTML: each kind in one way, whatever the page is about.
 
-The charts of a quantity over time have a cursor that follows the slider.
+The charts of a quantity over time have a cursor that follows the slider. What is not markup already
+is escaped: no name of a trace can be an element.
 """
 
 from __future__ import annotations
 
+import html
+import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from typing import Any
 
 import numpy as np
 
@@ -30,10 +35,9 @@ from ...page import (
     Verdict,
 )
 from ..figures import INK, SIDES, chart
+from ..film import inline
 from ..over_time import QuantityChart
-from ..robot_pictures import inline
 from ..terminal import non_breaking
-from .markup import Html, joined, tag
 
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
 _ROWS = 21  # of the table under a chart
@@ -267,3 +271,84 @@ def _number(value: float, tolerance: float) -> str:
     if 0 < abs(value) < _ROUNDING * tolerance:
         return "≈ 0"
     return f"{value:.4f}" if abs(value) >= 1e-3 or value == 0 else figure(value)
+
+
+_VOID = ("br", "hr", "img", "input", "meta", "col")
+_SPOKEN = ("aria_label", "aria_valuetext", "title")
+# What turns the text around, and halves of pairs of characters.
+_TURNS = re.compile("[\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+class Html(str):
+    """Text that is markup already."""
+
+    __slots__ = ()
+
+
+def escaped(text: object) -> Html:
+    """A text as markup that shows it; markup stays as it is."""
+    if isinstance(text, Html):
+        return text
+    return Html(html.escape(_printable(with_minus(str(text)))))
+
+
+def with_minus(text: str) -> str:
+    """A text whose figures have the sign minus, not a hyphen."""
+    return re.sub(r"(?<![\w\-–)\].])-(?=\d)|(?<=\de)-(?=\d)", "−", text)
+
+
+def literal(text: object) -> Html:
+    """A text as it is, for what may be typed or copied."""
+    return Html(html.escape(_printable(str(text))))
+
+
+def tag(name: str, *content: object, **attributes: object) -> Html:
+    """An element.
+
+    Args:
+        name: Of the element.
+        *content: Texts, which are escaped, and markup; None is left out.
+        **attributes: `class_` is class, `aria_label` aria-label; True is an attribute
+            without a value, None and False are left out.
+    """
+    said = ""
+    for key, value in attributes.items():
+        if value is None or value is False:
+            continue
+        said += " " + key.rstrip("_").replace("_", "-")
+        if value is not True:
+            text = with_minus(str(value)) if key in _SPOKEN else str(value)
+            said += f'="{html.escape(_printable(text))}"'
+    if name in _VOID:
+        return Html(f"<{name}{said}>")
+    if name in ("code", "pre"):
+        content = tuple(p if isinstance(p, Html) or p is None else literal(p) for p in content)
+    inner = "".join(escaped(part) for part in content if part is not None)
+    return Html(f"<{name}{said}>{inner}</{name}>")
+
+
+def joined(parts: Iterable[object]) -> Html:
+    """Parts one after the other."""
+    return Html("".join(escaped(part) for part in parts))
+
+
+def filled(name: str, slots: Mapping[str, object]) -> Html:
+    """A template of this folder, with texts, which are escaped, and markup in its slots."""
+    text = template(name)
+    return Html(re.sub(r"\{\{(\w+)\}\}", lambda slot: escaped(slots[slot[1]]), text))
+
+
+def template(name: str) -> str:
+    """The text of a file of this folder."""
+    return resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8")
+
+
+def data_of(value: Any) -> Html:
+    """A value as JSON that can stand in a script element, which "<" could end."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    return Html(text.replace("<", "\\u003c"))
+
+
+def _printable(text: str) -> str:
+    """Without characters that a browser refuses, or that turn the text around."""
+    return _TURNS.sub(" ", "".join(c if c >= " " else " " for c in text))

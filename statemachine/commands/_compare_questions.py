@@ -1,0 +1,342 @@
+"""Questions to `statemachine compare` beside how far apart: what of a step, why, what of a file.
+
+--one-step, --converge and --versions say of what it is a difference, --why which difference
+explains how much of it, and --models compares two files before anything moves.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from ..errors import StateMachineError
+from ..installed import PAIR
+from ._common import JOBS, PARTS, PROGRAM, REPEATED, Row, complain, pairs_of, refuse, show
+from ._compare_files import write_tests
+
+OF_STEPS: tuple[Row, ...] = (
+    (
+        "--one-step",
+        "",
+        "one step on each side from each state of the left one: the first stage that differs",
+    ),
+    (
+        "--converge",
+        "",
+        "run with steps as given, halved and quartered: what vanishes is discretisation",
+    ),
+    (
+        "--versions",
+        "V,V,…",
+        "run on releases of MuJoCo, and on the one that is installed: between which it changes",
+    ),
+    (
+        "--bisect",
+        "",
+        "with --versions V: add releases since V until it is known which one changed it",
+    ),
+)
+
+
+def run_steps(options: argparse.Namespace, request: Any) -> int:
+    """Answer, and show.
+
+    Args:
+        options: `one_step` and `json` are read.
+        request: The `compare.Request`; not of recorded traces alone.
+    """
+    asked = {"--one-step": _one_step, "--converge": _converge, "--versions": _versions}
+    flag = "--one-step" if options.one_step else "--converge" if options.converge else "--versions"
+    refuse(
+        (
+            request.is_traces and not request.sides,
+            f"{flag} runs both sides, and a trace is a run that was made: {PROGRAM} compare hold",
+        ),
+        (
+            options.versions and request.sides,
+            "--versions goes without sides: --model names the file",
+        ),
+    )
+    return asked[flag](options, request)
+
+
+def _one_step(options: argparse.Namespace, request: Any) -> int:
+    from ..compare import prepare_sides
+    from ..compare.labels import numbered
+    from ..compare.one_step import one_step
+    from ..report import steps
+    from ..report.terminal import progress
+
+    (left, right), _, _ = prepare_sides(request)
+    with progress("one step") as told:
+        result = one_step(left, right.model, names=request.names, progress=told)
+    labels = numbered(tuple(side.label for side in request.sides) or request.backends)
+    return show(steps.one_step(result, labels, Path(request.what[0]).name), result, options.json)
+
+
+def _converge(options: argparse.Namespace, request: Any) -> int:
+    from ..compare import run_sides
+    from ..compare.convergence import convergence
+    from ..report import steps
+    from ..report.terminal import progress
+
+    def with_more(options: dict[str, Any], usual: int, times: int) -> dict[str, Any]:
+        return {**options, "substeps": options.get("substeps", usual) * times}
+
+    def run(times: int) -> Any:
+        given = request.options.get("substeps", 1)
+        sides = tuple(
+            replace(side, options=with_more(side.options, given, times)) for side in request.sides
+        )
+        both = with_more(request.options, 1, times)
+        return run_sides(replace(request, options=both, sides=sides)).traces
+
+    with progress("converge") as told:
+        result = convergence(run, progress=told)
+    return show(steps.convergence(result, Path(request.what[0]).name), result, options.json)
+
+
+def _versions(options: argparse.Namespace, request: Any) -> int:
+    from ..compare import compare, run_sides
+    from ..measures import parse_tolerances
+    from ..releases import around_a_change, backends_of, published
+    from ..report import steps
+    from ..report.figures import write_pictures
+    from ..report.terminal import progress
+    from ..runs.drive import part_of
+
+    tolerances = parse_tolerances(options.tolerance)
+
+    def compared(pair: tuple[str, str], *bar: Any) -> Any:
+        traces = run_sides(replace(request, backends=pair), *bar).traces
+        return compare(*traces, tolerances=tolerances)
+
+    if options.bisect:
+        backends = around_a_change(
+            published(options.versions), compared, lambda text: complain(text, 0)
+        )
+    else:
+        backends = backends_of(options.versions)
+    pairs = list(pairwise(backends))
+    with progress("versions") as bar:
+        comparisons = [
+            compared(pair, part_of(bar, k / len(pairs), 1 / len(pairs)))
+            for k, pair in enumerate(pairs)
+        ]
+    write_tests(options, comparisons)
+    page = steps.versions(comparisons, request)
+    if options.plot is not None:
+        write_pictures(page.blocks, options.plot)
+    return show(page, comparisons, options.json)
+
+
+OF_WHY: tuple[Row, ...] = (
+    ("--why", "", "which difference explains how much of the gap"),
+    ("--quantity", "NAME", "what the gap is measured in"),
+    (
+        "--measure",
+        None,
+        "which figure of the gap is explained (worst)",
+        {"choices": ("worst", "end", "rms")},
+    ),
+    ("--finer", "", "every difference by its entries"),
+    ("--budget", "N", "how many sets of causes may be run where they interact (200)"),
+    JOBS,
+)
+
+
+def run_why(options: argparse.Namespace, request: Any) -> int:
+    """Explain, and show.
+
+    Args:
+        options: Those of the command.
+        request: A `compare.Request` that names what is run.
+    """
+    from ..report import why
+    from ..report.terminal import progress
+
+    with progress("why") as told:
+        result = explain(options, request, told)
+    said = (*request.taken, *([why.PLAYED] if request.is_traces else []))
+    return show(why.page(result, said), result, options.json)
+
+
+def explain(options: argparse.Namespace, request: Any, progress: Any) -> Any:
+    """The explanation of what two sides differ in.
+
+    Args:
+        options: Those of the command.
+        request: A `compare.Request`.
+        progress: Told the fraction that is done.
+    """
+    from ..compare import why
+    from ..compare.alike import for_left
+    from ..compare.perturbed import parse_uncertainty
+    from ..compare.sides import with_options
+    from ..compare.two_sides import recorded_sides
+
+    if request.is_traces:
+        asked, sides, traces = recorded_sides(request)
+    else:
+        asked, traces = request.scenario(), ()
+        sides = request.sides or request.on_backends(asked.model)
+    left, right = (side.label for side in sides)
+    sides, given = with_options(sides, {**asked.options, **request.options})
+    one, two = (side.load() for side in sides)
+    return why.explain(
+        one,
+        two,
+        replace(asked, options=given),
+        recordings=[
+            for_left(t, model, request) for t, model in zip(traces, (one, two), strict=False)
+        ],
+        seconds=request.seconds,
+        seed=request.seed,
+        names=request.names,
+        quantity=options.quantity,
+        measure=options.measure or "worst",
+        finer=options.finer,
+        budget=200 if options.budget is None else options.budget,
+        labels=None if left == right else (left, right),
+        uncertain=None if options.no_chaos else parse_uncertainty(options.uncertainty),
+        jobs=options.jobs,
+        progress=progress,
+    )
+
+
+OF_MODELS: tuple[Row, ...] = (
+    (
+        "--models",
+        "NAME|FILE",
+        "two models, URDF or MJCF, before anything moves; FILE@ENGINE, or --backends and one "
+        "model: what an engine makes of it",
+        {"nargs": "*"},
+    ),
+    ("--frame", "LEFT=RIGHT", "a frame of the left and what the right calls it", REPEATED),
+    ("--rename", None, argparse.SUPPRESS, REPEATED, {"dest": "map"}),
+    ("--digits", "N", "equal means to so many digits (6)"),
+    ("--all", "", "a row for every figure that differs"),
+)
+
+
+def run_models(options: argparse.Namespace) -> int:
+    """Compare, and show."""
+    from ..backends import backend_engine
+    from ..compare.models import compare, split
+    from ..report import model_diff
+    from ..report.terminal import progress
+
+    given = [split(text) for text in options.models]
+    if options.backends:
+        refuse(
+            (
+                any(engine for _, engine in given),
+                "--backends and FILE@ENGINE say the same: give one of them",
+            )
+        )
+        for engine in options.backends:
+            backend_engine(engine)
+        if len(given) == 1:
+            given *= 2
+        given = [
+            (model, engine) for (model, _), engine in zip(given, options.backends, strict=False)
+        ]
+    typed = " ".join(options.models or options.what[-2:]).replace(",", " ").split()
+    hint = "two models, or one and --backends A B"
+    if len(options.models) < 2 and len(typed) == 2:
+        hint = f"two words behind it: {PROGRAM} compare --models {' '.join(typed)}"
+    digits = 6 if options.digits is None else options.digits
+    refuse(
+        (
+            len(given) != 2 or len(options.models) > 2,
+            f"--models wants {hint}; got {len(options.models)}",
+        ),
+        *((True, f"--models compares descriptions; {word} is a run") for word in options.what),
+        (not 1 <= digits <= 17, f"--digits wants a number from 1 to 17; got {digits}"),
+        (options.seed < 0, f"--seed must not be negative; got {options.seed}"),
+    )
+    with progress("compare"):
+        result = compare(
+            given[0][0],
+            given[1][0],
+            engines=(given[0][1], given[1][1]),
+            frames=pairs_of(options.frame, "--frame"),
+            rename=pairs_of(options.map, "--map"),
+            digits=digits,
+            seed=options.seed,
+            menagerie=options.menagerie,
+        )
+    return show(model_diff.page(result, options.all), result, options.json)
+
+
+def for_page(
+    options: argparse.Namespace, request: Any, traces: Sequence[Any], ended: bool
+) -> dict[str, Any]:
+    """What a page says besides: causes, what each engine makes of the model, what was typed."""
+    more = {"models": _models(request, traces), "command": _typed(options, request)}
+    if options.no_why or ended:
+        return more
+    if any(trace.header.recorded for trace in traces):
+        says = (
+            "What causes it was not looked for: one side is a recorded run, and causes are found "
+            "by running both again."
+        )
+        return {**more, "why_not": says}
+    from ..report.terminal import progress
+
+    try:
+        with progress("why") as told:
+            return {**more, "explanation": explain(options, request, told)}
+    except StateMachineError as error:
+        return {**more, "why_not": f"What causes it could not be found: {error}."}
+
+
+def _models(request: Any, traces: Sequence[Any]) -> Any:
+    """The page of what each engine makes of the model; None where that cannot be read."""
+    recorded = [trace.header.provenance.model_file for trace in traces]
+    names = [side.path for side in request.sides] or recorded
+    engines = tuple(trace.header.backend for trace in traces)
+    if engines[0] == engines[1] and names[0] == names[1]:
+        return None
+    from ..compare.models import compare
+    from ..report.model_diff import page
+
+    files = [request.model or name for name in names]
+    given = {"engines": engines, "rename": request.names, "menagerie": request.menagerie}
+    try:
+        return page(compare(*files, **given))
+    except (StateMachineError, OSError):
+        return None
+
+
+def _typed(options: argparse.Namespace, request: Any) -> str:
+    """The command as typed, without folders of this machine."""
+    from ..measures.text import command
+
+    words = [PROGRAM, "compare", *(Path(word).name for word in request.what)]
+    words += [side.label for side in request.sides]
+    if not request.sides and tuple(request.backends) != PAIR:
+        words += ["--backends", *request.backends]
+    return command(
+        words,
+        ("--defaults", request.defaults, "model"),
+        ("--model", request.model and Path(request.model).name, None),
+        ("--menagerie", request.menagerie and "DIR", None),
+        ("--seconds", request.seconds, None),
+        ("--timestep", request.options.get("timestep"), None),
+        ("--seed", request.seed, 0),
+        ("--every", request.every, 1),
+        ("--keyframe", request.keyframe, None),
+        *(("--map", f"{a}={b}", None) for a, b in request.names.items()),
+        *(("--tolerance", text, None) for text in options.tolerance),
+        *((f"--{part}", getattr(options, part), None) for part in PARTS),
+        *(("--uncertainty", text, None) for text in options.uncertainty),
+        ("--no-chaos", options.no_chaos, False),
+        ("--quantity", options.quantity or None, None),
+        ("--no-why", options.no_why, False),
+        ("--html", Path(options.html).name, None),
+    )
