@@ -112,7 +112,7 @@ def tolerance_of(
         acting = max(float(v[v > 0].mean()) if (v > 0).any() else 0.0 for v in (one, two))
         return Tolerance(
             max(_FORCE * acting, 1e-6),
-            f"5 % of {rounded(acting, 'N')}, the mean while they touch",
+            "5 % of the mean force while they touch",
         )
     return Tolerance(
         timestep * (1 + 1e-9),

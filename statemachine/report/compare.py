@@ -189,20 +189,16 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
         emphasis=lambda agreement: agreement.verdict == "differs",
         wide={"tolerance", "floor", "inside from, s"},
     )
-    # One row for each tolerance: who shares it, how much, why.
-    shared = grouped(
-        (
-            (quantity(agreement.tolerance, agreement.unit), agreement.reason),
-            QUANTITIES[agreement.kind].plural,
-        )
-        for agreement in agreements
-    )
+    # One row for each reason: who shares it, how much.
+    shared = grouped(((agreement.reason, agreement.unit), agreement) for agreement in agreements)
     reasons = Table.of(
         shared.items(),
         {
-            "quantities": lambda row: ", ".join(dict.fromkeys(row[1])),
-            "tolerance": lambda row: row[0][0],
-            "because": lambda row: row[0][1],
+            "quantities": lambda row: ", ".join(
+                dict.fromkeys(QUANTITIES[f.kind].plural for f in row[1])
+            ),
+            "tolerance": lambda row: _span([f.tolerance for f in row[1]], row[0][1]),
+            "because": lambda row: row[0][0],
         },
         "What does not matter, and why",
         words={"because"},
@@ -220,6 +216,11 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
         checked=checked,
         **sides,
     )
+
+
+def _span(values: Sequence[float], unit: str) -> str:
+    """What values [SI unit] lie between."""
+    return " to ".join(dict.fromkeys(quantity(end(values), unit) for end in (min, max)))
 
 
 def _floor_columns(floor: Figures) -> dict[str, Callable[[Agreement], str]]:
