@@ -24,7 +24,7 @@ from typing import Any
 import joblib
 
 import statemachine as sm
-from statemachine.runs.commands import TARGET
+from statemachine.runs.robot import TARGET
 from statemachine.sweep import Sweep, prepared
 from statemachine.sweep.rows import CELLS, RowWriter, counted
 from statemachine.sweep.worker import Row, run_batch

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine import errors, models, robot_packages
+from statemachine import errors, models
 from statemachine.cli import main
 from statemachine.compare import compare
 from statemachine.lessons import LESSONS
@@ -24,7 +24,7 @@ from statemachine.report.robots import page as survey_page
 from statemachine.robots import ExaminedModel, Survey
 from statemachine.robots.examine import examine
 from statemachine.runs import record_scenario
-from statemachine.runs.commands import hold_ctrl, is_servo
+from statemachine.runs.robot import hold_ctrl, is_servo
 from statemachine.runs.scenarios import SCENARIOS, fitting
 
 from .conftest import (
@@ -358,7 +358,7 @@ def no_network(menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch) ->
         asked.append(timeout)
         raise urllib.error.URLError("Name or service not known")
 
-    monkeypatch.setattr(robot_packages.urllib.request, "urlopen", urlopen)
+    monkeypatch.setattr(models.urllib.request, "urlopen", urlopen)
     return asked
 
 

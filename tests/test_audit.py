@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 from rich.cells import cell_len
+from statemachine.probes.audit.conclusions import conclude
 
 import statemachine as sm
 from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
-from statemachine.engines.futures import FutureGap, gap
+from statemachine.engines.measured import FutureGap, gap
 from statemachine.engines.mujoco.audit import MujocoDriver
 from statemachine.errors import BadInputError, EngineError, EngineWarning
 from statemachine.installed import require
@@ -28,9 +29,7 @@ from statemachine.measures import JointPlaces
 from statemachine.page import Figures, Items, Page, Table
 from statemachine.probes import audit
 from statemachine.probes.audit import drivers_of, trials
-from statemachine.probes.audit.conclusions import conclude
-from statemachine.probes.audit.interface_driver import run_elsewhere
-from statemachine.probes.audit.points import points
+from statemachine.probes.audit.interface_driver import points, run_elsewhere
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from statemachine.errors import MissingEngineError
-from statemachine.grading import exercise, own_files, recording
+from statemachine.grading import exercise, recording
 from statemachine.grading.answers import decode
 from statemachine.grading.calls import FaultError, answers_of, answers_of_file
 from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
@@ -376,10 +376,10 @@ def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
         "more.py": "def demo_gravity(model): return bob\n",
     }
     written_all(tmp_path, texts | dict.fromkeys((*empty, "env/x.py"), ""))
-    assert set(own_files.named_by(tmp_path / "student.py")) == {
+    assert set(recording.named_by(tmp_path / "student.py")) == {
         "student.py", "helper.py", "deeper.py", "table.json", "tools/__init__.py", "tools.txt",
     }  # fmt: skip
-    whole = own_files.in_folder(tmp_path)
+    whole = recording.in_folder(tmp_path)
     assert {"more.py", "unnamed.py", "tools/__init__.py"} < set(whole)
     assert not {"env/x.py", ".hidden.py"} & set(whole)
 

@@ -17,13 +17,20 @@ from statemachine import engines
 from statemachine.cli import main
 from statemachine.compare.models import own_ways
 from statemachine.engines import room, samples
+from statemachine.engines.measured import TREE
 from statemachine.engines.mujoco import conventions as mujoco_conventions
-from statemachine.engines.samples import TREE
 from statemachine.errors import MissingEngineError, UnknownNameError
 from statemachine.installed import ENGINES, available, require
-from statemachine.probes import phrasebook
 from statemachine.probes.calls import record
-from statemachine.probes.conventions import NO_ANSWER, QUESTIONS, UNDECIDED, ask, probe
+from statemachine.probes.conventions import (
+    CONCEPTS,
+    NO_ANSWER,
+    QUESTIONS,
+    UNDECIDED,
+    ask,
+    probe,
+    run_phrases,
+)
 from statemachine.probes.conventions.answers import closest
 from statemachine.probes.conventions.frames import FIXED, ORDERS
 from statemachine.report import conventions as report
@@ -455,7 +462,7 @@ def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     # Worlds of other tests may still wait for the garbage collector.
     before = bullet_clients()
     probe(["pybullet"])
-    phrasebook.run(["pybullet"])
+    run_phrases(["pybullet"])
 
     monkeypatch.setattr(pybullet(), "stepSimulation", Mock(side_effect=RuntimeError("as seeded")))
     refused(
@@ -464,7 +471,7 @@ def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: P
             for question in ("gravity", "future", "save")
         )
     )
-    found = {call.concept: call for call in phrasebook.run(["pybullet"]).engines["pybullet"]}
+    found = {call.concept: call for call in run_phrases(["pybullet"]).engines["pybullet"]}
     assert found["state"].works
     assert found["step"].said == "RuntimeError: as seeded"
     assert bullet_clients() <= before
@@ -475,8 +482,8 @@ def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 
 def test_every_call_works(engine: str) -> None:
-    table = phrasebook.run([engine]).engines[engine]
-    assert tuple(call.concept for call in table) == phrasebook.CONCEPTS
+    table = run_phrases([engine]).engines[engine]
+    assert tuple(call.concept for call in table) == CONCEPTS
     assert [call.said for call in table if not call.works] == []
 
 
@@ -484,21 +491,21 @@ def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> No
     """As a reader would type them, with nothing of ours."""
     own = room(engine).phrases()
     file = written(tmp_path / own.file[0], own.file[1])
-    lines = [f"file = {str(file)!r}", *(own.cells[name].code for name in phrasebook.CONCEPTS)]
+    lines = [f"file = {str(file)!r}", *(own.cells[name].code for name in CONCEPTS)]
     done = in_its_own_python("\n".join([*lines, "print(len(worlds))"]), tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "3"
 
 
-@pytest.mark.parametrize("concept", phrasebook.CONCEPTS[1:])
+@pytest.mark.parametrize("concept", CONCEPTS[1:])
 def test_a_cell_that_does_nothing_is_found_out(
     engine: str, concept: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cells: Any = room(engine).phrases().cells
     monkeypatch.setitem(cells, concept, dataclasses.replace(cells[concept], code="pass"))
-    found = {call.concept: call for call in phrasebook.run([engine]).engines[engine]}
+    found = {call.concept: call for call in run_phrases([engine]).engines[engine]}
     assert not found[concept].works
-    assert not report.calls_page(phrasebook.run([engine])).holds
+    assert not report.calls_page(run_phrases([engine])).holds
 
 
 # The command.
@@ -596,7 +603,7 @@ def test_a_room_of_another_package_may_have_some_of_the_methods(
     engines.register("theirs", "their_room:Theirs")
     assert answers("gravity", "theirs") == {"": "told 0 0 -50, felt 0 0 -1"}
     assert ask("timestep", "theirs") is None
-    (phrase,) = phrasebook.run(["theirs"]).engines["theirs"]
+    (phrase,) = run_phrases(["theirs"]).engines["theirs"]
     assert (phrase.concept, phrase.works, phrase.said) == ("load", True, "")
     refused((UnknownNameError, "calls can be recorded", lambda: record("", "theirs")))
 

@@ -20,7 +20,7 @@ from statemachine.lessons.certificate import page
 from statemachine.lessons.fingertip import random_qpos
 from statemachine.models import models_dir
 from statemachine.page import Figures, Verdict
-from statemachine.runs.provenance import provenance
+from statemachine.runs.header import provenance
 
 from .conftest import around, assert_has, lesson_result, opened, refused, started, written
 from .small_models import BALL_AND_SLIDE, loaded, model_of

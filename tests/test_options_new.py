@@ -249,7 +249,7 @@ def test_pybullet_as_it_comes_has_none_of_them() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_energies_are_those_of_the_changed_mass() -> None:
-    from statemachine.runs.derived import energies
+    from statemachine.runs.recorder import energies
 
     found = []
     for backend in ("mujoco", "pybullet"):

@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from statemachine.silence import silence
+from statemachine.installed import silence
 
 from .conftest import ROOT, refused, runs_in_silence
 
@@ -108,7 +108,7 @@ def test_a_fork_meanwhile_does_not_hang() -> None:
     """The child has neither the other thread's lock nor its streams."""
     code = """
 import ctypes, os, threading
-from statemachine.silence import silence
+from statemachine.installed import silence
 
 begun, ended = threading.Event(), threading.Event()
 

@@ -15,7 +15,7 @@ import pytest
 
 from statemachine.grading.mutants.faults import FAULTS
 from statemachine.lessons import LESSONS
-from statemachine.probes.phrasebook import CONCEPTS
+from statemachine.probes.conventions import CONCEPTS
 from statemachine.report.conventions import OURS, REMEMBER
 
 from .conftest import ROOT, assert_not_in, refused

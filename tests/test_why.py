@@ -333,7 +333,7 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     """Bit for bit the run of a script that knows nothing of this library but the URDF."""
     import pybullet as pb
 
-    from statemachine.runs.commands import TARGET
+    from statemachine.runs.robot import TARGET
 
     fresh, found = dialled()
     ours = path_of(found.build({}, {}), HOLD)

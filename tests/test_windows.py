@@ -33,7 +33,7 @@ GUARDED = {
     ("processes/sandbox.py", "SIGKILL"),  # a return code below zero is POSIX's
     ("processes/sandbox.py", "SIGPROF"),
     ("processes/sandbox.py", "SIGXCPU"),
-    ("silence.py", "register_at_fork"),
+    ("installed.py", "register_at_fork"),
     ("sweep/worker.py", "ITIMER_REAL"),
     ("sweep/worker.py", "SIGALRM"),
     ("sweep/worker.py", "setitimer"),

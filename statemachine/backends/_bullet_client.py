@@ -12,9 +12,8 @@ from types import MappingProxyType
 from typing import Any
 
 from ..errors import EngineError, ModelError
-from ..installed import require
+from ..installed import require, silence
 from ..processes import free_memory
-from ..silence import silence
 
 pb: Any = require("pybullet")
 

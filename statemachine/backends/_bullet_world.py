@@ -15,10 +15,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..installed import silence
 from ..interface import Array
 from ..rotations import INVERSE, matrix_from_quat, wxyz_from_xyzw, xyzw_from_wxyz
 from ..rotations import times as quat_times
-from ..silence import silence
 from . import _bullet_urdf as urdf
 from . import _dense as dense
 from ._bullet_client import (

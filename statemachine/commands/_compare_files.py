@@ -169,7 +169,7 @@ def _model_of(
 ) -> tuple[Any, Any, bool]:
     """The file of a side, its model, and whether it is as the trace was recorded with it."""
     from ..backends import load
-    from ..runs.provenance import provenance
+    from ..runs.header import provenance
 
     known, sides = trace.header.provenance, request.sides if request else ()
     file = sides[place].path if sides else options.model or known.model_file

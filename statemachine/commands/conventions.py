@@ -35,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask, and show."""
-    from ..probes import conventions, phrasebook
+    from ..probes import conventions
     from ..report import conventions as report
     from ..report.terminal import progress
 
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     engines = _engines(options.backend)
     if options.calls:
         with progress("calls") as told:
-            table = phrasebook.run(engines, told)
+            table = conventions.run_phrases(engines, told)
         return show(report.calls_page(table), table, options.json)
     with progress("conventions") as told:
         result = conventions.probe(engines, options.question or conventions.QUESTIONS, told)

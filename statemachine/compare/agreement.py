@@ -29,7 +29,7 @@ from ..measures import (
 from ..measures.text import on
 from ..page import Figures
 from ..runs import Header, Trace, model_file
-from ..runs.provenance import model_files
+from ..runs.header import model_files
 from .labels import labels_of, notes_on
 from .series import Series, at_the_end, default_tip, joint_columns, series, touches
 

@@ -13,7 +13,7 @@ from ..engines import room
 from ..interface import Array, Data, Ints, JointType, Model, forward, step
 from ..measures import ContactNames
 from ..rotations import angle_between, matrix_from_quat
-from ..runs.derived import array_or_nan
+from ..runs.recorder import array_or_nan
 from .matching import Matched
 
 KINEMATICS, MASS, FOUND, FORCE = "kinematics", "mass matrix", "contacts found", "contact force"

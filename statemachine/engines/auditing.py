@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import DivergedError
 from ..interface import Array, Model
 from ..measures import JointPlaces
-from .futures import FutureGap, gap, worst
+from .measured import FutureGap, gap, worst
 
 Layer = Literal["engine", "interface"]
 

@@ -101,7 +101,7 @@ class LivePictures(PipedChild):
             renderer: What draws.
         """
         self._size, self._renderer = size, renderer
-        command, environment = fresh_python(f"{__package__}.pictures")
+        command, environment = fresh_python(f"{__name__}:draw_as_asked")
         super().__init__(command, room(DEFAULT).drawing_environment(renderer.opengl, environment))
         self._send((renderer.name, files, size, camera))
 
@@ -159,8 +159,14 @@ def drawn(
         yield pictures.take()
 
 
+def draw_as_asked() -> None:
+    """Draw what standard input asks for, and end the process."""
+    with suppress(BrokenPipeError):  # nobody wants the rest
+        _draw()
+    os._exit(0)  # a driver may take its time, or fail, in taking its things down
+
+
 def _draw() -> None:
-    """Draw what standard input asks for."""
     name, files, (width, height), camera = pickle.load(sys.stdin.buffer)
     # What a driver prints must not get in between the pictures.
     out = os.fdopen(os.dup(1), "wb")
@@ -192,9 +198,3 @@ def _asked() -> SimpleQueue[Any]:
 
     threading.Thread(target=listen, daemon=True).start()
     return asked
-
-
-if __name__ == "__main__":
-    with suppress(BrokenPipeError):  # nobody wants the rest
-        _draw()
-    os._exit(0)  # a driver may take its time, or fail, in taking its things down

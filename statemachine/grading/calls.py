@@ -11,7 +11,7 @@ import numpy as np
 
 from ..engines import room
 from ..errors import UnsupportedError, refuse
-from ..python_files import line_of, load_module, misfit, said
+from ..runs.controllers import line_of, load_module, misfit, said
 from .answers import answer_of, encode
 from .watch import engine_watched, watching
 from .worlds import ExerciseWorld

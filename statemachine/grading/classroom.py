@@ -15,11 +15,10 @@ from ..processes import checked_jobs
 from ..processes.parallel import in_parallel
 from ..runs.whole import replace_csv
 from .calls import reason
-from .class_table import NOTHING, ClassEntry, read, rows_of
+from .class_table import NOTHING, ClassEntry, read, rows_of, score
 from .exercise import TIME_LIMIT, ExerciseJudge
 from .mutants.run import examine
-from .own_files import code_of, digest, has_functions, in_folder, likeness, shape_of
-from .predictions import score
+from .recording import code_of, digest, has_functions, in_folder, likeness, shape_of
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
 _PREDICTIONS = "lesson.json"

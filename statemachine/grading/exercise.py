@@ -28,8 +28,16 @@ from ..installed import DEFAULT, engine_version
 from ..processes.parallel import in_parallel, unwinding
 from ..releases import is_release
 from .judges import JUDGES, Judgement, judge_of, judged
-from .own_files import LARGEST, digest, has_solutions, in_folder, named_by
-from .recording import FunctionRecording, Limits, record
+from .recording import (
+    LARGEST,
+    FunctionRecording,
+    Limits,
+    digest,
+    has_solutions,
+    in_folder,
+    named_by,
+    record,
+)
 from .worlds import ExerciseWorld, Scenes
 
 LOOK = "please look at this"

@@ -12,8 +12,7 @@ from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_da
 from ..kinematics import Kind
 from ..measures.quantities import readings
 from ..page import Figures
-from ..runs.commands import farther, is_servo, load_at_start, start_keyframe
-from ..runs.robot import carried_by, scalar_joint
+from ..runs.robot import carried_by, farther, is_servo, load_at_start, scalar_joint, start_keyframe
 from ..witness import labels
 
 USUAL = "shoulder_lift"  # the arm's joint that lessons are about

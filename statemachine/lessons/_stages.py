@@ -13,8 +13,8 @@ from ..interface import INPUTS, Data, Model, forward, make_data, step
 from ..measures.text import grouped
 from ..page import Figures, Pipeline, Table, Traces
 from ..probes import conventions
-from ..runs.commands import hold_ctrl
 from ..runs.drive import Progress
+from ..runs.robot import hold_ctrl
 from ._robot import Tip, read_derived, read_stored
 
 _STORED = (*INPUTS, "time")

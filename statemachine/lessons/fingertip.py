@@ -22,7 +22,7 @@ from ..measures import largest_or_inf
 from ..page import Figures
 from ..rotations import Placement, angle_between, matrix_from_quat
 from ..runs.drive import Progress, silent
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from ..runs.robot import carried_by
 from ..witness import labels
 from ._robot import Tip, tips_of

@@ -16,7 +16,7 @@ from ..measures import largest
 from ..measures.text import count, millimetres, short_time, vector
 from ..page import Figures, Table
 from ..runs.drive import Progress, steps_in
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from ._robot import coordinate, tips_of, usual_tip, with_joint
 from ._stages import (
     change_tables,

@@ -14,10 +14,9 @@ from ..errors import DivergedError, UnsupportedError
 from ..interface import Model, make_data, reset
 from ..measures.text import NONE, apart, position, signed
 from ..page import Figures, Table, Traces
-from ..runs.commands import start_keyframe
 from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
-from ..runs.provenance import provenance
-from ..runs.robot import is_the_arm, touching
+from ..runs.header import provenance
+from ..runs.robot import is_the_arm, start_keyframe, touching
 from ..runs.scenarios import SCENARIOS
 from ._falling import BALANCE, PARTS, Droop, droop, milestones
 from ._robot import carried_by_joint, check_servos, coordinate, start_line, with_joint

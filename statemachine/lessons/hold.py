@@ -16,10 +16,9 @@ from ..measures.text import position, short_time
 from ..page import Figures, Table, Traces
 from ..releases import is_here, version_of
 from ..runs import record_scenario, shipped
-from ..runs.commands import hold_ctrl, is_servo, start_keyframe
 from ..runs.drive import Progress, steps_in
-from ..runs.provenance import model_digest, provenance
-from ..runs.robot import command, touching, trees_of_actuators
+from ..runs.header import model_digest, provenance
+from ..runs.robot import command, hold_ctrl, is_servo, start_keyframe, touching, trees_of_actuators
 from ..runs.scenarios import SCENARIOS
 from ._robot import check_servos, start_line
 from .session import CodeRun, stepping_loop

@@ -16,7 +16,7 @@ from ..interface.options import as_count
 from ..measures.text import count, duration
 from ..page import Figures
 from ..runs.drive import Progress, part_of
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from .in_turns import in_turns
 from .session import CodeRun
 from .template import by_engine, differences

@@ -15,7 +15,7 @@ import numpy as np
 from ..backends import load
 from ..interface import Array, forward, make_data, reset, step
 from ..page import Page, Printed, RobotPicture
-from ..runs.commands import TARGET
+from ..runs.robot import TARGET
 from ..runs.scenarios import SCENARIOS
 
 _ARM, _BOX = "so101/scene", "so101/scene_box"

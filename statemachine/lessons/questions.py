@@ -10,7 +10,7 @@ from ..interface import Model
 from ..measures.text import degrees, duration
 from ..page import Figures
 from ..runs.drive import Progress, part_of
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from ..runs.robot import is_the_arm
 from . import LESSONS, module
 from .session import CodeRun, take

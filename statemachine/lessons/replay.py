@@ -17,7 +17,7 @@ from ..measures import largest
 from ..measures.text import count, degrees, millimetres
 from ..page import Figures
 from ..runs.drive import Progress, part_of
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from ..runs.robot import body_pairs, command, is_the_arm
 from ._two_runs import BREAKS, broken, broken_table, growth, of_its_own, through_us, ways_back
 from .session import CodeRun

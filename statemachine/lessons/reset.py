@@ -12,7 +12,7 @@ from ..interface import INPUTS, Data, JointType, Model, forward, make_data, rese
 from ..measures.text import count, millimetres
 from ..page import Figures, Table
 from ..runs.drive import Progress
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from ..runs.robot import body_pairs, carried_by, moved_by_actuators
 from ._robot import read_derived, read_stored
 from .session import CodeRun

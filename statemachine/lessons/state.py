@@ -10,7 +10,7 @@ from ..interface import JointType, Model, make_data, reset
 from ..measures.text import grouped, listed
 from ..page import Figures, Slots, Table
 from ..runs.drive import Progress
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from .session import CodeRun
 from .template import differences
 

@@ -13,7 +13,7 @@ from ..interface import Data, Model, step
 from ..measures.text import count, duration
 from ..page import Figures
 from ..runs.drive import Progress, steps_in
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from .session import CodeRun
 from .template import by_engine
 

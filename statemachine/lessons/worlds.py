@@ -17,7 +17,7 @@ from ..measures.text import count, duration
 from ..page import Figures, Table, Traces
 from ..processes import free_memory, resident_memory
 from ..runs.drive import Progress, part_of
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from ..worlds import make_worlds, reset, step
 from .in_turns import Ratio, in_turns
 from .session import CodeRun

@@ -24,7 +24,7 @@ from ..interface.options import as_scalar
 from ..measures.text import count, position
 from ..page import Figures, Table
 from ..runs.drive import Progress
-from ..runs.provenance import provenance
+from ..runs.header import provenance
 from ._robot import coordinate, read_derived, with_joint
 from .session import CodeRun
 from .template import emulated

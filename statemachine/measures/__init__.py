@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from .contacts import ContactNames, overlaps, same_pairs, together
 from .gap import (
     SAME,
     Common,
@@ -22,10 +21,14 @@ from .gap import (
 from .quantities import (
     COUNT,
     QUANTITIES,
+    ContactNames,
     Quantity,
     Tolerance,
     amount,
+    overlaps,
     parse_tolerances,
+    same_pairs,
+    together,
     tolerance_of,
 )
 

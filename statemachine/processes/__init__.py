@@ -24,17 +24,20 @@ SERVERS = weakref.WeakSet[Any]()
 _WATCH = 1.0  # seconds between two looks at whether the parent is still there
 
 
-def fresh_python(module: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
-    """Command and environment that run a module in a fresh Python, which finds what this one does.
+def fresh_python(function: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
+    """Command and environment that call a function in a fresh Python, which finds what this does.
 
     Args:
-        module: A module of this package, by its full name.
-        *arguments: What it reads in `sys.argv`.
+        function: "package.module:function", by full name.
+        *arguments: What it is called with.
     """
-    package = Path(__file__).resolve().parents[2]
-    paths = [os.fspath(package), *(path or os.getcwd() for path in sys.path)]
+    code = f"import sys; from {function.replace(':', ' import ')} as call; call(*sys.argv[1:])"
+    paths = [
+        os.fspath(Path(__file__).resolve().parents[2]),
+        *(path or os.getcwd() for path in sys.path),
+    ]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
-    return [sys.executable, "-P", "-m", module, *arguments], environment
+    return [sys.executable, "-P", "-c", code, *arguments], environment
 
 
 def end_with_parent() -> None:

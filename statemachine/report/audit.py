@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..engines.futures import FutureGap, worst
+from ..engines.measured import FutureGap, worst
 from ..measures.text import NONE, grouped, milliseconds, rough
 from ..page import Block, Figures, Page, Table
 from ..probes.audit.trials import (

@@ -15,7 +15,7 @@ from ..engines.measured import Measurement
 from ..interface import DERIVED
 from ..measures.text import NONE, capital, few, grouped, reading, significant
 from ..page import Block, Code, Figures, Page, Section, Table, Text, Verdict
-from ..probes.phrasebook import CONCEPTS
+from ..probes.conventions import CONCEPTS
 from . import template
 from .template import if_true, versions_of
 

@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from .. import __version__
-from ..grading.predictions import KIND, answers_in
+from ..grading.class_table import KIND, answers_in
 from ..page import LETTERS, Question
 from ..runs.whole import replace_text
 

@@ -17,8 +17,7 @@ from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
 from ..measures.text import reading
 from ..page import Page, Picture, RobotPicture, Text, Traces
-from ..probes import phrasebook
-from ..probes.conventions import probe
+from ..probes.conventions import probe, run_phrases
 from ..runs.scenarios import scenario
 from ..runs.whole import replace_bytes
 from . import compare as comparison
@@ -65,7 +64,7 @@ def make_reference(folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     installed, _ = available()
     print("asking the engines ...")
-    table = phrasebook.run(installed)
+    table = run_phrases(installed)
     pages = {
         "conventions": markdown(conventions.page(probe(installed)), lambda _: ""),
         "calls": markdown(conventions.calls_page(table), lambda _: ""),

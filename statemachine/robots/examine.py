@@ -7,7 +7,6 @@ is told before each part, so that a part that crashes leaves what was found befo
 from __future__ import annotations
 
 import pickle
-import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -252,7 +251,3 @@ def main(path: str, quick: str, seed: str, answer: str) -> None:
         replace_bytes(Path(answer), pickle.dumps((part, row)))
 
     tell(examine(Path(path), ExaminedModel("", "", ""), bool(quick), int(seed), tell), "")
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

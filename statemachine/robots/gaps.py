@@ -10,8 +10,8 @@ from ..compare.perturbed import nudged_controller, nudged_start
 from ..errors import StateMachineError
 from ..interface import Array, Model, make_data, reset
 from ..measures import JointPlaces, farthest, largest_or_inf, turns
-from ..runs.commands import start_keyframe
 from ..runs.drive import Controller, drive
+from ..runs.robot import start_keyframe
 from .records import TOLERANCE, RunGap
 
 STEPS = 400

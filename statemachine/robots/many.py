@@ -23,7 +23,7 @@ from ..models import SUFFIXES
 from ..processes import ALONE, checked_jobs, fresh_python, sandbox
 from ..processes.parallel import in_parallel, unwinding
 from ..runs.drive import Progress, silent
-from ..runs.provenance import model_digest, model_files
+from ..runs.header import model_digest, model_files
 from .gaps import STEPS
 from .records import ExaminedModel, Survey, read_table, write_table
 
@@ -230,7 +230,7 @@ def _examined(
     with tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder:
         answer = Path(folder) / "answer"
         words = os.fspath(model.path), "quick" * quick, str(seed), os.fspath(answer)
-        command, environment = fresh_python(f"{__package__}.examine", *words)
+        command, environment = fresh_python(f"{__package__}.examine:main", *words)
         outcome = sandbox.run(
             command,
             cpu=4 * seconds + 60,

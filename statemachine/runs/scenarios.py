@@ -15,9 +15,8 @@ import numpy as np
 
 from ..errors import BadInputError, check_name
 from ..interface import Array, Data, Model
-from .commands import hold_ctrl, home, need_actuators, waves
 from .drive import Controller
-from .robot import has_floor, is_the_arm
+from .robot import has_floor, hold_ctrl, home, is_the_arm, need_actuators, waves
 
 # Swings the arm with the box in its jaws by 23 degrees.
 MOVING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)

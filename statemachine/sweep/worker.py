@@ -25,7 +25,7 @@ from .. import __version__
 from ..backends import load, on_default
 from ..compare.perturbed import nudged_controller, nudged_start
 from ..errors import BadInputError, StateMachineError, TimedOutError
-from ..installed import DEFAULT
+from ..installed import DEFAULT, silence
 from ..interface import Array, Data, Model, forward, make_data, reset
 from ..interface.records import usual_site
 from ..measures import ContactNames
@@ -33,11 +33,10 @@ from ..measures.text import listed
 from ..models import resolve
 from ..processes import end_with_parent
 from ..runs.controllers import function_file
-from ..runs.derived import energies
 from ..runs.drive import check_length, drive, steps_in
-from ..runs.provenance import model_digest
+from ..runs.header import model_digest
+from ..runs.recorder import energies
 from ..runs.scenarios import Scenario
-from ..silence import silence
 from .design import digest
 from .request import PreparedSweep, Sweep, SweepCell, drawn_start, options_at, start_at
 from .rows import DONE, FAILED, known

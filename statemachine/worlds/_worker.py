@@ -120,7 +120,7 @@ class WorldsProcess(PipedChild):
         self.worlds, self._asleep = worlds, 0
         self._block, self._place = block, answers + number * ANSWER_MOST
         command, environment = fresh_python(
-            f"{__package__}._worker", block.handle, str(block.size), str(number)
+            f"{__name__}:main", block.handle, str(block.size), str(number)
         )
         super().__init__(command, environment, **block.inherited)
 
@@ -245,7 +245,16 @@ def _portable_error(error: Exception) -> Exception:
 
 
 def main(handle: str, size: str, number: str) -> None:
-    """Do what is asked until there is nobody to ask."""
+    """Do what is asked until there is nobody to ask; then end the process."""
+    try:
+        _serve(handle, size, number)
+    except Exception:
+        traceback.print_exc()
+    finally:
+        os._exit(0)  # at once: there is nothing that the system does not take back
+
+
+def _serve(handle: str, size: str, number: str) -> None:
     end_with_parent()  # also in the midst of a long step
     out, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)  # engines greet there, and warn
@@ -261,12 +270,3 @@ def main(handle: str, size: str, number: str) -> None:
         os.write(out, ANSWER.pack(command[0], answered))
         if VERBS[command[1]] == "fill":
             os.dup2(nothing, 2)  # until now somebody read what was said there
-
-
-if __name__ == "__main__":
-    try:
-        main(*sys.argv[1:])
-    except Exception:
-        traceback.print_exc()
-    finally:
-        os._exit(0)  # at once: there is nothing that the system does not take back

@@ -14,7 +14,7 @@ from ...page import Figures
 from ...releases import engine_of
 from ...runs import Trace
 from ...runs.drive import Progress, silent
-from ...runs.provenance import provenance
+from ...runs.header import provenance
 from ...runs.robot import moved_by_actuators
 from ...runs.scenarios import Scenario
 from ..labels import files_apart

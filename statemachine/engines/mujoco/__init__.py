@@ -28,7 +28,7 @@ class MujocoEngine(RawEngine):
     supersampling = 2  # drawn so many times as large, and made smaller: edges are smooth then
     steps = ("mj_step", "mj_step2")
     forwards = ("mj_forward", "mj_kinematics", "mj_fwdPosition")
-    phrases = function_of(".mujoco.phrasebook:phrases")
+    phrases = function_of(".mujoco.conventions:phrases")
     driver = function_of(".mujoco.audit:MujocoDriver")
     call_watch = function_of(".mujoco.calls:MujocoWatch")
     read = function_of(".mujoco.description:read")

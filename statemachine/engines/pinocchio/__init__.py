@@ -11,7 +11,7 @@ from .. import RawEngine, function_of
 class PinocchioEngine(RawEngine):
     """Pinocchio: it computes, and runs nothing."""
 
-    phrases = function_of(".pinocchio.phrasebook:phrases")
+    phrases = function_of(".pinocchio.conventions:phrases")
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
         """A function of `conventions`."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ...backends._bullet_client import as_file, connect, disconnect, load_urdf, pb
-from ...silence import silence
+from ...installed import silence
 
 
 class HasClient(Protocol):

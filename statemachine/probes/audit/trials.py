@@ -26,7 +26,7 @@ from ...engines.auditing import (
     SaveMethod,
     SavePoint,
 )
-from ...engines.futures import FutureGap, gap, worst
+from ...engines.measured import FutureGap, gap, worst
 from ...interface import Array, Model
 
 AGAIN, RESET, PIECES, LOOK = "again", "reset", "step(n)", "look"
