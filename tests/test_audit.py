@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 from rich.cells import cell_len
-from statemachine.probes.audit.conclusions import conclude
 
 import statemachine as sm
 from statemachine.backends import mujoco_backend
@@ -28,7 +27,7 @@ from statemachine.interface import JointType
 from statemachine.measures import JointPlaces
 from statemachine.page import Figures, Items, Page, Table
 from statemachine.probes import audit
-from statemachine.probes.audit import drivers_of, trials
+from statemachine.probes.audit import conclude, drivers_of, trials
 from statemachine.probes.audit.interface_driver import points, run_elsewhere
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report

@@ -17,8 +17,8 @@ from statemachine import engines
 from statemachine.cli import main
 from statemachine.compare.models import own_ways
 from statemachine.engines import room, samples
-from statemachine.engines.measured import TREE
 from statemachine.engines.mujoco import conventions as mujoco_conventions
+from statemachine.engines.samples import TREE
 from statemachine.errors import MissingEngineError, UnknownNameError
 from statemachine.installed import ENGINES, available, require
 from statemachine.probes.calls import record
