@@ -114,10 +114,10 @@ class Law:
         self._rub_r = np.array([softness(*pair) for pair in zip(still, weight, strict=True)])
         self._rub_weight = weight + self._rub_r
         self._rubs = rubs = np.flatnonzero(self._frictionloss)
-        self._unit = np.eye(len(dofs))
-        # Joints with friction: softness, -b, most.
-        columns = np.column_stack([self._rub_r, -self._rub_b, self._frictionloss])
-        self._rub_rows = list(zip(rubs.tolist(), columns[rubs].tolist(), strict=True))
+        self._unit = unit = np.eye(len(dofs))
+        # Rows of joints with friction; their references are these times the velocities.
+        columns = unit, self._rub_r, -self._rub_b, self._least_rub, self._frictionloss
+        self._rub_rows = [column[rubs] for column in columns]
         self._coupled = bool(self._equalities) or self._tendons.rubs
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
@@ -198,7 +198,7 @@ class Law:
         linear = dense.times(self._linear, x)
         passive, damped = linear[:n], linear[n : 2 * n]
         actuator, inertia = self.drives.forces(linear[2 * n :])
-        if self._medium:
+        if self._medium.bodies:
             drag, slope = self._medium.forces(self._q, speed)
             passive = passive + drag
             inertia = np.array([inertia[0], inertia[1] + self._later * slope])
@@ -222,42 +222,51 @@ class Law:
             friction = moved
             solve = dense.dot(change, change) > self._steady
         if solve:
-            rubbing = [
-                SoftRow(self._unit[i], soft, damping * speed[i], -most, most)
-                for i, (soft, damping, most) in self._rub_rows
-            ]
             kinds = (
-                rubbing + self._tendons.rubbing(speed),
+                self._tendons.rubbing(speed),
                 stops,
-                self._equalities.rows(self._q, x[:n], speed),
+                self._equalities.rows(self._q, x[:n], speed) if self._coupled else (),
             )
-            friction, limit, equality = self._constrained(explicit, others, friction, kinds)
+            known = speed, others, friction
+            friction, limit, equality = self._constrained(explicit, *known, kinds)
             others = others + limit + equality
         self.friction = friction
         self._parts = bias, actuator, passive, friction, limit, equality
         return dense.solved(implicit, others + friction)
 
     def _constrained(
-        self, factor: Array, others: Array, friction: Array, kinds: Sequence[Sequence[SoftRow]]
+        self,
+        factor: Array,
+        speed: Array,
+        others: Array,
+        friction: Array,
+        kinds: Sequence[Sequence[SoftRow]],
     ) -> list[Array]:
         """Friction, limit and equality force (n,), by pivoting between free and bounded rows.
 
         Each row has a force F between two bounds, and wants J·a + R·F = its reference; a row at a
-        bound may miss it to one side.
+        bound may miss it to one side. Those of the joints' friction come before the others.
         """
-        rows = [row for kind in kinds for row in kind]
-        if not rows:
-            return [self._nothing] * len(kinds)
-        jacobian, soft, goal, least, most = (np.array(part) for part in zip(*rows, strict=True))
-        response = np.array([dense.solved(factor, row.copy()) for row in jacobian])
+        rubbing, columns = len(self._rubs), self._rub_rows.copy()
+        columns[2] = columns[2] * speed[self._rubs]
+        if rows := [row for kind in kinds for row in kind]:
+            further = map(np.array, zip(*rows, strict=True))
+            columns = [np.concatenate(pair) for pair in zip(columns, further, strict=True)]
+        jacobian, soft, goal, least, most = columns
+        response = jacobian.copy()
+        for row in response:
+            dense.solved(factor, row)
         matrix = dense.product(response, jacobian.T.copy())
-        matrix.flat[:: len(rows) + 1] += soft
+        matrix.flat[:: len(soft) + 1] += soft
         right = goal - dense.times(jacobian, dense.solved(factor, others.copy()))
-        force = np.zeros(len(rows))
-        force[: len(self._rubs)] = friction[self._rubs]
+        force = np.zeros(len(soft))
+        force[:rubbing] = friction[self._rubs]
         force = dense.pivoted(matrix, right, least, most, force)
-        ends = np.cumsum([0, *map(len, kinds)]).tolist()
-        return [dense.times(jacobian[a:b].T.copy(), force[a:b]) for a, b in pairwise(ends)]
+        ends = [0, *(np.cumsum([*map(len, kinds)]) + rubbing).tolist()]
+        return [
+            dense.times(jacobian[a:b].T.copy(), force[a:b]) if b > a else self._nothing
+            for a, b in pairwise(ends)
+        ]
 
     def _stops_reached(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
         """Rows of the limits that joints and tendons are beyond."""

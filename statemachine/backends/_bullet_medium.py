@@ -20,7 +20,11 @@ from .compiled import gravity
 
 
 class Medium:
-    """Drag and compensation of gravity of one tree."""
+    """Drag and compensation of gravity of one tree.
+
+    Attributes:
+        bodies: Those on which something acts.
+    """
 
     def __init__(
         self, raw: mujoco.MjModel, world: World, tree: Tree, off: Mapping[str, bool]
@@ -29,7 +33,7 @@ class Medium:
         wet = bool(raw.opt.density or raw.opt.viscosity)
         self._lift = -gravity(raw) * (raw.body_mass * raw.body_gravcomp)[:, None]
         passive = not (off["damper"] and off["spring"])  # as MuJoCo, which then skips all of it
-        self._bodies = [
+        self.bodies = [
             body
             for body in tree.links
             if passive and raw.body_mass[body] and (wet or self._lift[body].any())
@@ -47,14 +51,11 @@ class Medium:
         self._linear = viscous.T.copy()
         self._square = density * np.concatenate([np.array(move) / 2, np.array(spin) / 64]).T
 
-    def __bool__(self) -> bool:
-        return bool(self._bodies)
-
     def forces(self, q: Sequence[float], speed: Array) -> tuple[Array, Array]:
         """The generalised force (n,), and how it opposes each velocity more (n, n)."""
         raw, n = self._raw, len(speed)
         force, slope = np.zeros(n), np.zeros((n, n))
-        for body in self._bodies:
+        for body in self.bodies:
             pose = self._world.body_pose(self._tree, body)
             turn = matrix_from_quat(pose[1])
             centre = pose[0] + dense.times(turn, raw.body_ipos[body])

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Iterator, Sequence
-from contextlib import nullcontext
 from itertools import chain
 from typing import Any, Literal
 
@@ -40,7 +39,6 @@ from .compiled import gravity
 _PUSHES = 0.03  # of an overlap that a contact undoes in a step; the engine's own is 0.08
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
-_NO_LOCK = nullcontext()
 _ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # a pose, as the engine has them
 _REST = math.sqrt(1 - 2 * _TILT**2)
 
@@ -413,7 +411,9 @@ class World:
             rate: (n,) its acceleration, as qacc.
         """
         if not tree.free:
-            with HiddenWorld.lock if self._turns_gravity else _NO_LOCK:
+            if not self._turns_gravity:
+                return pb.calculateInverseDynamics(tree.body, q, v, rate, 0, self.client)
+            with HiddenWorld.lock:
                 return pb.calculateInverseDynamics(tree.body, q, v, rate, 0, self.client)
         (centre, axes), (w, x, y, z) = self._frames[tree.body], q[3:7]
         own = (x, y, z, w)
