@@ -139,6 +139,14 @@ class World:
             for tree in self.trees
             if tree.free
         }
+        # Of their bases: what of T is constant, see `_base_axes`, and the body's axes in the frame.
+        self._changes: dict[int, tuple[Array, Array]] = {}
+        for body, (centre, axes) in self._frames.items():
+            inward = matrix_from_quat(wxyz_from_xyzw(np.array(axes))).T.copy()
+            lever = np.cross(np.eye(3), centre).T.copy()  # times w: w × centre
+            change = np.zeros((6, 6))
+            change[:3, 3:], change[3:, 3:] = inward, dense.product(inward, lever)
+            self._changes[body] = change, inward
         self._last: dict[int, Quat] = dict.fromkeys(self._frames, (0.0, 0.0, 0.0, 1.0))
         self._turns_gravity = any(tree.free and tree.driven for tree in self.trees)
         with silence():  # what it has to say of a tree, it says the first time
@@ -447,24 +455,20 @@ class World:
         rows = pb.calculateMassMatrix(tree.body, q[7 * tree.free :], 0, self.client)
         # Faster than np.array.
         mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
-        if not tree.free:
-            return mass
-        axes = self._base_axes(tree, q)
-        return dense.product(np.ascontiguousarray(axes.T), dense.product(mass, axes))
+        if tree.free:
+            axes = self._base_axes(tree, q)
+            mass[:, :6] = dense.product(mass[:, :6].copy(), axes)
+            mass[:6] = dense.product(axes.T.copy(), mass[:6].copy())
+        return mass
 
     def _base_axes(self, tree: Tree, q: Sequence[float]) -> Array:
-        """T (n, n), by which the engine's velocities of a tree that floats are T·qvel.
+        """T (6, 6), by which the engine's velocities of the base of a tree that floats are T·qvel.
 
-        Its base turns, then moves, in its own axes.
+        The base turns, then moves, in its own axes.
         """
-        centre, axes = self._frames[tree.body]
-        inward = matrix_from_quat(wxyz_from_xyzw(np.array(axes))).T
-        back = matrix_from_quat(np.array(q[3:7])).T
-        change = np.eye(len(tree.dofs))
-        change[:3, :3], change[:3, 3:6] = 0.0, inward
-        change[3:6, :3] = dense.product(inward, back)
-        lever = np.array(np.cross(np.eye(3), centre).T, dtype=np.float64)  # times w: w × centre
-        change[3:6, 3:6] = dense.product(inward, lever.copy())
+        change, inward = self._changes[tree.body]
+        change = change.copy()
+        change[3:, :3] = dense.product(inward, matrix_from_quat(np.array(q[3:7])).T.copy())
         return change
 
     def body_pose(self, tree: Tree, body: int) -> tuple[Array, Array]:
@@ -499,9 +503,9 @@ class World:
         moving, turning = (np.array(part) for part in rows)
         if tree.free:
             axes, turn = self._base_axes(tree, q), matrix_from_quat(np.array(q[3:7]))
-            moving, turning = (
-                dense.product(turn, dense.product(rows, axes)) for rows in (moving, turning)
-            )
+            for rows in (moving, turning):
+                rows[:, :6] = dense.product(rows[:, :6].copy(), axes)
+            moving, turning = dense.product(turn, moving), dense.product(turn, turning)
         return np.vstack([moving + np.cross(turning, point - origin, axisa=0).T, turning])
 
     def push(self, tree: Tree, q: Sequence[float], force: Array) -> None:
