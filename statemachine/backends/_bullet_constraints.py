@@ -114,7 +114,7 @@ class Tendons:
         self._stiffness = raw.tendon_stiffness[ids] * (not off["spring"])
         self._slack = raw.tendon_lengthspring[ids].T
         self.stiff = bool(self._stiffness.any())
-        shortest = 0.0 if off["refsafe"] else 2 * raw.opt.timestep
+        shortest = shortest_time(raw, off)
         weight, on = raw.tendon_invweight0[ids], not off["constraint"]
         self._friction = raw.tendon_frictionloss[ids] * (on and not off["friction"])
         self.rubs = bool(self._friction.any())
@@ -173,7 +173,7 @@ class Equalities:
         self._raw, self._world, self._tree = raw, world, tree
         self._sums: list[tuple[Soft, list[Array], list[float], list[float]]] = []
         self._places: list[tuple[int, list[Soft], list[TiedPlace]]] = []
-        shortest = 0.0 if off["refsafe"] else 2 * raw.opt.timestep
+        shortest = shortest_time(raw, off)
         active = raw.eq_active0 & (not (off["equality"] or off["constraint"]))
         for eq in np.flatnonzero(active).tolist():
             bodies = ends_of(raw, eq)
@@ -235,12 +235,13 @@ class Equalities:
         points, quats = [], []
         moves, spins, drifts = np.zeros((2, 6, n)), np.zeros((2, 4)), np.zeros((2, 6))
         for k, place in enumerate(places):
-            pose = place.still or self._world.body_pose(tree, place.body)
-            point = pose[0] + dense.times(matrix_from_quat(pose[1]), place.offset)
+            (where,), (quat,) = place.still or self._world.body_poses(tree, [place.body])
+            turn = matrix_from_quat(quat)
+            point = where + dense.times(turn, place.offset)
             points.append(point)
-            quats.append(times(pose[1], place.quat))
+            quats.append(times(quat, place.quat))
             if not place.still:
-                moves[k] = self._world.jacobian(tree, q, place.body, pose, point)
+                moves[k] = self._world.jacobian(tree, q, place.body, (where, turn), point)
                 spins[k, 1:], drifts[k] = self._drift(moves[k], speed)
         jacobian, drift = moves[0] - moves[1], drifts[0] - drifts[1]
         scale, back = 0.5 * float(self._raw.eq_data[eq, 10]), quats[1] * INVERSE
@@ -284,7 +285,7 @@ class TiedPlace:
     Attributes:
         body: MuJoCo's id of the body.
         offset, quat: (3,) and (4,) where in the body.
-        still: xpos and xquat of the body, if it never moves.
+        still: xpos (1, 3) and xquat (1, 4) of the body, if it never moves.
     """
 
     def __init__(self, raw: mujoco.MjModel, eq: int, side: int, body: int) -> None:
@@ -302,7 +303,12 @@ class TiedPlace:
         if raw.body_treeid[body] < 0:
             still = mujoco.MjData(raw)
             mujoco.mj_kinematics(raw, still)
-            self.still = still.xpos[body].copy(), still.xquat[body].copy()
+            self.still = still.xpos[[body]], still.xquat[[body]]
+
+
+def shortest_time(raw: mujoco.MjModel, off: Mapping[str, bool]) -> float:
+    """The least time constant of a constraint [s]: two steps, where MuJoCo takes care of it."""
+    return 0.0 if off["refsafe"] else 2 * float(raw.opt.timestep)
 
 
 def bounds_of(ranges: Array, limited: Any) -> tuple[Array, Array]:

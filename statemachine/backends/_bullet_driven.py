@@ -15,14 +15,14 @@ import mujoco
 import numpy as np
 
 from ..interface import DERIVED, POSES, Array
-from ..rotations import INVERSE, matrix_from_quat, times, wxyz_from_xyzw
+from ..rotations import matrix_from_quat, wxyz_from_xyzw
 from . import _dense as dense
 from ._bullet_client import pb
 from ._bullet_contacts import contacts_of
 from ._bullet_drives import in_force
 from ._bullet_law import Law
 from ._bullet_plan import Plan
-from ._bullet_world import Tree, World
+from ._bullet_world import Tree, World, body_frames
 from ._hidden_world import HiddenWorld, Memory, Moment, Read, bounded
 from .compiled import gravity
 
@@ -274,11 +274,9 @@ class Ghost(World):
             return {name: self._sites(qpos, name)}
         raw = self._raw
         xpos, xquat = (array.copy() for array in self.still[:2])
-        for tree, (where, turned) in zip(self.trees, self._states(qpos), strict=True):
+        for tree, centres in zip(self.trees, self._states(qpos), strict=True):
             bodies = list(tree.links)
-            xquat[bodies] = times(wxyz_from_xyzw(turned), raw.body_iquat[bodies] * INVERSE)
-            turns = matrix_from_quat(xquat[bodies])
-            xpos[bodies] = where - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies])
+            xpos[bodies], xquat[bodies] = body_frames(raw, bodies, *centres)
         for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
             body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
             quat = qpos[start + 3 : start + 7]
@@ -321,19 +319,10 @@ class Ghost(World):
             if sites not in self._known:
                 self.put(qpos, self._rest)
                 self._known[sites] = [
-                    self._centres(tree.body, [*(tree.tips if sites else tree.links).values()])
+                    self.centres(tree, [*(tree.tips if sites else tree.links).values()])
                     for tree in self.trees
                 ]
             return self._known[sites]
-
-    def _centres(self, body: int, links: list[int]) -> tuple[Array, Array]:
-        """Centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of some links."""
-        if not links:
-            return np.empty((0, 3)), np.empty((0, 4))
-        states = pb.getLinkStates(
-            body, links, computeForwardKinematics=1, physicsClientId=self.client
-        )
-        return np.array([state[0] for state in states]), np.array([state[1] for state in states])
 
 
 def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:

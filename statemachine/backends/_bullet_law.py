@@ -41,6 +41,7 @@ from ._bullet_constraints import (
     bounds_of,
     curves,
     impedance,
+    shortest_time,
     soft,
     soft_row,
     softness,
@@ -107,9 +108,9 @@ class Law:
         self._least_rub = -self._frictionloss
         self._steady = _STEADY**2 * dense.dot(self._frictionloss, self._frictionloss)
         weight = raw.dof_invweight0[dofs]
-        floor = 0.0 if off["refsafe"] else 2 * self._timestep
+        shortest = shortest_time(raw, off)
         solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
-        self._rub_b, _ = springs(solref, solimp, floor)
+        self._rub_b, _ = springs(solref, solimp, shortest)
         still = [impedance(curve, 0.0) for curve in curves(solimp)]
         self._rub_r = np.array([softness(*pair) for pair in zip(still, weight, strict=True)])
         self._rub_weight = weight + self._rub_r
@@ -126,7 +127,7 @@ class Law:
         low, high = bounds_of(raw.jnt_range[joints] + margin, limited)
         self._ranges: tuple[list[float], list[float]] = low.tolist(), high.tolist()
         solref, solimp = raw.jnt_solref[joints], raw.jnt_solimp[joints]
-        self._stops = soft(solref, solimp, weight, floor)
+        self._stops = soft(solref, solimp, weight, shortest)
 
     def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
         """Start from a state; contact and friction (n,) are those of the step before it."""

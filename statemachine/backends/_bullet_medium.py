@@ -55,11 +55,10 @@ class Medium:
         """The generalised force (n,), and how it opposes each velocity more (n, n)."""
         raw, n = self._raw, len(speed)
         force, slope = np.zeros(n), np.zeros((n, n))
-        for body in self.bodies:
-            pose = self._world.body_pose(self._tree, body)
-            turn = matrix_from_quat(pose[1])
-            centre = pose[0] + dense.times(turn, raw.body_ipos[body])
-            jacobian = self._world.jacobian(self._tree, q, body, pose, centre)
+        places, quats = self._world.body_poses(self._tree, self.bodies)
+        for body, place, turn in zip(self.bodies, places, matrix_from_quat(quats), strict=True):
+            centre = place + dense.times(turn, raw.body_ipos[body])
+            jacobian = self._world.jacobian(self._tree, q, body, (place, turn), centre)
             force += dense.times(jacobian[:3].T.copy(), self._lift[body])
             if not self._wet:
                 continue

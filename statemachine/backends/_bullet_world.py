@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any, Literal
 
+import mujoco
 import numpy as np
 
 from ..installed import silence
@@ -471,12 +472,19 @@ class World:
         change[3:, :3] = dense.product(inward, matrix_from_quat(np.array(q[3:7])).T.copy())
         return change
 
-    def body_pose(self, tree: Tree, body: int) -> tuple[Array, Array]:
-        """The xpos (3,) and xquat (4,) of a body that is not the engine's base."""
-        raw = self._raw
-        where, axes, *_ = pb.getLinkState(tree.body, tree.links[body], 0, 1, self.client)
-        quat = quat_times(wxyz_from_xyzw(np.array(axes)), raw.body_iquat[body] * INVERSE)
-        return where - dense.times(matrix_from_quat(quat), raw.body_ipos[body]), quat
+    def body_poses(self, tree: Tree, bodies: Sequence[int]) -> tuple[Array, Array]:
+        """The xpos (n, 3) and xquat (n, 4) of bodies that are not the engine's base."""
+        links = [tree.links[body] for body in bodies]
+        return body_frames(self._raw, bodies, *self.centres(tree, links))
+
+    def centres(self, tree: Tree, links: Sequence[int]) -> tuple[Array, Array]:
+        """Centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of some links."""
+        if not links:
+            return np.empty((0, 3)), np.empty((0, 4))
+        states = pb.getLinkStates(
+            tree.body, links, computeForwardKinematics=1, physicsClientId=self.client
+        )
+        return np.array([state[0] for state in states]), np.array([state[1] for state in states])
 
     def jacobian(
         self, tree: Tree, q: Sequence[float], body: int, pose: tuple[Array, Array], point: Array
@@ -487,12 +495,12 @@ class World:
             tree: The tree, which the world has in the same pose.
             q: Its `qpos`.
             body: MuJoCo's id.
-            pose: xpos (3,) and xquat (4,) of the body.
+            pose: xpos (3,) and the body's axes (3, 3).
             point: (3,) in the world.
         """
-        where, quat = pose
+        where, turned = pose
         # What the engine tells is of the origin of the link, where its last joint is.
-        origin = where + dense.times(matrix_from_quat(quat), urdf.anchor(self._raw, body))
+        origin = where + dense.times(turned, urdf.anchor(self._raw, body))
         zeros, angles = [0.0] * len(tree.joints), q[7 * tree.free :]
         if tree.joints:
             rows = pb.calculateJacobian(
@@ -526,6 +534,15 @@ class World:
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""
         return pb.getContactPoints(physicsClientId=self.client)
+
+
+def body_frames(
+    raw: mujoco.MjModel, bodies: Sequence[int], centres: Array, axes: Array
+) -> tuple[Array, Array]:
+    """The xpos (n, 3) and xquat (n, 4) of bodies, from what the engine tells of their centres."""
+    quats = quat_times(wxyz_from_xyzw(axes), raw.body_iquat[bodies] * INVERSE)
+    turns = matrix_from_quat(quats)
+    return centres - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies]), quats
 
 
 ENGINE_TIMESTEP = 1 / 240
