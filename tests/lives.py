@@ -36,15 +36,22 @@ def live(
         sm.reset(models[world], data[world], key)
 
     def keep() -> None:
+        states = worlds.get_states(many)
         kept[:] = [
             (worlds.get_state(many, i), sm.get_state(model, data[i]))
             for i, model in enumerate(models)
         ]
+        assert [states.pop(i) for i in range(many.n)] == [single for _, single in kept]
         assert all(ours == single for ours, single in kept)
 
     def take_back() -> None:  # either is the other's
         worlds.set_state(many, world, kept[world][1])
         sm.set_state(models[world], data[world], kept[world][0])
+
+    def take_all_back() -> None:
+        worlds.set_states(many, dict(enumerate(single for _, single in kept)))
+        for model, each, (ours, _) in zip(models, data, kept, strict=True):
+            sm.set_state(model, each, ours)
 
     def write() -> None:  # reaches one world, with the next step that is for it
         many.qpos[world, 0] = data[world].qpos[0] = 0.25
@@ -59,10 +66,14 @@ def live(
         sm.forward(models[world], data[world])
 
     changes: list[Callable[[], None]] = [
-        *(keep, forward, set_time, take_back, write, lambda: reset(None)),
+        *(keep, forward, set_time, take_back, write, take_all_back, lambda: reset(None)),
         *([lambda: reset(0)] if models[0].keyframes else []),
     ]
     equal(many, data)
+    if models[0].keyframes:
+        worlds.reset(many, keyframe=0)
+        for model, each in zip(models, data, strict=True):
+            sm.reset(model, each, 0)
     for k in range(rounds):
         world = int(rng.integers(many.n))
         if k % 2 == 0:
@@ -74,9 +85,12 @@ def live(
                 each.ctrl = row
         nstep, mask = int(rng.integers(1, 5)), rng.random(many.n) < 0.8
         some = (None, mask, np.flatnonzero(mask)[::-1])[k % 3]
-        worlds.step(many, nstep, ids=some)
+        fresh = bool(rng.random() < 0.3)
+        worlds.step(many, nstep, ids=some, forward=fresh)
         for i in np.flatnonzero(mask).tolist() if some is not None else range(many.n):
             sm.step(models[i], data[i], nstep)
+            if fresh:
+                sm.forward(models[i], data[i])
         equal(many, data)
     for each in data:
         each.close()

@@ -30,7 +30,6 @@ from statemachine.errors import (
     UnknownNameError,
     UnsupportedError,
 )
-from statemachine.interface.worlds import WRITABLE
 
 from .conftest import SHARED, opened, refused, runs_in_silence, shared, started
 from .lives import equal, live
@@ -62,74 +61,7 @@ def commands(model: sm.Model, *shape: int) -> np.ndarray:
 
 def test_a_world_is_what_one_data_is(model: sm.Model) -> None:
     with worlds_of(model) as worlds:
-        assert not worlds.xpos.any()
-        live(worlds, [model] * N, 28)
-        many.step(worlds)
-        many.reset(worlds, ids=[1])
-        assert not worlds.xpos[1].any()
-        assert worlds.xpos[2].any()
-
-
-def test_a_step_with_forward_is_a_step_and_a_forward(model: sm.Model) -> None:
-    with worlds_of(model) as together, worlds_of(model) as apart:
-        together.ctrl = apart.ctrl = commands(model, N)
-        apart.qvel[2, 0] = together.qvel[2, 0] = 1e20  # ends at once
-        for ids in (None, [0, 2], [1, 3]):
-            assert np.array_equal(together.xpos, apart.xpos)  # what is read comes with the next
-            with warnings.catch_warnings(action="ignore"):
-                many.step(together, 2, ids=ids, forward=True)
-                many.step(apart, 2, ids=ids)
-                many.forward(apart, ids=ids)
-            for name in (*WRITABLE, *together.derived):
-                ours, theirs = getattr(together, name), getattr(apart, name)
-                assert np.array_equal(ours[[0, 1, 3]], theirs[[0, 1, 3]])
-        assert list(together.diverged) == list(apart.diverged) == [2]
-
-
-def test_states_of_all_worlds_are_those_of_each(model: sm.Model) -> None:
-    latency = [0.0, 0.02, 0.01, 0.02] if model.backend == "mujoco" else [0.02] * N
-    with worlds_of(model, latency=latency) as worlds, worlds_of(model, latency=latency) as others:
-        worlds.ctrl = commands(model, N)
-        many.step(worlds, 30)
-        states = many.get_states(worlds)
-        assert states == {world: many.get_state(worlds, world) for world in range(N)}
-        assert many.get_states(worlds, [3, 1]) == {1: states[1], 3: states[3]}
-        many.set_states(others, states)
-        assert many.get_states(others) == states
-        for world, state in states.items():
-            many.set_state(worlds, world, state)
-        for each in (worlds, others):
-            assert not each.xpos.any()
-            many.step(each, 5)
-        for name in (*WRITABLE, *worlds.derived):
-            assert np.array_equal(getattr(worlds, name), getattr(others, name))
-        worlds.qvel[1, 0] = 1e20
-        with pytest.warns(DivergedWarning):
-            many.step(worlds, ids=[1])
-        assert list(many.get_states(worlds)) == [0, 2, 3]
-        many.set_states(worlds, {1: states[1]})
-        assert not worlds.diverged
-
-
-def test_states_move_between_worlds_and_data(worlds: many.Worlds) -> None:
-    model = worlds.model
-    # In contact.
-    with opened(model, 0, nstep=60) as (_, data), sm.make_data(model) as again:
-        many.set_state(worlds, 2, sm.get_state(model, data))
-        sm.set_state(model, again, pickle.loads(pickle.dumps(sm.get_state(model, data))))
-        assert not worlds.xpos[2].any()
-        assert many.get_state(worlds, 2) == sm.get_state(model, again)
-        many.step(worlds, 20)
-        sm.step(model, again, 20)
-        equal(worlds, [again] * N, [2])
-        assert not np.array_equal(worlds.qpos[1], worlds.qpos[2])
-        back = many.get_state(worlds, 2)
-        sm.set_state(model, data, back)
-        sm.set_state(model, again, back)
-        sm.step(model, data, 5)
-        many.set_state(worlds, 0, back)
-        many.step(worlds, 5, ids=[0])
-        equal(worlds, [data], [0])
+        live(worlds, [model] * N, 42)
 
 
 @pytest.mark.parametrize("every", [1, 4])
@@ -206,10 +138,12 @@ def test_a_world_that_diverges_leaves_the_others_alone(
     many.forward(worlds)
     refused((UnknownNameError, "", lambda: many.reset(worlds, ids=[1], keyframe="no such")))
     assert 1 in worlds.diverged
+    states = many.get_states(worlds)
+    assert list(states) == [0, 2, 3]
     if recorded:
         many.reset(worlds, ids=[1], keyframe=0)
     else:
-        many.set_state(worlds, 1, many.get_state(worlds, 2))
+        many.set_states(worlds, {1: states[2]})
     assert not worlds.diverged
     many.step(worlds)
     assert worlds.time.all()

@@ -15,11 +15,10 @@ from statemachine.errors import BadInputError, EngineError, UnknownNameError
 from statemachine.interface import worlds as interface_worlds
 from statemachine.worlds import LogUniform, Uniform, draw, make_worlds
 
-from .conftest import ROOT, assert_in, need_engine, opened, refused
+from .conftest import ROOT, assert_in, need_engine, refused
 from .lives import live
 from .small_models import SLEEPY, loaded, model_of
 
-FIELDS = ("qpos", "qvel", "ctrl", "time")
 FACTS = (
     "timestep", "gravity", "body_mass", "geom_friction", "actuator_kp", "actuator_kv",
     "actuator_delay", "dof_armature", "dof_damping", "dof_frictionloss",
@@ -69,31 +68,19 @@ NAMES = (
 )
 @pytest.mark.filterwarnings("ignore:PyBullet. friction of")
 def test_a_world_is_the_data_of_a_replaced_model(backend: str, name: str) -> None:
-    """Bit for bit, from a keyframe, under a command of its own."""
+    """Bit for bit, whatever becomes of them."""
     need_engine(backend)
     model = sm.load("so101/scene_box", backend=backend)
     can = model.capabilities.options
     every = {key: values for key, values in varied(model).items() if key in can}
     assert backend == "pybullet" or set(every) == set(NAMES) == set(can)
     options = every if name not in NAMES else {name: every[name]}
-    push = np.random.default_rng(2).uniform(-0.2, 0.2, (N, 6))
+    models = [
+        model.replace(**{key: values[i] for key, values in options.items()}) for i in range(N)
+    ]
     with make_worlds(model, N, workers=2, **options) as many:
-        worlds.reset(many, keyframe=0)
-        many.ctrl += push
-        worlds.step(many, 50)
-        worlds.forward(many)
-        for i in range(N):
-            with opened(
-                model.replace(**{key: values[i] for key, values in options.items()}), keyframe=0
-            ) as (one, data):
-                data.ctrl += push[i]
-                sm.step(one, data, 50)
-                sm.forward(one, data)
-                for field in (*FIELDS, *many.derived):
-                    np.testing.assert_array_equal(getattr(many, field)[i], getattr(data, field))
-                state = worlds.get_state(many, i)  # whose layout is that of its latency
-                assert state == sm.get_state(one, data)
-                worlds.set_state(many, i, state)
+        live(many, models, 16)
+        for i, one in enumerate(models):
             for fact in FACTS:
                 got, wanted = (getattr(each, fact) for each in (many.model_of(i), one))
                 np.testing.assert_array_equal(got, wanted, err_msg=fact)
