@@ -213,6 +213,18 @@ def around(owner: Any, name: str) -> Callable[[Callable[..., Any]], Patch]:
     return decorate
 
 
+def followed_by(owner: Any, name: str, act: Callable[..., object]) -> Patch:
+    """A fault at the end of a function: what is done then, with its arguments. See `around`."""
+
+    @around(owner, name)
+    def faulty(right: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+        result = right(*arguments, **named)
+        act(*arguments)
+        return result
+
+    return faulty
+
+
 def bits(data: Data) -> list[bytes]:
     """Everything that a Data says."""
     found = []

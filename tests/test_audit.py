@@ -39,6 +39,7 @@ from .conftest import (
     assert_has,
     assert_in,
     bullet_clients,
+    followed_by,
     need_engine,
     refused,
     registered,
@@ -325,42 +326,18 @@ def broken(findings: Iterable[AuditFinding]) -> set[tuple[str, str]]:
     return {(each.layer, each.case) for each in findings if not each.holds}
 
 
-def after(name: str, act: Callable[[MujocoData], None]) -> Patch:
-    """A fault in a method of MujocoData: something happens at its end."""
-
-    @around(MujocoData, name)
-    def faulty(right: Any, self: MujocoData, *arguments: Any) -> Any:
-        result = right(self, *arguments)
-        act(self)
-        return result
-
-    return faulty
-
-
-def nudge(data: Any) -> None:
+def nudge(data: Any, *_: Any) -> None:
     """The smallest change there is, of one velocity."""
     raw = data.raw if isinstance(data, sm.Data) else data
     raw.qvel[0] = np.nextafter(raw.qvel[0], 10.0)
 
 
-def forget_warm_start(data: MujocoData) -> None:
+def forget_warm_start(data: MujocoData, *_: Any) -> None:
     data.raw.qacc_warmstart[:] = 0
 
 
-def leave_a_force(data: MujocoData) -> None:
+def leave_a_force(data: MujocoData, *_: Any) -> None:
     data.raw.qfrc_applied[1] = 1e-9
-
-
-@around(lambda: require("mujoco"), "mj_forward")
-def forward_of_the_engine_perturbs(right: Any, model: Any, data: Any) -> None:
-    right(model, data)
-    nudge(data)
-
-
-@around(MujocoData, "_recompute")
-def forward_takes_a_step(right: Any, self: MujocoData) -> None:
-    self._advance(self._raw_model, self._raw)
-    right(self)
 
 
 @around(MujocoDriver, "advance")
@@ -425,29 +402,37 @@ STATE = "get_state, set_state"
 FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
     "a restore forgets the warm start": (
         "restore",
-        after("_set_state", forget_warm_start),
+        followed_by(MujocoData, "_set_state", forget_warm_start),
         ("interface", STATE),
     ),
     "a restore leaves a force": (
         "restore",
-        after("_set_state", leave_a_force),
+        followed_by(MujocoData, "_set_state", leave_a_force),
         ("interface", STATE),
     ),
-    "a save perturbs": ("look", after("_get_state", nudge), ("interface", "get_state")),
-    "forward perturbs": ("look", after("_recompute", nudge), ("interface", "forward")),
+    "a save perturbs": (
+        "look",
+        followed_by(MujocoData, "_get_state", nudge),
+        ("interface", "get_state"),
+    ),
+    "forward perturbs": (
+        "look",
+        followed_by(MujocoData, "_recompute", nudge),
+        ("interface", "forward"),
+    ),
     "forward of the engine perturbs": (
         "look",
-        forward_of_the_engine_perturbs,
+        followed_by(lambda: require("mujoco"), "mj_forward", lambda _, data: nudge(data)),
         ("engine", "mj_forward"),
     ),
     "forward takes a step": (
         "look",
-        forward_takes_a_step,
+        followed_by(MujocoData, "_recompute", lambda d: d._advance(d._raw_model, d._raw)),
         ("interface", "forward"),
     ),
     "a read perturbs": (
         "look",
-        after("_find_contacts", nudge),
+        followed_by(MujocoData, "_find_contacts", nudge),
         ("interface", "reading what is derived"),
     ),
     "a read of PyBullet perturbs": (
@@ -463,7 +448,7 @@ FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
     ),
     "reset leaves a force": (
         "reset",
-        after("_reset", leave_a_force),
+        followed_by(MujocoData, "_reset", leave_a_force),
         ("interface", "a used one, reset"),
     ),
     "the engine is not deterministic": ("again", noise, ("engine", "in a new one")),
@@ -504,13 +489,10 @@ def test_without_a_fault_nothing_is_found(question: str, backend: str) -> None:
 
 def test_an_engine_whose_restore_drops_the_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the engine itself it is a fact; of the interface on it, a broken promise."""
-
-    @around(require("mujoco"), "mj_setState")
-    def faulty(right: Any, model: Any, data: Any, *rest: Any) -> None:
-        right(model, data, *rest)
-        data.qacc_warmstart[:] = 0
-
-    faulty(monkeypatch)
+    forget = followed_by(
+        require("mujoco"), "mj_setState", lambda _, data, *state: data.qacc_warmstart.fill(0)
+    )
+    forget(monkeypatch)
     found = asked("restore")
     engine = conclude([each for each in found if each.layer == "engine"])
     assert engine.suffice == ("mj_copyData",)
@@ -533,14 +515,10 @@ def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.Monk
 @pytest.mark.slow
 def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     """This one does, always in the same way: only the other one can tell."""
-
-    @around(MujocoDriver, "start")
-    def faulty(right: Any, self: MujocoDriver, machine: Any, point: Any) -> None:
-        right(self, machine, point)
-        machine.qfrc_applied[1] = 1e-9
-
-    after("_set_state", leave_a_force)(monkeypatch)
-    faulty(monkeypatch)
+    followed_by(MujocoData, "_set_state", leave_a_force)(monkeypatch)
+    followed_by(MujocoDriver, "start", lambda _, raw, __: raw.qfrc_applied.put(1, 1e-9))(
+        monkeypatch
+    )
     result = audit.run(sm.load(SCENE), steps=10)
     engine, interface = result.audited
     assert {each.experiment for each in engine.findings if not each.holds} == {"process"}
@@ -617,7 +595,7 @@ def test_the_command_fits_the_terminal(cli: Cli, backend: str) -> None:
 def test_a_broken_promise_is_exit_code_1(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    after("_set_state", forget_warm_start)(monkeypatch)
+    followed_by(MujocoData, "_set_state", forget_warm_start)(monkeypatch)
     assert main(["audit", "--steps", "10"]) == 1
     assert "yes, broken" in capsys.readouterr().out
 

@@ -41,6 +41,7 @@ from .conftest import (
     Patch,
     around,
     bullet_clients,
+    followed_by,
     in_its_own_python,
     need_engine,
     refused,
@@ -322,12 +323,6 @@ def without_a_motor(right: Any, *words: Any, physicsClientId: int, **named: Any)
     return body
 
 
-@around(mujoco, "mj_step")
-def recomputing_step(right: Any, model: Any, data: Any, nstep: int = 1) -> None:
-    right(model, data, nstep)
-    mujoco().mj_forward(model, data)
-
-
 @around(pybullet, "stepSimulation")
 def recomputing_step_of_pybullet(right: Any, client: int) -> None:
     right(client)
@@ -357,10 +352,10 @@ def reset_keeps_time(right: Any, model: Any, data: Any) -> None:
     data.time = time
 
 
-@around(mujoco, "mj_setState")
-def restore_loses_the_warm_start(right: Any, model: Any, data: Any, *state: Any) -> None:
-    right(model, data, *state)
-    data.qacc_warmstart[:] = 0
+recomputing_step = followed_by(mujoco, "mj_step", lambda *of: mujoco().mj_forward(*of[:2]))
+cold_restore = followed_by(
+    mujoco, "mj_setState", lambda _, data, *state: data.qacc_warmstart.fill(0)
+)
 
 
 def no_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -422,11 +417,11 @@ OTHERWISE: dict[str, tuple[tuple[Patch, ...], str, str, dict[str, str]]] = {
         "reset", "mujoco", {"mj_resetData": "keeps time, gravity, timestep, bodies"},
     ),
     "a restore that loses the warm start": (
-        (restore_loses_the_warm_start,),
+        (cold_restore,),
         "save", "mujoco", {"mjSTATE_INTEGRATION": "forgets warm start, gravity, timestep"},
     ),
     "a future without the warm start": (
-        (restore_loses_the_warm_start,), "future", "mujoco", {"mjSTATE_INTEGRATION": "differs"}
+        (cold_restore,), "future", "mujoco", {"mjSTATE_INTEGRATION": "differs"}
     ),
     # Then positions and velocities are all that there is.
     "no warm start at all": (

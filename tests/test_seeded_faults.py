@@ -24,7 +24,7 @@ from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
 from statemachine.interface import Model, State, read_only
 
-from .conftest import Patch, around, need_engine, refused, registered
+from .conftest import Patch, around, followed_by, need_engine, refused, registered
 from .pybullet_faults import PYBULLET_FAULTS
 
 
@@ -44,42 +44,11 @@ def a_read_recomputes(right: Any, self: MujocoData, name: str) -> np.ndarray:
     return right(self, name)
 
 
-@around(MujocoData, "_reset")
-def reset_keeps_the_time(right: Any, self: MujocoData, key: int | None) -> None:
-    time = self.raw.time
-    right(self, key)
-    self.raw.time = time
-
-
-@around(MujocoData, "_reset")
-def reset_computes(right: Any, self: MujocoData, key: int | None) -> None:
-    right(self, key)
-    mujoco.mj_forward(self._home.raw, self.raw)
-
-
-@around(MujocoData, "_reset")
-def keyframe_forgets_ctrl(right: Any, self: MujocoData, key: int | None) -> None:
-    right(self, key)
-    self.raw.ctrl[:] = 0
-
-
 @around(MujocoData, "_set_state")
 def state_forgets_the_commands(right: Any, self: MujocoData, state: State) -> None:
     kept = self.raw.history.copy()
     right(self, state)
     self.raw.history[:] = kept
-
-
-@around(MujocoData, "_set_state")
-def state_forgets_the_warm_start(right: Any, self: MujocoData, state: State) -> None:
-    right(self, state)
-    self.raw.qacc_warmstart[:] = 0
-
-
-@around(MujocoData, "_find_contacts")
-def contact_normal_the_other_way(right: Any, self: MujocoData) -> Any:
-    found = right(self)
-    return dataclasses.replace(found, geom=found.geom[:, ::-1].copy())
 
 
 def _damp_bodies(raw: Any, by: float) -> None:
@@ -97,18 +66,6 @@ def changes_with(*names: str) -> Patch:
         return {name: value for name, value in right(raw, options).items() if name not in names}
 
     return faulty
-
-
-@around(MujocoData, "_reset")
-def fresh_arrays_each_time(right: Any, self: MujocoData, key: int | None) -> None:
-    right(self, key)
-    object.__setattr__(self, "qpos", self.raw.qpos[:])
-
-
-@around(MujocoModel, "__init__")
-def no_ctrl_clamp(right: Any, self: MujocoModel, raw: Any, *rest: Any, **named: Any) -> None:
-    right(self, raw, *rest, **named)
-    raw.actuator_ctrllimited[:] = 0  # behind the back of the Model's own ranges
 
 
 def contacts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patch:
@@ -144,11 +101,22 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
         mutants.step_and_forward,
         {"a_step_leaves_values_of_the_state_before"},
     ),
-    "reset keeps the time": (reset_keeps_the_time, {"time_passes_only_in_step"}),
-    "reset computes": (reset_computes, {"fresh_and_reset_are_zero"}),
-    "keyframe forgets ctrl": (keyframe_forgets_ctrl, {"keyframes_are_taken_whole"}),
+    "reset keeps the time": (
+        followed_by(MujocoData, "_reset", lambda data, _: setattr(data.raw, "time", 5.0)),
+        {"time_passes_only_in_step"},
+    ),
+    "reset computes": (
+        followed_by(
+            MujocoData, "_reset", lambda data, _: mujoco.mj_forward(data._home.raw, data.raw)
+        ),
+        {"fresh_and_reset_are_zero"},
+    ),
+    "keyframe forgets ctrl": (
+        followed_by(MujocoData, "_reset", lambda data, _: data.raw.ctrl.fill(0)),
+        {"keyframes_are_taken_whole"},
+    ),
     "state forgets the warm start": (
-        state_forgets_the_warm_start,
+        followed_by(MujocoData, "_set_state", lambda data, _: data.raw.qacc_warmstart.fill(0)),
         {"restored_futures_agree", "forward_depends_on_the_state_alone"},
     ),
     "recovery leaves the counters": (
@@ -164,7 +132,7 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
         {"forces_balance_at_rest"},
     ),
     "contact normal the other way": (
-        contact_normal_the_other_way,
+        contacts_with("geom", lambda geom: geom[:, ::-1].copy()),
         {"contact_carries_the_weight"},
     ),
     "default motor left on": (mutants.motor_left_on, {"options_do_what_they_say"}),
@@ -203,7 +171,12 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
         state_forgets_the_commands,
         {"a_state_has_the_commands_on_their_way"},
     ),
-    "inputs are new arrays": (fresh_arrays_each_time, {"inputs_are_the_same_arrays_for_life"}),
+    "inputs are new arrays": (
+        followed_by(
+            MujocoData, "_reset", lambda data, _: object.__setattr__(data, "qpos", data.raw.qpos[:])
+        ),
+        {"inputs_are_the_same_arrays_for_life"},
+    ),
     "acceleration negated": (
         derived("qacc", lambda _, qacc: read_only(-qacc)),
         {"acceleration_is_the_rate_of_velocity", "a_force_accelerates_by_the_armature"},
@@ -229,7 +202,12 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
         facts_with("jnt_limited", np.logical_not),
         {"facts_are_the_files"},
     ),
-    "ctrl is not clamped": (no_ctrl_clamp, {"ctrl_is_clamped_inside"}),
+    "ctrl is not clamped": (
+        followed_by(
+            MujocoModel, "__init__", lambda model, *_: model.raw.actuator_ctrllimited.fill(0)
+        ),
+        {"ctrl_is_clamped_inside"},
+    ),
 }
 
 
