@@ -427,11 +427,6 @@ def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
 # Mistakes that were met.
 
 
-def test_a_file_that_is_no_trace_is_taken_for_no_experiment(here: Cli, tmp_path: Path) -> None:
-    (tmp_path / "waves.csv").write_text("time\n")
-    one_line(here("compare", tmp_path / "waves.csv"), "a trace ends in .npz or .parquet")
-
-
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no /proc")
 def test_a_place_that_refuses_is_named_and_no_other(cli: Cli) -> None:
     done = cli("trace", "record", "droop", "--seconds", "0.1", "-o", "/proc/droop.npz")

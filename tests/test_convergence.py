@@ -13,9 +13,9 @@ from statemachine.compare.convergence import convergence
 from statemachine.errors import EndedEarlyError
 from statemachine.page import Figures
 from statemachine.report.steps import convergence as page
-from statemachine.runs import Trace, record, write
+from statemachine.runs import Trace, record
 
-from .conftest import Cli, one_line, refused, written
+from .conftest import Cli, refused, written
 from .small_models import FALLING_BAR
 
 
@@ -108,9 +108,3 @@ def test_the_command_line_answers_both_questions(cli: Cli) -> None:
     told = json.loads(cli(*asked, "--one-step", "--json").stdout)
     assert told["first"] is None
     assert [stage["stage"] for stage in told["stages"]][:2] == ["kinematics", "mass matrix"]
-
-
-def test_recorded_runs_have_no_step_to_take_again(here: Cli, tmp_path: Path) -> None:
-    file = write(record(sm.load("so101"), seconds=0.1), tmp_path / "a.npz")
-    one_line(here("compare", file, file, "--one-step"), "runs both sides")
-    one_line(here("compare", file, file, "--uncertainty", "1mm"), "recorded run")

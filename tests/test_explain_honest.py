@@ -13,8 +13,6 @@ import statemachine as sm
 from statemachine.cli import main
 from statemachine.runs import read, record, write
 
-from .conftest import Cli, one_line
-
 ARM = """
 <mujoco model="arm"><option integrator="implicitfast"/><worldbody>
 <body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="{damping}"/>
@@ -37,8 +35,6 @@ USUAL = {
 FUNCTIONS = """
 import numpy as np
 
-_draw = np.random.default_rng()
-
 def none(model, data):
     return None
 
@@ -47,9 +43,6 @@ def wave(model, data):
 
 def sensed(model, data):
     return [0.3 - 0.2 * data.raw.sensordata[0]]
-
-def drawn(model, data):
-    return [float(_draw.normal())]
 
 def pushed(model, data):
     data.raw.xfrc_applied[1, 0] = np.sin(6 * data.time) / (1 + 10 * data.qpos[0] ** 2)
@@ -208,14 +201,6 @@ def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
     (folder / "r.xml").write_text(text, encoding="utf-8")
     one, two = (sm.load(folder / name) for name in ("l.xml", "r.xml"))
     assert sensors_of(match_models(one, two, {"j1": "hinge"})) == []
-
-
-def test_a_function_that_draws_without_a_seed_has_no_causes(folder: Path, here: Cli) -> None:
-    file(folder, "l.xml")
-    one_line(
-        here("compare", "f.py:drawn", "l.xml", "l.xml", "damping=0.5", "--why"),
-        "does not command the same twice",
-    )
 
 
 def test_forces_of_a_function_leave_no_open_loop(folder: Path, capsys: Any) -> None:

@@ -60,7 +60,6 @@ from .conftest import (
     assert_not_in,
     lesson_result,
     of_python,
-    one_line,
     refused,
     with_figures,
     written,
@@ -838,4 +837,3 @@ def test_pictures_of_a_lesson(tmp_path: Path, here: Cli) -> None:
     assert [here(*words, file).returncode for file in files] == [0, 0]
     assert "distance to the goal" in files[0].read_text(encoding="utf-8")
     assert files[0].read_bytes() == files[1].read_bytes()
-    one_line(here(*words, tmp_path / "hold.txt"), ".svg")

@@ -87,6 +87,8 @@ COMMANDS = [
     ("conventions", 0, "not asked"),
     ("conventions --calls", 0, "not asked"),
     ("conventions quaternion", 0, "not asked"),
+    ("conventions quaternion --json", 0, f'"{NAME}": null'),
+    ("conventions --calls --json", 0, f'"{NAME}": []'),
     _slow("audit --steps 3", 0, f"{NAME} itself, by its own functions, was not asked."),
     _slow("audit --steps 3", 0, f"this interface on {NAME}"),
     _slow(f"check {ROOT}/exercises/step_loop.py", SAYS_NO, f"step_loop.py on {NAME}"),

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from statemachine import load
+from statemachine.runs import record, write
+
 from .conftest import ROOT, Cli, one_line, written_all
 from .small_models import BENT, TWO_LINKS, TWO_SERVOS
 
@@ -17,6 +20,18 @@ def controller(model, data):
 def late(model, data):
     if data.time > 0.1:
         return 1 / 0
+"""
+
+FUNCTIONS = """
+import numpy as np
+
+_draw = np.random.default_rng()
+
+def hold(model, data):
+    return [0.4, 0]
+
+def drawn(model, data):
+    return [float(_draw.normal()), 0.0]
 """
 
 
@@ -33,7 +48,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "bad.urdf": "<robot",
             "heavy.xml": arm.replace('mass="0.2"', 'mass="0.4"'),
             "turned.xml": arm.replace("".join(TWO_SERVOS), "".join(reversed(TWO_SERVOS))),
-            "own.py": "def hold(model, data):\n    return [0.4, 0]\n",
+            "own.py": FUNCTIONS,
+            "empty.xml": "<mujoco/>",
+            "waves.csv": "time\n",
             "c.py": CONTROLLERS,
             "e.py": "def controller(:",
             "picture.py": "\x89PNG\0\0",
@@ -41,6 +58,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         },
     )
     (made / "empty").mkdir()
+    write(record(load("so101"), seconds=0.05), made / "run.npz")
     (made / "folder.svg").mkdir()
     return made
 
@@ -212,6 +230,24 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("compare hold --every 2", "--every goes with FILE.py:FUNCTION"),
         ("compare hold so101 so101 --keyframe x", "--keyframe goes with FILE.py:FUNCTION"),
         ("compare own.py:hold arm.xml arm.xml --every 0", "at least 1; got 0"),
+        (
+            "compare own.py:drawn arm.xml arm.xml damping=0.5 --why",
+            "does not command the same twice",
+        ),
+        ("compare waves.csv", "a trace ends in .npz or .parquet"),
+        (
+            "compare waves --why --model empty.xml --seconds 0.1 --backends mujoco mujoco",
+            "nothing in it can move",
+        ),
+        ("compare run.npz run.npz --one-step", "runs both sides"),
+        ("compare run.npz run.npz --uncertainty 1mm", "recorded run"),
+        ("compare run.npz run.npz --seconds 1", "--seconds is of a run"),
+        ("compare run.npz run.npz --timestep 0.01", "--timestep"),
+        ("compare run.npz run.npz --defaults engine", "--defaults"),
+        ("compare run.npz run.npz --backends mujoco mujoco", "--backends"),
+        ("compare run.npz --seed 3", "--seed"),
+        ("lesson state --record mine.json", "needs a terminal that asks"),
+        ("lesson hold --no-questions --plot hold.txt", ".svg"),
         ("view --seconds 0.1 --keyframe hled", "Did you mean 'held'"),
         ("view --seconds 0.1 --keyframe 7", "7"),
         ("view --seconds 0.1 --port 70000", "70000"),

@@ -386,20 +386,6 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
 # The command.
 
 
-@pytest.mark.parametrize(
-    ("words", "module", "extra"),
-    [
-        (("--plot", "a.svg"), "matplotlib", "[plot]"),
-        (("--film", "a.webp"), "PIL", "[render]"),
-        (("--film", "a.mp4"), "imageio_ffmpeg", "[mp4]"),
-    ],
-)
-def test_an_extra_that_is_missing_is_named_before_anything_runs(
-    cli: Cli, without: Any, words: tuple[str, ...], module: str, extra: str
-) -> None:
-    one_line(cli("compare", "hold", *words, **without(module)), extra, 3)
-
-
 def _two_files(tmp_path: Path, sides: tuple[sm.Model, Trace, Trace]) -> tuple[str, str]:
     for name, trace in zip(("one.npz", "two.npz"), sides[1:], strict=True):
         write(trace, tmp_path / name)

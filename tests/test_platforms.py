@@ -136,14 +136,6 @@ def test_what_is_installed_needs_no_compiler(platform: str, python: str) -> None
         assert found[name] == version or not version
 
 
-def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str]) -> None:
-    done = cli("lesson", "gravity", "--backend", "pybullet", **without_pybullet, code=3)
-    (line,) = done.stderr.splitlines()
-    here = installed.wheel_here(ENGINES["pybullet"])
-    assert (f"pip install {here.requirement} " if here else "no wheel for") in line
-    assert "CPython 3.11 to 3.13" in line
-
-
 def test_what_to_install_depends_on_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """On another machine, as far as Python tells, on which no engine is installed."""
     nothing = Mock(side_effect=importlib.metadata.PackageNotFoundError("nothing"))

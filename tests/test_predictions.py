@@ -12,7 +12,7 @@ from statemachine.errors import BadInputError
 from statemachine.page import Question
 from statemachine.report.quiz import RecordedReader
 
-from .conftest import Cli, assert_in, one_line, refused, written
+from .conftest import assert_in, refused, written
 from .test_lessons import _at_a_terminal
 
 ONE = Question("how many?", ("1", "2"), 1, "counted")
@@ -54,14 +54,6 @@ def test_another_file_is_not_overwritten(tmp_path: Path, text: str) -> None:
     file = written(tmp_path / "mine.json", text)
     refused((BadInputError, "no record of predictions", lambda: RecordedReader(file)))
     assert file.read_text() == text
-
-
-def test_nobody_there_to_answer(cli: Cli, tmp_path: Path) -> None:
-    one_line(
-        cli("lesson", "state", "--record", str(tmp_path / "mine.json")),
-        "needs a terminal that asks",
-    )
-    assert not (tmp_path / "mine.json").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")

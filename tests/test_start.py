@@ -106,25 +106,38 @@ def test_a_clash_of_import_names_is_said_in_one_line(
 
 
 @pytest.mark.parametrize(
-    ("engine", "content", "words"),
+    ("command", "module", "content", "says"),
     [
-        ("pinocchio", None, "pip install pin"),
-        ("pinocchio", "test = 1", "is not the engine"),
-        ("mujoco", "raise ImportError('libGL.so.1: cannot open')", "libGL.so.1"),
+        ("fingertip", "pinocchio", None, "pip install pin"),
+        ("fingertip", "pinocchio", "test = 1", "is not the engine"),
         (
+            "fingertip",
             "pinocchio",
             "raise ImportError('libgomp.so.1: no such file')",
             "apt-get install libgomp1",
         ),
-        ("mujoco", "import nonexistent_dependency", "nonexistent_dependency"),
+        ("lesson state", "mujoco", "raise ImportError('libGL.so.1: cannot open')", "libGL.so.1"),
+        ("lesson state", "mujoco", "import nonexistent_dependency", "nonexistent_dependency"),
+        ("lesson state --backend pybullet", "pybullet", None, "CPython 3.11 to 3.13"),
+        ("compare hold --why", "pybullet", None, "pybullet is not installed"),
+        ("conventions --backend pybullet", "pybullet", None, "pybullet is not installed"),
+        ("conventions --calls --backend mujoco", "mujoco", None, "mujoco is not installed"),
+        ("view", "viser", None, "pip install 'statemachine-sim[view]'"),
+        *(
+            pytest.param(f"compare hold {words}", module, None, extra, marks=pytest.mark.slow)
+            for words, module, extra in (
+                ("--plot a.svg", "matplotlib", "[plot]"),
+                ("--film a.webp", "PIL", "[render]"),
+                ("--film a.mp4", "imageio_ffmpeg", "[mp4]"),
+            )
+        ),
     ],
 )
-def test_a_missing_or_broken_engine_is_one_line(
-    cli: Cli, without: Any, engine: str, content: str | None, words: str
+def test_what_is_missing_or_broken_is_one_line(
+    cli: Cli, without: Any, command: str, module: str, content: str | None, says: str
 ) -> None:
-    environment = without(engine) if content is None else without(**{engine: content})
-    command = ["fingertip"] if engine == "pinocchio" else ["lesson", "state"]
-    one_line(cli(*command, **environment), words, 3)
+    environment = without(module) if content is None else without(**{module: content})
+    one_line(cli(*command.split(), **environment), says, 3)
 
 
 def test_an_interrupt_is_no_engine_that_does_not_load(monkeypatch: pytest.MonkeyPatch) -> None:

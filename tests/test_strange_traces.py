@@ -22,7 +22,7 @@ from statemachine.report import compare as report
 from statemachine.runs import Trace, model_file, read, record, write
 from statemachine.runs.whole import check_place, replace_file
 
-from .conftest import Cli, assert_has, one_line, refused, shown
+from .conftest import Cli, assert_has, refused, shown
 from .small_models import TWO_NAMELESS, model_of
 
 
@@ -190,18 +190,6 @@ def test_a_name_from_a_file_does_nothing_to_a_terminal(
         assert not {"\x1b", "\x07", "\u202e"} & set(text)
 
 
-def test_options_of_a_run_are_refused_with_traces(box: Trace, tmp_path: Path, here: Cli) -> None:
-    path = str(write(box, tmp_path / "box.npz"))
-    for words in (
-        (path, path, "--seconds", "1"),
-        (path, path, "--timestep", "0.01"),
-        (path, path, "--defaults", "engine"),
-        (path, path, "--backends", "mujoco", "mujoco"),
-        (path, "--seed", "3"),
-    ):
-        one_line(here("compare", *words), "")
-
-
 def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
 ) -> None:
@@ -241,13 +229,6 @@ def test_the_command_of_a_played_trace_says_what_was_asked(
     assert read(out).header.command == (
         "statemachine trace play box.npz --backend mujoco --defaults engine --model scene_box"
     )
-
-
-@pytest.mark.usefixtures("bullet")
-def test_why_of_what_cannot_move_is_one_line(tmp_path: Path, here: Cli) -> None:
-    (tmp_path / "empty.xml").write_text("<mujoco/>")
-    words = ("--why", "--model", tmp_path / "empty.xml", "--seconds", "0.1")
-    one_line(here("compare", "waves", *words), "nothing in it can move")
 
 
 def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Model) -> None:

@@ -34,7 +34,7 @@ from statemachine.view.session import (
 )
 from statemachine.view.viser_front import readout, warning
 
-from .conftest import ROOT, assert_has, assert_in, in_its_own_python, one_line, opened, refused
+from .conftest import ROOT, assert_has, assert_in, opened, refused
 from .small_models import ODD_DRIVES, model_of, on_both
 
 SCENE = "so101/scene_box"
@@ -551,14 +551,6 @@ def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(
     port = str(_free_pair())
     with Viewer(tmp_path, str(file), str(file), "--port", port, "--seconds", "0.3") as viewer:
         assert_in(viewer.end(), "box of so101/scene_box", f"mujoco {mujoco_box.engine_version}")
-
-
-def test_without_viser_the_extra_is_named(tmp_path: Path) -> None:
-    code = (
-        "import sys; sys.modules['viser'] = None\n"
-        "from statemachine.cli import main; sys.exit(main(['view']))"
-    )
-    one_line(in_its_own_python(code, ROOT), "pip install 'statemachine-sim[view]'", 3)
 
 
 def test_nobody_opens_a_tunnel_from_here(monkeypatch: pytest.MonkeyPatch) -> None:

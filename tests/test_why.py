@@ -26,10 +26,8 @@ from statemachine.runs.scenarios import Scenario, scenario
 
 from .conftest import (
     ROOT,
-    Cli,
     assert_has,
     need_engine,
-    one_line,
     opened,
     refused,
     registered,
@@ -641,8 +639,3 @@ def test_no_gap_is_nothing_to_explain(arm: Model) -> None:
 
 
 # The command
-
-
-def test_without_pybullet_one_line_says_so(cli: Cli, without_pybullet: dict[str, str]) -> None:
-    done = cli("compare", "hold", "--why", **without_pybullet)
-    one_line(done, "pip install pybullet", code=3)
