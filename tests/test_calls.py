@@ -21,7 +21,6 @@ import pytest
 
 from statemachine import backends, installed
 from statemachine.backends.mujoco_backend import MujocoData
-from statemachine.cli import main
 from statemachine.engines.call_watch import CLOSED, NEW
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.page import Figures, Page, Table
@@ -444,11 +443,6 @@ def test_every_call_of_the_backend_says_its_client() -> None:
         assert place in (None, watched._BEFORE_CLIENT[name]), name
 
 
-@around(MujocoData, "_recompute")
-def forward_that_steps(_right: Any, self: Any) -> None:
-    mujoco.mj_step(self._home.raw, self.raw)
-
-
 @around(mujoco, "mj_forward")
 def write_in_a_call(right: Any, model: Any, data: Any) -> None:
     right(model, data)
@@ -461,6 +455,11 @@ def write_beside_a_call(_right: Any, self: Any) -> None:
     mujoco.mj_forward(self._home.raw, self.raw)
     self.raw.qvel[2] = 1e-300
     mujoco.mj_forward(self._home.raw, self.raw)
+
+
+forward_that_steps = around(MujocoData, "_recompute")(
+    lambda _right, self: mujoco.mj_step(self._home.raw, self.raw)
+)
 
 
 @pytest.mark.parametrize(
@@ -520,16 +519,6 @@ def test_what_cannot_be_recorded_is_refused() -> None:
     refused((BadInputError, "on pybullet", lambda: record(other, "mujoco")))
     nested = 'from statemachine.probes.calls import record\nrecord("", "mujoco")'
     assert "cannot record another" in str(record(nested, "mujoco").error)
-
-
-def test_a_lesson_on_a_backend_whose_calls_nobody_knows(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """It is taken, and the page says that the calls are missing."""
-    monkeypatch.setattr(backends, "_BACKENDS", dict(backends._BACKENDS))
-    backends.register("twin", "statemachine.backends.mujoco_backend:load")
-    assert main(("lesson", "forward", "--backend", "twin", "--calls", "--no-questions")) == 0
-    assert "twin: not asked which of its own functions it ran." in capsys.readouterr().out
 
 
 def test_statements_are_those_that_were_typed() -> None:

@@ -42,13 +42,6 @@ def test_the_same_seed_draws_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     assert seen[:20] == seen[20:40] != seen[40:]
 
 
-def test_a_binary_model_that_is_not_refused_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    plain = sm.load
-    monkeypatch.setenv("XDG_CACHE_HOME", "")  # which the target sets
-    monkeypatch.setattr(sm, "load", lambda file: plain(file) if file.suffix == ".xml" else None)
-    assert len(mjb.run(1, 4).failures) == 3
-
-
 # A step that looks for no other thread; MuJoCo lets go of Python's lock within it.
 UNGUARDED = """
 import json, mujoco, statemachine as sm
@@ -65,12 +58,6 @@ def test_two_threads_in_one_data_are_found() -> None:
         assert any("others than one thread's" in line for line in json.loads(done.stdout))
     else:  # which a target's own process turns into a failure
         assert done.returncode < 0, done.stderr
-
-
-def test_a_data_that_stays_taken_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sm, "step", Mock(side_effect=BusyDataError("taken for ever")))
-    (failure,) = threads.run(1, 1).failures
-    assert failure.endswith(": refused when all threads were gone")
 
 
 BROKEN_PARSER = """
@@ -106,7 +93,12 @@ whole.beside = files.beside = beside
 
 
 BLIND_READER = "import statemachine as sm\nsm.load = sm.Kinematics = lambda *a, **k: {}[a]"
+_LOAD = sm.load
 PATCHES: dict[str, list[tuple[Any, str, Any]]] = {
+    "a binary model is not refused": [
+        (sm, "load", lambda file: _LOAD(file) if file.suffix == ".xml" else None),
+    ],
+    "a data stays taken": [(sm, "step", Mock(side_effect=BusyDataError("taken for ever")))],
     "a digest is not looked at": [
         (formats, "_digest", lambda _text, _columns: "0" * 64),
         (traces, "_CHANGES", [traces._flip] * 3),
@@ -127,6 +119,8 @@ PATCHES: dict[str, list[tuple[Any, str, Any]]] = {
     ("fault", "target", "tries", "says"),
     [
         ("a digest is not looked at", traces, 40, "other numbers"),
+        ("a binary model is not refused", mjb, 4, ""),
+        ("a data stays taken", threads, 1, ": refused when all threads were gone"),
         pytest.param("a command line ends in a traceback", command_lines, 4, "traceback",
                      marks=pytest.mark.slow),
         pytest.param("a reader of models fails", models, 2, "KeyError", marks=pytest.mark.slow),
@@ -137,6 +131,7 @@ def test_a_fault_is_found(
     fault: str, target: Any, tries: int, says: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("pyarrow")
+    monkeypatch.setenv("XDG_CACHE_HOME", "")  # which a target sets
     for patch in PATCHES[fault]:
         monkeypatch.setattr(*patch)
     assert any(says in line for line in target.run(1, tries).failures)

@@ -77,6 +77,7 @@ COMMANDS = [
     ("lesson forward", 0, NAME),
     ("lesson hold", 0, NAME),
     ("lesson hold --json", 0, f'"{NAME}": {{'),
+    ("lesson forward --calls", 0, "not asked which of its own functions it ran"),
     _slow("lesson gravity --seconds 0.5 --longer 0", 0, NAME),
     ("lesson reset", 0, NAME),
     ("lesson replay --steps 100", 0, NAME),

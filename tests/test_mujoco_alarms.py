@@ -18,7 +18,7 @@ import statemachine as sm
 from statemachine.backends import _mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
-from .conftest import ROOT, assert_has, opened, refused, runs_in_silence
+from .conftest import assert_has, opened, refused, runs_in_silence
 from .small_models import SLIDE, TWO_SLIDES, crowded, model_of
 
 
@@ -78,7 +78,9 @@ def test_the_handler_of_somebody_else_hears_all() -> None:
         assert len(heard) == before
 
 
-def test_the_handler_comes_back_with_the_last_data() -> None:
+def test_the_handler_comes_back_with_the_last_data_and_nothing_is_printed(
+    tmp_path: Path,
+) -> None:
     """In a process of its own, where no other Data lives."""
     code = """
 import mujoco, numpy as np, statemachine as sm
@@ -90,6 +92,13 @@ for handler in (None, theirs):
     assert mujoco.get_mju_user_warning() is handler
     first, second = sm.make_data(model), sm.make_data(model)
     assert mujoco.get_mju_user_warning() is not handler
+    second.qpos[0] = np.nan
+    try:
+        sm.step(model, second, 10)
+    except sm.errors.DivergedError:
+        pass
+    else:
+        raise SystemExit("it did not diverge")
     first.close()
     assert mujoco.get_mju_user_warning() is not handler
     del first, second
@@ -99,7 +108,8 @@ mujoco.set_mju_user_warning(print)
 del data
 assert mujoco.get_mju_user_warning() is print
 """
-    runs_in_silence(code, ROOT)
+    runs_in_silence(code, tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 def test_handlers_that_are_saved_and_restored_pile_up_nothing() -> None:

@@ -334,22 +334,6 @@ def test_without_pyarrow_one_line_names_the_extra(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_write_that_fails_leaves_what_was_there(
-    tmp_path: Path, box: Trace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = write(box, tmp_path / "box.npz")
-    before = path.read_bytes()
-
-    def full(file: Any, **_arrays: Any) -> None:
-        file.write(b"half")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(np, "savez_compressed", full)
-    refused((OSError, "No space", lambda: write(box, path)))
-    assert path.read_bytes() == before
-    assert [file.name for file in tmp_path.iterdir()] == ["box.npz"]
-
-
 def test_what_is_no_trace_at_all(tmp_path: Path, box: Trace) -> None:
     good = write(box, tmp_path / "box.npz").read_bytes()
     (tmp_path / "folder.npz").mkdir()

@@ -61,18 +61,23 @@ def model(box: sm.Model) -> sm.Model:
     return box
 
 
-def _meanwhile(
-    data: sm.Data, use: Callable[[], object], hook: str = "_advance"
-) -> list[BaseException | None]:
-    """Let another thread use something in the middle of the next step; what it raised."""
-    place: Any = data if hook == "_advance" else type(data)
-    put = object.__setattr__ if place is data else type.__setattr__
+def meanwhile(of: Any, use: Callable[[], object], hook: str) -> list[BaseException | None]:
+    """Let another thread use something in the middle of the next step; what it raised.
+
+    Args:
+        of: A Data, or Worlds.
+        use: What the thread does.
+        hook: What is called in the middle: `_advance` of the object, or a method of its class.
+    """
+    place: Any = of if hook == "_advance" else type(of)
+    put = object.__setattr__ if place is of else type.__setattr__
     right, raised = getattr(place, hook), []
 
-    def hooked(*args: object) -> None:
+    def hooked(*args: object) -> object:
         put(place, hook, right)
-        right(*args)
+        result = right(*args)
         raised.append(raised_in_a_thread(use))
+        return result
 
     put(place, hook, hooked)
     return raised
@@ -85,7 +90,7 @@ def test_a_second_thread_is_refused_while_one_steps_or_resets(
 ) -> None:
     """And the Data is not one that diverged: it is only in the middle of something."""
     with opened(model, 0, nstep=20) as (_, data), opened(model, 0, nstep=20) as (_, alone):
-        raised = _meanwhile(data, lambda: USES[name](model, data), hook)
+        raised = meanwhile(data, lambda: USES[name](model, data), hook)
         for each in (data, alone):
             USES[verb](model, each)
             sm.step(model, each, 3)
@@ -111,7 +116,7 @@ def test_another_data_is_not_refused(model: sm.Model) -> None:
             assert other.qacc.any()
             after(model, 1)
 
-        raised = _meanwhile(data, use)
+        raised = meanwhile(data, use, "_advance")
         sm.step(model, data)
         assert raised == [None]
 

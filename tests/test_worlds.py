@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import pickle
-import threading
 import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -31,9 +29,10 @@ from statemachine.errors import (
     UnsupportedError,
 )
 
-from .conftest import SHARED, opened, refused, runs_in_silence, shared, started
+from .conftest import ROOT, SHARED, opened, refused, runs_in_silence, shared, started
 from .lives import equal, live
 from .small_models import RICH, loaded, model_of
+from .test_turns import meanwhile
 
 N = 4
 
@@ -330,49 +329,33 @@ def test_closed_worlds_keep_their_inputs_and_refuse(box: sm.Model) -> None:
     )
 
 
-def test_one_thread_at_a_time(worlds: many.Worlds) -> None:
-    entered, leave = threading.Event(), threading.Event()
-    hook = worlds._step
-
-    def waiting(*question: Any) -> Any:
-        entered.set()
-        assert leave.wait(30)
-        return hook(*question)
-
-    worlds._step = waiting  # type: ignore[method-assign]
-    thread = threading.Thread(target=many.step, args=(worlds,))
-    thread.start()
-    try:
-        assert entered.wait(30)
-        busy = BusyDataError, "another thread is using this Worlds"
-        uses = many.forward, many.reset, lambda w: many.get_state(w, 0)
-        refused(*((*busy, partial(use, worlds)) for use in uses))
-    finally:
-        leave.set()
-        thread.join()
-    assert worlds.time.all()
-    many.reset(worlds)
+@pytest.mark.parametrize("use", [many.forward, many.reset, many.get_states])
+def test_one_thread_at_a_time(worlds: many.Worlds, use: Callable[[many.Worlds], object]) -> None:
+    raised: Any = meanwhile(worlds, partial(use, worlds), "_step")
+    many.step(worlds)
+    assert [type(error) for error in raised] == [BusyDataError]
+    assert "another thread is using this Worlds" in str(raised[0])
+    use(worlds)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
-def test_worlds_belong_to_the_process_that_made_them(worlds: many.Worlds) -> None:
-    def child(answers: Any) -> None:
-        try:
-            many.step(worlds)
-        except BusyDataError as error:
-            answers.put(str(error))
+def test_worlds_belong_to_the_process_that_made_them(backend: str) -> None:
+    code = f"""
+import os, statemachine as sm
+from statemachine.worlds import make_worlds, step
+worlds = make_worlds(sm.load("so101", backend="{backend}"), 4, workers=2)
+if not os.fork():
+    try:
+        step(worlds)
+    except sm.errors.BusyDataError as error:
         worlds.close()
-
-    context = multiprocessing.get_context("fork")
-    answers = context.Queue()
-    process = context.Process(target=child, args=(answers,))
-    process.start()
-    assert "another process" in answers.get(timeout=30)
-    process.join(30)
-    assert process.exitcode == 0
-    many.step(worlds)
-    assert worlds.time.all()
+        os._exit("another process" not in str(error))
+    os._exit(2)
+assert os.wait()[1] == 0
+step(worlds)
+assert worlds.time.all()
+"""
+    runs_in_silence(code, ROOT)
 
 
 @pytest.mark.parametrize("substeps", [1, 2])
