@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from statemachine.page import Figures
 from statemachine.report.steps import convergence as page
 from statemachine.runs import Trace, record
 
-from .conftest import Cli, refused, written
+from .conftest import refused, written
 from .small_models import FALLING_BAR
 
 
@@ -92,19 +91,3 @@ def test_a_run_that_ends_early_is_no_limit(tmp_path: Path) -> None:
         return trace, trace
 
     refused((EndedEarlyError, "it left every bound", lambda: convergence(run)))
-
-
-@pytest.mark.usefixtures("bullet")
-@pytest.mark.slow
-def test_the_command_line_answers_both_questions(cli: Cli) -> None:
-    asked = ("compare", "fall", "--seconds", "0.3")
-    told = json.loads(cli(*asked, "--converge", "--json").stdout)
-    assert told["vanishes"]
-    # Two sides of one engine; the change is named.
-    heavy = cli(
-        "compare", "waves", "so101", "so101", "damping=1", "--seconds", "0.2", "--one-step", code=1
-    )
-    assert "stage of a step that differs is “passive”" in " ".join(heavy.stdout.split())
-    told = json.loads(cli(*asked, "--one-step", "--json").stdout)
-    assert told["first"] is None
-    assert [stage["stage"] for stage in told["stages"]][:2] == ["kinematics", "mass matrix"]

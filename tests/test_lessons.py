@@ -57,7 +57,6 @@ from .conftest import (
     Cli,
     assert_has,
     assert_in,
-    assert_not_in,
     lesson_result,
     of_python,
     refused,
@@ -500,14 +499,6 @@ def test_a_reset_of_a_model_that_lacks_something(cli: Cli, tmp_path: Path, body:
 
 
 @pytest.mark.slow
-def test_calls_beside_a_lesson(cli: Cli, backend: str) -> None:
-    done = cli("lesson", "forward", "--backend", backend, "--calls", code=0)
-    assert {"mujoco": "mj_forward", "pybullet": "getLinkStates"}[backend] in done.stdout
-    assert max(map(cell_len, done.stdout.splitlines())) <= 80
-    assert "own words" not in cli("lesson", "questions", "--calls").stdout
-
-
-@pytest.mark.slow
 def test_our_keyframe_holds_the_box(backend: str) -> None:
     held, pickup = _take("reset", backend)[1].result.scenes
     assert_has(held, held=True, on_world=0, robot_steps=held.nstep)
@@ -520,17 +511,6 @@ def test_real_time_is_the_loops_affair(cli: Cli) -> None:
     done = cli("lesson", "time", "--realtime", "--seconds", "0.8", code=0)
     assert time.monotonic() - began >= 0.8
     assert_in(done.stdout, "s simulated in", "the waiting is yours", "0.8 s of simulated time")
-
-
-@pytest.mark.slow
-def test_the_whole_path_piped(cli: Cli) -> None:
-    done = cli("lesson", code=0)
-    assert done.stderr == ""
-    numbers = re.findall(r"^(\d+) of 10, ", done.stdout, re.MULTILINE)
-    assert numbers == [str(k) for k in range(1, 11)]
-    assert max(map(cell_len, done.stdout.splitlines())) <= 80
-    assert_not_in(done.stdout, "\x1b", "Your prediction")
-    assert "exercises/step_loop.py" in done.stdout
 
 
 @pytest.mark.usefixtures("bullet")

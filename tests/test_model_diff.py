@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rich.cells import cell_len
 
 from statemachine import load
 from statemachine.compare.models import compare, read, split
@@ -24,7 +23,7 @@ from statemachine.models import models_dir
 from statemachine.page import Figures
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, assert_has, refused, written, written_all
+from .conftest import assert_has, refused, written, written_all
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -531,14 +530,6 @@ def test_what_an_import_drops() -> None:
 def test_split() -> None:
     assert split("so101@pybullet") == ("so101", "pybullet")
     assert split("a@b/so101.xml") == ("a@b/so101.xml", None)
-
-
-@pytest.mark.slow
-def test_the_command(cli: Cli, tmp_path: Path) -> None:
-    same = cli("compare", "--models", "so101", "so101", code=0)
-    assert "nothing differs that matters, to 6 digits" in same.stdout
-    assert max(map(cell_len, same.stdout.splitlines())) <= 80
-    assert cli("compare", "--models", "so101", "so101/scene_box", "--all").returncode == 1
 
 
 def test_frames_that_were_given(pair: Pair) -> None:

@@ -22,9 +22,7 @@ from statemachine.report.grading import mutants_page
 
 from .conftest import (
     ROOT,
-    Cli,
     assert_has,
-    assert_in,
     of_python,
     opened,
     refused,
@@ -344,16 +342,9 @@ def test_the_page_keeps_to_its_columns() -> None:
     )
     page = mutants_page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
     assert not page.holds
-    assert max(map(cell_len, shown(page).splitlines())) <= 80
-
-
-@pytest.mark.slow
-def test_the_command_says_what_survives(cli: Cli) -> None:
-    only = ("--only", "xyzw", "--only", "degrees")
-    done = cli("check", "--mutants", str(EXERCISE), *only)
-    assert (done.returncode, done.stderr) == (1, "")
-    assert_in(done.stdout, "1 of 2 faults caught", MUTANTS["xyzw"].hint)
-    assert cli("check", "--mutants", str(EXERCISE), *only[2:]).returncode == 0
+    text = shown(page)
+    assert max(map(cell_len, text.splitlines())) <= 80
+    assert MUTANTS["xyzw"].hint in " ".join(text.split())
 
 
 def test_without_pytest_it_says_what_to_install(

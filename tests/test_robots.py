@@ -38,7 +38,6 @@ from statemachine.runs.scenarios import scenario
 
 from .conftest import (
     ROOT,
-    Cli,
     assert_has,
     assert_in,
     need_engine,
@@ -365,17 +364,6 @@ def test_a_page_of_80_columns() -> None:
     out = shown(page(Survey("mujoco", (ROW,), (), "w")))
     assert_in(out, "pybullet refuses it: it has a tendon", "pybullet warns: RK4")
     assert max(map(len, out.splitlines())) <= 80
-
-
-@pytest.mark.slow
-def test_the_command(cli: Cli, folder: Path) -> None:
-    done = cli("robots", str(folder), "--quick", "--json", "--jobs", "2", code=0)
-    told = json.loads(done.stdout)
-    assert {"default", "models", "parts", "made_with", "wrong"} == set(told)
-    row = told["models"][0]
-    assert {"file", "sha256", "nq", "backends", "witness", "faults", "ended"} <= set(row)
-    done = cli("robots", str(folder / "good.xml"), "--quick", code=0)
-    assert "gap without contacts" in done.stdout
 
 
 @pytest.mark.slow
