@@ -84,20 +84,6 @@ def test_what_touches_at_first(
         assert _touching(model, data) == touching
 
 
-@pytest.mark.slow
-def test_a_replay_of_20000_steps_is_bit_identical(box: sm.Model) -> None:
-    runs = set()
-    with sm.make_data(box) as used, sm.make_data(box) as new:
-        for data in (used, new, used):
-            sm.reset(box, data, keyframe=0)
-            start = data.ctrl[0]
-            for k in range(20_000):
-                data.ctrl[0] = start + 0.3 * np.sin(0.01 * k)
-                sm.step(box, data)
-            runs.add(sm.get_state(box, data))
-    assert len(runs) == 1
-
-
 def test_meshes_are_what_the_script_makes(tmp_path: Path) -> None:
     folder = ARM.parent / "look"
     spec: Any = importlib.util.spec_from_file_location("make_meshes", folder / "make_meshes.py")

@@ -7,10 +7,8 @@ import importlib
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -213,23 +211,6 @@ def test_a_body_of_the_scene_is_not_taken_for_the_robot(here: Cli) -> None:
     assert min(found["touches"].values()) > 0.5
     held = _json(here, "lesson", "hold", "--model", "so101/scene_box")["mujoco"]
     assert held["first_contact"] > 0.2
-
-
-def test_ctrl_c_ends_a_long_run() -> None:
-    run = subprocess.Popen(
-        [sys.executable, "-m", "statemachine", "lesson", "speed", "--steps", "9000000"],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # Ignored where the tests run in the background of a shell, and that is inherited.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
-    )
-    time.sleep(2.0)
-    run.send_signal(signal.SIGINT)
-    _, errors = run.communicate(timeout=30)
-    assert run.returncode == 130
-    assert "Traceback" not in errors
 
 
 @pytest.mark.parametrize("command", ["", "lesson state", "lesson state --json", "doctor --json"])

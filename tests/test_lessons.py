@@ -600,7 +600,7 @@ _LATER = "Go on later with: statemachine lesson --from "
             *("--from state", [(_ASKED, "a\n"), (_MORE, "q\n")], {"more": False}),
             *(f"{_LATER}state", "3 of 10"),
         ),
-        ("--from 9", [(_ASKED, "q\n")], {}, f"9 of 10.*{_LATER}time", "10 of 10"),
+        ("--from 9", [(_ASKED, "q\n")], {}, f"9 of 10.*{_LATER}time", "10 of 10|Where to go next"),
         (
             "",
             [
@@ -729,17 +729,6 @@ def short_path(monkeypatch: pytest.MonkeyPatch) -> None:
         lambda *_: (Page("t", "o", [Question("q", ("a", "b"), 0, "because")]), {}),
     )
     monkeypatch.setattr(quiz, "can_ask", lambda: True)
-
-
-@pytest.mark.usefixtures("short_path")
-def test_nothing_follows_where_the_reader_stopped(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("builtins.input", Mock(side_effect=quiz.Stopped))
-    assert main(["lesson"]) == 0
-    said = capsys.readouterr().out
-    assert "Go on later with: statemachine lesson --from objects" in said
-    assert "Where to go next" not in said
 
 
 @pytest.mark.usefixtures("short_path", "pinocchio")

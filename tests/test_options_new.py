@@ -99,10 +99,6 @@ def test_options_add_up_and_their_order_does_not_count(box: sm.Model, order: int
     np.testing.assert_array_equal(once.geom_friction[:, 1:], box.geom_friction[:, 1:])
 
 
-def test_load_takes_them_too(backend: str) -> None:
-    assert (sm.load("so101", backend=backend, kp=500).actuator_kp == 500).all()
-
-
 @pytest.mark.usefixtures("bullet")
 def test_pybullet_says_which_frictions_it_cannot_have() -> None:
     """It multiplies the frictions of two links; MuJoCo takes the larger."""

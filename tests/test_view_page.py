@@ -172,8 +172,9 @@ def test_run_pause_step_and_reset(stage: Stage) -> None:
     for factor in ("0.5", "1"):
         speed.fill(factor)
         stage.until(lambda wanted=float(factor): stage.session.speed == wanted)
-    session._arms[0][1].qvel[:] = 1e200
     stage.press("Run")
+    stage.until(lambda: session.running)
+    session._arms[0][1].qvel[:] = 1e200
     line = stage.tab.get_by_text("Reset to go on.")
     stage.until(lambda: line.count() == 1)
     assert line.inner_text().startswith("mujoco: ")
