@@ -17,8 +17,7 @@ from statemachine.compare.why.gap import Ruler
 from statemachine.errors import BadInputError
 from statemachine.page import Figures
 from statemachine.report import compare as report
-from statemachine.runs import Trace
-from statemachine.runs.rerun import Rerun
+from statemachine.runs import Rerun, Trace
 
 from .conftest import Cli, refused, shown
 from .small_models import DOUBLE_PENDULUM, PENDULUM, TILTED_BOX, model_of

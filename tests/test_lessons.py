@@ -49,7 +49,7 @@ from statemachine.page import (
 )
 from statemachine.report import quiz
 from statemachine.report import terminal as bar
-from statemachine.runs.rerun import record_scenario
+from statemachine.runs import record_scenario
 from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import (

@@ -15,7 +15,7 @@ from statemachine.compare.why import explain
 from statemachine.errors import BadInputError
 from statemachine.page import Figures
 from statemachine.report.steps import one_step as page
-from statemachine.runs.rerun import Rerun
+from statemachine.runs import Rerun
 from statemachine.runs.scenarios import scenario
 
 from .conftest import assert_has, assert_in, refused

@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from statemachine import robots
 from statemachine.backends import load
 from statemachine.errors import BadInputError
 from statemachine.report.robots import page
@@ -29,7 +30,6 @@ from statemachine.robots import (
     examine_all,
     find,
     gaps,
-    many,
 )
 from statemachine.robots.records import read_table, write_table
 from statemachine.runs import record_scenario
@@ -396,7 +396,7 @@ def test_an_interrupt_leaves_a_table_and_no_process(
 
 
 def test_versions_and_settings_are_part_of_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    quick, whole = many._made_with(True, 0), many._made_with(False, 1)
+    quick, whole = robots._made_with(True, 0), robots._made_with(False, 1)
     assert quick.endswith(", quick")
     assert_in(whole, "seed 1", "mujoco")
 

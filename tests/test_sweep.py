@@ -761,7 +761,7 @@ def test_a_worker_with_another_version_or_file_is_told_of(policy: str) -> None:
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("statemachine.sweep.drive._PATIENCE", 0.5)
+    monkeypatch.setattr("statemachine.sweep._PATIENCE", 0.5)
     refused(
         (
             BadInputError,

@@ -116,7 +116,7 @@ def test_a_cause_is_found_on_another_engine_too(arm: Model) -> None:
 
 
 def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = importlib.import_module("statemachine.runs.rerun")
+    module = importlib.import_module("statemachine.runs")
     made, record = [], module.record
     monkeypatch.setattr(module, "record", lambda *a, **k: made.append(1) or record(*a, **k))
     result = explain(arm, arm.replace(gravity=[0, 0, -9]), HOLD, uncertain=None, jobs=1)

@@ -42,7 +42,7 @@ GUARDED = {
     ("processes/parallel.py", "SIG_BLOCK"),
     ("processes/parallel.py", "SIG_SETMASK"),
     ("processes/parallel.py", "pthread_sigmask"),
-    ("processes/pipes.py", "register_at_fork"),
+    ("processes/__init__.py", "register_at_fork"),
 }
 
 

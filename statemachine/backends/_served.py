@@ -17,7 +17,7 @@ from ..errors import EngineError
 from ..installed import DEFAULT, engine_version
 from ..interface import DERIVED, Array, Contacts
 from ..interface.options import HUGE
-from ..processes.pipes import PipedChild
+from ..processes import PipedChild
 from ..releases import is_release, version_of
 from . import _child_server
 from ._hidden_world import HiddenWorld, Memory, Moment, Read

@@ -14,7 +14,7 @@ Two engines that agree prove nothing; neither side is the truth.
 
 from __future__ import annotations
 
-from ..runs.rerun import Rerun, rerun_of
+from ..runs import Rerun, rerun_of
 from .agreement import Agreement, Comparison, SideRun, compare, witness
 from .labels import Labels, labels_of
 from .perturbed import Uncertainty, chaos_floor, perturbed_runs

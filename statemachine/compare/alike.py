@@ -11,9 +11,8 @@ import numpy as np
 from ..backends import load
 from ..errors import StateMachineError, TraceError
 from ..interface import Array, Data, Model
-from ..runs import Trace, model_file
+from ..runs import SideStart, Trace, model_file, start_of
 from ..runs.recorder import layout_of
-from ..runs.rerun import SideStart, start_of
 from ..runs.scenarios import Controller
 from .matching import Matched, Pairs, match_models
 from .sides import Request, Side

@@ -23,7 +23,7 @@ from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
 from ..interface import Array, Model, State
 from ..rotations import HERE
-from ..runs.rerun import SideStart
+from ..runs import SideStart
 
 Only = Mapping[str, tuple[str, ...]]
 _ONE_PLACE = 1e-6  # [m] within which two sites without a common name are one

@@ -17,9 +17,9 @@ import numpy as np
 from ..errors import BadInputError, DivergedError, UnsupportedError
 from ..interface import Array, Data, Model, State, get_state, make_data, reset, set_state, step
 from ..page import Figures
+from ..runs import Rerun
 from ..runs.drive import Progress, silent
 from ..runs.recorder import put_row
-from ..runs.rerun import Rerun
 from .matching import Matched, match_models
 from .stages import AFTER, FORCE, FOUND, STAGES, StageMeasure, StageReader, StepReading, measures
 

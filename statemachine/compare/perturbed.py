@@ -18,9 +18,8 @@ from ..interface import Array, Data, Ints, JointType, Model
 from ..measures import amount, common_moments
 from ..page import Figures
 from ..rotations import times
-from ..runs import Trace
+from ..runs import Rerun, Trace, beginning_with
 from ..runs.drive import Progress, part_of, silent
-from ..runs.rerun import Rerun, beginning_with
 from ..runs.scenarios import Controller
 from .agreement import Agreement, Comparison
 from .series import series, touches

@@ -14,9 +14,21 @@ from ..installed import DEFAULT
 from ..interface import Model
 from ..measures import common_moments
 from ..measures.text import command, milliseconds
-from ..runs import Trace, model_file, play, read, shipped
+from ..runs import (
+    Rerun,
+    SideStart,
+    Trace,
+    beginning_with,
+    commands_of,
+    model_file,
+    play,
+    read,
+    replayed,
+    rerun_of,
+    shipped,
+    start_of,
+)
 from ..runs.drive import Progress, check_length, part_of, silent, steps_in
-from ..runs.rerun import Rerun, SideStart, beginning_with, commands_of, replayed, rerun_of, start_of
 from ..runs.scenarios import SCENARIOS, Controller, Scenario
 from .alike import (
     called,

@@ -29,8 +29,7 @@ from ..drawing.scene import Camera, Motion, Pixels, compose, smaller
 from ..errors import EngineError, MissingEngineError, check_name
 from ..installed import DEFAULT, require
 from ..interface import Array
-from ..processes import fresh_python
-from ..processes.pipes import PipedChild
+from ..processes import PipedChild, fresh_python
 from . import room, rooms_with
 
 _BIAS = 2  # pixels that the ghost must be nearer by than the solid side before it is seen

@@ -29,6 +29,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from . import signal_name
+
 GB = 1024**3
 # Address space, of which engines reserve far more than they use.
 MEMORY_MOST = 4 * GB
@@ -161,14 +163,6 @@ def run(
         "flood": f"prints more than {_FLOOD >> 20} MB, and was ended there",
     }
     return ProcessOutcome(end, code, is_ready or started(), *texts, took, used, words[end])  # pyright: ignore
-
-
-def signal_name(number: int) -> str:
-    """The name of the signal that ended a process."""
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
 
 
 def limit_cpu(seconds: float, trace: IO[str]) -> None:

@@ -29,7 +29,7 @@ from ..installed import require_extra
 from ..interface import Array, Model
 from ..measures import nearest
 from ..page import Figures, Picture, RobotPicture
-from ..processes.pipes import last_line
+from ..processes import last_line
 from ..runs import Trace
 from ..runs.drive import Progress, silent
 from ..runs.whole import beside, replace_file

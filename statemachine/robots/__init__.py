@@ -9,8 +9,30 @@ row, and not the table.
 
 from __future__ import annotations
 
-from .many import ModelFile, examine_all, find
-from .records import BackendRow, ExaminedModel, RunGap, Survey, WitnessRow
+import hashlib
+import os
+import pickle
+import platform
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from xml.etree import ElementTree
+
+from .. import __version__
+from ..errors import MissingEngineError, refuse
+from ..installed import DEFAULT, ENGINES, engine_version, require
+from ..models import SUFFIXES
+from ..processes import ALONE, checked_jobs, fresh_python, sandbox
+from ..processes.parallel import in_parallel, unwinding
+from ..runs.drive import Progress, silent
+from ..runs.header import model_digest, model_files
+from .gaps import STEPS
+from .records import BackendRow, ExaminedModel, RunGap, Survey, WitnessRow, read_table, write_table
 
 __all__ = [
     "BackendRow",
@@ -22,3 +44,240 @@ __all__ = [
     "examine_all",
     "find",
 ]
+
+
+# Models among files and folders, each in a process of its own, into a table that is resumed.
+
+_ROOTS = (DEFAULT, "robot")  # of MJCF, whose root is called after its engine, and of URDF
+_BINARY = ".mjb"
+_START = 65536  # bytes in which a file that is no XML may say what it was meant to be
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A file that is a model, or a part of one.
+
+    Attributes:
+        name: What it is called in the table.
+        path: Where it is.
+        sha256: Digest of it and of what it includes; "" where it cannot be read.
+        part_of: The first file found that includes it; "" for none.
+    """
+
+    name: str
+    path: Path
+    sha256: str
+    part_of: str = ""
+
+
+def find(paths: Sequence[str | os.PathLike[str]]) -> list[ModelFile]:
+    """The models among files and folders, in an order that does not change.
+
+    In a folder, and in all below it, each MJCF and URDF is one; a binary model must be named.
+    A file without bodies, itself or in what it includes, is left out.
+
+    Raises:
+        BadInputError: A path is not there, or nothing is found at all.
+    """
+    files: dict[Path, tuple[str, Path]] = {}  # what each is called, and where it was found
+    for given in map(Path, paths):
+        is_file = given.is_file()
+        wrong_end = f"{given} is no model: it does not end in {', '.join(SUFFIXES)}"
+        refuse(
+            (not is_file and not given.is_dir(), f"there is no file or folder {given}"),
+            (is_file and given.suffix.lower() not in SUFFIXES, wrong_end),
+        )
+        for file in [given] if is_file else _below(given):
+            name = (file.relative_to(given) if len(paths) == 1 and not is_file else file).as_posix()
+            files.setdefault(file.resolve(), (name, file))
+    refuse((not files, f"no models (MJCF or URDF) in {', '.join(map(str, paths))}"))
+    owners: dict[Path, str] = {}
+    for name, file in files.values():
+        with suppress(ValueError, OSError):
+            for part in list(model_files(file))[1:]:  # what it includes
+                owners.setdefault(part.resolve(), name)
+    return [
+        ModelFile(name, file.absolute(), _digest(file), owners.get(place, ""))
+        for place, (name, file) in files.items()
+    ]
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    for file in sorted(folder.rglob("*")):
+        parts = file.relative_to(folder).parts
+        if any(part.startswith(".") or part in ("__pycache__", "__MACOSX") for part in parts):
+            continue
+        if file.suffix.lower() in SUFFIXES and file.suffix.lower() != _BINARY and file.is_file():
+            root = _root(file)
+            if root in _ROOTS and (root == "robot" or _has_bodies(file)):
+                yield file
+
+
+def _root(file: Path) -> str:
+    """The name of a file's root element; of one that is no XML, what it begins to be; or ""."""
+    try:
+        for _, element in ElementTree.iterparse(file, events=("start",)):
+            return element.tag
+    except (ElementTree.ParseError, UnicodeError, ValueError):
+        pass
+    except OSError:
+        return ""
+    with file.open("rb") as content:
+        start = content.read(_START)
+    return next((root for root in _ROOTS if f"<{root}".encode() in start), "")
+
+
+def _has_bodies(file: Path) -> bool:
+    """Whether a body is in an MJCF, or in what it includes; one that is no XML may have."""
+    try:
+        return any(
+            element.tag in ("body", "attach", "replicate", "composite", "flexcomp")
+            for part in model_files(file)
+            for _, element in ElementTree.iterparse(part, events=("start",))
+        )
+    except (ElementTree.ParseError, UnicodeError, ValueError, OSError):
+        return True
+
+
+def _digest(file: Path) -> str:
+    with suppress(ValueError, OSError):
+        return model_digest(file)
+    with suppress(OSError):
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    return ""
+
+
+SECONDS = 60.0  # for a model
+_MEMORY = 8 * sandbox.GB  # address space, of which engines reserve far more than they use
+
+
+def examine_all(
+    models: Sequence[ModelFile],
+    *,
+    quick: bool = False,
+    seconds: float = SECONDS,
+    jobs: int | None = None,
+    seed: int = 0,
+    table: Path | None = None,
+    progress: Progress = silent,
+) -> Survey:
+    """Examine every model, several at once.
+
+    Args:
+        models: From `find`.
+        quick: Whether to leave out scenarios and costs.
+        seconds: What each may take on the clock.
+        jobs: How many at once; by default one for each processor.
+        seed: Of the commands and poses that are drawn.
+        table: A .csv or .json file that is written anew after each model. What it says already of
+            the same content, made with the same versions and settings, is taken over.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: `seconds`, `jobs` or `seed` is no such number, or `table` is there and no
+            such table.
+        MissingEngineError: The default engine is not installed here.
+    """
+    jobs = checked_jobs(jobs)
+    refuse(
+        (
+            not 0 < seconds <= 86400,
+            f"seconds must be above 0, and at most 86400; got {seconds:g}",
+        ),
+        (seed < 0, f"seed must not be negative; got {seed}"),
+    )
+    require(DEFAULT)
+    made_with = _made_with(quick, seed)
+    before = read_table(table) if table is not None and table.exists() else {}
+    rows: dict[str, ExaminedModel] = {}
+    work: dict[str, Callable[[], ExaminedModel | None]] = {}
+    stop = threading.Event()
+    for model in models:
+        known = before.get((model.name, model.sha256, made_with))
+        if known is not None and not (known.ended and known.limit != seconds):
+            rows[model.name] = replace(known, part_of=model.part_of)
+        else:
+            work[model.name] = partial(
+                _examined, model, made_with, quick=quick, seconds=seconds, seed=seed, stop=stop
+            )
+
+    def in_order() -> list[ExaminedModel]:
+        return [rows[model.name] for model in models if model.name in rows]
+
+    def ended(name: str, row: ExaminedModel | None) -> None:
+        if row is None:  # it was stopped
+            return
+        rows[name] = row
+        if table is not None:
+            write_table(table, in_order())
+
+    with unwinding():
+        in_parallel(
+            work, jobs, ended, stop.set, lambda left: progress(1 - left / max(1, len(models)))
+        )
+    done = in_order()
+    if table is not None:
+        write_table(table, done)
+    return Survey(
+        DEFAULT,
+        tuple(row for row in done if row.is_model),
+        tuple(row for row in done if not row.is_model),
+        made_with,
+    )
+
+
+def _made_with(quick: bool, seed: int) -> str:
+    """Versions and settings, in one line."""
+    versions = [f"statemachine {__version__}", f"python {platform.python_version()}"]
+    for name in ENGINES:
+        with suppress(MissingEngineError):
+            versions.append(f"{name} {engine_version(name)}")
+    return f"{', '.join(versions)}; {STEPS} steps, seed {seed}{', quick' if quick else ''}"
+
+
+def _examined(
+    model: ModelFile,
+    made_with: str,
+    *,
+    quick: bool,
+    seconds: float,
+    seed: int,
+    stop: threading.Event,
+) -> ExaminedModel | None:
+    """A model's row, from a process of its own; None if stopped."""
+    if stop.is_set():
+        return None
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder:
+        answer = Path(folder) / "answer"
+        words = os.fspath(model.path), "quick" * quick, str(seed), os.fspath(answer)
+        command, environment = fresh_python(f"{__package__}.examine:main", *words)
+        outcome = sandbox.run(
+            command,
+            cpu=4 * seconds + 60,
+            wall=seconds,
+            cwd=folder,  # engines leave logs where they run
+            env={**environment, **ALONE},
+            memory_most=_MEMORY,
+            stop=stop,
+        )
+        if stop.is_set():
+            return None
+        part, row = "start", ExaminedModel("", "", "")
+        with suppress(OSError):
+            part, row = pickle.loads(answer.read_bytes())
+    ended = ""
+    if outcome.end != "code" or outcome.code or part:
+        said = outcome.stderr.strip().splitlines() if outcome.end == "code" else []
+        ended = f"its process failed: {said[-1][:200]}" if said else f"it {outcome.how}"
+        ended += f" (at: {part or 'the end'})"
+    return replace(
+        row,
+        file=model.name,
+        sha256=model.sha256,
+        made_with=made_with,
+        part_of=model.part_of,
+        ended=ended,
+        limit=seconds,
+        took=round(time.monotonic() - began, 1),
+    )

@@ -17,9 +17,9 @@ from ..measures import JointPlaces
 from ..processes import checked_jobs
 from ..runs.controllers import function_file, is_function
 from ..runs.drive import Progress, silent
+from . import run_apart
 from .analysis_data import Runs, SweepData, gap_between, read_runs
 from .design import Value, Vary
-from .drive import run_apart
 from .prepare import prepared
 from .request import DESIGN, REQUEST, PreparedSweep, Sweep, SweepCell, own_value
 from .rows import require_parquet, schema_of

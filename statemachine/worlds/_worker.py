@@ -34,8 +34,7 @@ from typing import Any, TypeVar
 
 from .. import backends
 from ..errors import EngineError, shown
-from ..processes import end_with_parent, fresh_python
-from ..processes.pipes import PipedChild, await_message
+from ..processes import PipedChild, await_message, end_with_parent, fresh_python
 from ._holder import Holder, StepStopped, arrays_in
 
 T = TypeVar("T")

@@ -18,7 +18,7 @@ from ...installed import DEFAULT
 from ...interface import Model
 from ...measures import farthest
 from ...page import Figures
-from ...runs.rerun import SideStart
+from ...runs import SideStart
 from ..matching import Matched
 
 START, COMMANDS, ORDER = "start", "commands", "order of ctrl"  # of the run itself

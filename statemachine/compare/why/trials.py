@@ -23,8 +23,7 @@ from ...measures import Deviation
 from ...page import Figures
 from ...processes import checked_jobs
 from ...processes.parallel import forks_for, in_forks
-from ...runs import Trace
-from ...runs.rerun import Rerun, SideStart, beginning_with, commands_of, start_of
+from ...runs import Rerun, SideStart, Trace, beginning_with, commands_of, start_of
 from ...runs.scenarios import Controller, Scenario
 from ..alike import commands_alike, controller_for_right, translated
 from ..matching import Matched

@@ -40,8 +40,7 @@ from ...interface import (
     step,
 )
 from ...measures.quantities import readings
-from ...processes import fresh_python
-from ...processes.pipes import last_line
+from ...processes import fresh_python, last_line
 from .trials import AuditFinding, against_run, finding_of
 
 # The moments at which a run is saved: at rest, in motion, mid-contact, at a limit.
