@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -257,24 +257,23 @@ def judge_all(
                 entries[submission.name] = entry
             work[submission.name] = partial(_entry, judge, submission, entry, tests)
 
-        def in_order() -> list[ClassEntry]:
-            return [entries[name] for name in work if name in entries]
-
-        def ended(name: str, entry: ClassEntry) -> None:
-            entries[name] = entry
+        def kept(judged: Mapping[str, ClassEntry]) -> list[ClassEntry]:
+            """The entries so far in their order, of which the table is made."""
+            both = {**entries, **judged}
+            in_order = [both[name] for name in work if name in both]
             if table is not None:
-                replace_csv(table, rows_of(in_order()))
+                replace_csv(table, rows_of(in_order))
+            return in_order
 
-        in_parallel(
-            work,
-            jobs,
-            ended,
-            stop=judge.stop.set,
-            progress=lambda waiting: progress(1 - waiting / len(submitted)),
+        return kept(
+            in_parallel(
+                work,
+                jobs,
+                judge.stop.set,
+                lambda waiting: progress(1 - waiting / len(submitted)),
+                kept,
+            )
         )
-    if table is not None:
-        replace_csv(table, rows_of(in_order()))
-    return in_order()
 
 
 def _entry(

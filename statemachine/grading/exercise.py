@@ -191,7 +191,7 @@ class ExerciseJudge(ExitStack):
         self, copy: _Copy, folder: Path, progress: Callable[[float], None]
     ) -> tuple[Judgement, ...]:
         """All functions at once, so that the slowest decides how long it takes."""
-        stop, recordings = threading.Event(), dict[str, Any]()
+        stop = threading.Event()
         work: dict[str, Callable[[], Any]] = {
             name: partial(
                 record, copy.path, copy.folder, name, self.backend, self.limits, folder / name, stop
@@ -206,7 +206,7 @@ class ExerciseJudge(ExitStack):
                 stop.set()
             progress(1 - left / len(work))
 
-        in_parallel(work, len(work), recordings.__setitem__, stop.set, waiting)
+        recordings = in_parallel(work, len(work), stop.set, waiting)
         return tuple(self._judgement(copy, name, recordings[name]) for name in JUDGES)
 
     def _work_out(self) -> None:

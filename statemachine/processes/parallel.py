@@ -48,29 +48,35 @@ _work: Sequence[Callable[[], Any]] = ()  # of the forks that are made
 def in_parallel(
     work: Mapping[str, Callable[[], T]],
     jobs: int,
-    ended: Callable[[str, T], None],
     stop: Callable[[], object],
-    progress: Callable[[int], None] = lambda _: None,
-) -> None:
+    progress: Callable[[int], None] = lambda _left: None,
+    ended: Callable[[dict[str, T]], object] = lambda _results: None,
+) -> dict[str, T]:
     """Do all of it, in threads that wait for processes.
 
     Args:
         work: What to call, by name, in the order in which it is begun.
         jobs: How many are called at once.
-        ended: Called here with the name and the result of each as it ends.
         stop: Called once at the end, or when something is raised: what still runs must end then.
         progress: Told every moment how many are still waited for.
+        ended: Called here as each ends, with the results so far.
+
+    Returns:
+        The results by name, in the order in which they came.
     """
+    results: dict[str, T] = {}
     with ThreadPoolExecutor(jobs) as pool:
         try:
             waiting = {pool.submit(call): name for name, call in work.items()}
             while waiting:
                 for future in wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done:
-                    ended(waiting.pop(future), future.result())
+                    results[waiting.pop(future)] = future.result()
+                    ended(results)
                 progress(len(waiting))
         finally:
             stop()
             pool.shutdown(wait=False, cancel_futures=True)
+    return results
 
 
 @contextmanager
@@ -83,9 +89,8 @@ def worker_processes(jobs: int) -> Iterator[list[Callable[..., Future[Any]]]]:
     next has a new process.
     """
     _begin_trackers()
-    loky: Any = importlib.import_module(_LOKY)
     # An executor of several processes would lose the work of all with any one of them.
-    new = partial(loky.ProcessPoolExecutor, 1, env=ALONE)
+    new = partial(importlib.import_module(_LOKY).ProcessPoolExecutor, 1, env=ALONE)
     executors = [new() for _ in range(jobs)]
 
     def submit(worker: int, *call: Any) -> Future[Any]:

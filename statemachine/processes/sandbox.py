@@ -27,7 +27,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import IO, Literal
 
 from . import signal_name
 
@@ -146,11 +146,14 @@ def run(
         finally:  # an interrupt too
             _end_all(process, token)
             used = _reap(process)
-        texts = [_start_of(file, output_most) for file in (out, err)]
+        for file in (out, err):
+            file.seek(0)
+        texts = [file.read(output_most).decode("utf-8", "replace") for file in (out, err)]
     code = process.returncode if end == "code" else 0
     if code < 0:
         code = -code
-        end = "cpu" if _is_of_cpu(code, used, cpu) else "signal"
+        of_a_limit = code in (signal.SIGPROF, signal.SIGXCPU)
+        end = "cpu" if of_a_limit or (code == signal.SIGKILL and used >= cpu) else "signal"
     if end != "cpu" and code and re.search(_NO_MEMORY, texts[1][-2000:]):
         end = "memory"
     words = {
@@ -184,11 +187,6 @@ def limit_cpu(seconds: float, trace: IO[str]) -> None:
     last = math.ceil(time.process_time() + seconds) + 1  # where the signal was refused
     with suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_CPU, (last, last))
-
-
-def _is_of_cpu(number: int, used: float, most: float) -> bool:
-    """Whether a signal that ended a process was one of a limit of `most` seconds."""
-    return number in (signal.SIGPROF, signal.SIGXCPU) or (number == signal.SIGKILL and used >= most)
 
 
 def cpu_of(process: subprocess.Popen[bytes]) -> float:
@@ -296,8 +294,3 @@ def _relatives(leader: int, token: str) -> set[Path]:
             ):
                 relatives.add(entry)
     return relatives
-
-
-def _start_of(file: Any, most: int) -> str:
-    file.seek(0)
-    return file.read(most).decode("utf-8", "replace")

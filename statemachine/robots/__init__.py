@@ -16,7 +16,7 @@ import platform
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -201,23 +201,19 @@ def examine_all(
                 _examined, model, made_with, quick=quick, seconds=seconds, seed=seed, stop=stop
             )
 
-    def in_order() -> list[ExaminedModel]:
-        return [rows[model.name] for model in models if model.name in rows]
-
-    def ended(name: str, row: ExaminedModel | None) -> None:
-        if row is None:  # it was stopped
-            return
-        rows[name] = row
+    def kept(examined: Mapping[str, ExaminedModel | None]) -> list[ExaminedModel]:
+        """The rows so far in their order, of which the table is made."""
+        both = {**rows, **examined}
+        in_order = [row for model in models if (row := both.get(model.name))]  # None: stopped
         if table is not None:
-            write_table(table, in_order())
+            write_table(table, in_order)
+        return in_order
 
     with unwinding():
-        in_parallel(
-            work, jobs, ended, stop.set, lambda left: progress(1 - left / max(1, len(models)))
+        examined = in_parallel(
+            work, jobs, stop.set, lambda left: progress(1 - left / max(1, len(models))), kept
         )
-    done = in_order()
-    if table is not None:
-        write_table(table, done)
+    done = kept(examined)
     return Survey(
         DEFAULT,
         tuple(row for row in done if row.is_model),

@@ -152,10 +152,9 @@ def examine(
             took = healthy.outcome
             patience = _TIMES * took.cpu + _AND, _TIMES * took.wall + _CLOCK_AND
             stop, total = threading.Event(), len(mutants) + 1
-            in_parallel(
+            records = in_parallel(
                 {m.name: partial(_run, path, backend, m.name, *patience, stop) for m in mutants},
                 checked_jobs(None),
-                records.__setitem__,
                 stop.set,
                 lambda left: progress((total - left) / total),
             )
