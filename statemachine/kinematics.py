@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import BadInputError, ModelError, check_name
+from .errors import BadInputError, ModelError, check_name, refuse
 from .installed import require
 from .interface import Array, Model
 from .interface.options import as_numbers, as_vector
@@ -239,13 +239,14 @@ def shared_joints(kinematics: Kinematics, names: Sequence[str]) -> list[int]:
     own = kinematics.joint_names
     if own == tuple(names):
         return list(range(len(own)))
-    if not all(own):
-        raise BadInputError(
-            f"{kinematics.path.name} has joints without a name: they cannot be matched"
-        )
     lacking = sorted(set(own) - set(names))
-    if lacking:
-        raise BadInputError(f"the engine lacks joints of the witness: {', '.join(lacking)}")
+    refuse(
+        (
+            not all(own),
+            f"{kinematics.path.name} has joints without a name: they cannot be matched",
+        ),
+        (lacking, f"the engine lacks joints of the witness: {', '.join(lacking)}"),
+    )
     return [number for number, name in enumerate(names) if name in own]
 
 

@@ -18,7 +18,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .errors import MissingEngineError, ModelError, ModelFileError, check_name, shown, unknown_name
+from .errors import (
+    MissingEngineError,
+    ModelError,
+    ModelFileError,
+    check_name,
+    refuse,
+    shown,
+    unknown_name,
+)
 
 # Robots by name, through packages that know where public models are.
 #
@@ -198,10 +206,11 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     ours = text if "/" in text else f"{text}/{text}"
     if ours in model_names():
         return models_dir() / f"{ours}.xml"
-    if path.is_dir():
-        raise ModelFileError(f"{text} is a folder: name a file in it ({', '.join(SUFFIXES)})")
-    if path.is_file():
-        raise ModelFileError(f"model file {text} does not end in {', '.join(SUFFIXES)}")
+    refuse(
+        (path.is_dir(), f"{text} is a folder: name a file in it ({', '.join(SUFFIXES)})"),
+        (path.is_file(), f"model file {text} does not end in {', '.join(SUFFIXES)}"),
+        error=ModelFileError,
+    )
     if os.environ.get("MENAGERIE") and "/" in text:
         return _in_menagerie(text, Path(os.environ["MENAGERIE"]).expanduser())
     raise unknown_name("model", text, model_names())
@@ -211,10 +220,14 @@ def _as_text(name: str | os.PathLike[str]) -> str:
     text = os.fspath(name) if isinstance(name, os.PathLike) else name
     if not isinstance(text, str):
         raise TypeError(f"a model is given by its name or a path; got {shown(name)}")
-    if "\0" in text or not text.strip():
-        raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
-    if any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)):
-        raise ModelFileError(f"{text!r} is not UTF-8, and engines open no file of such a name")
+    refuse(
+        ("\0" in text or not text.strip(), f"{text!r} is neither the name of a model nor a path"),
+        (
+            any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)),
+            f"{text!r} is not UTF-8, and engines open no file of such a name",
+        ),
+        error=ModelFileError,
+    )
     return text
 
 

@@ -101,17 +101,20 @@ class Capabilities:
     refused: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def __str__(self) -> str:
-        lines = [f"options of replace: {', '.join(self.options)}"]
-        for reason in dict.fromkeys(self.refused.values()):
-            names = [name for name, why in self.refused.items() if why == reason]
-            lines.append(f"not {', '.join(names)}: {reason}")
-        lines.append(f"integrators: {', '.join(self.integrators) or 'as in the file'}")
-        alone = "share the compiled model" if self.shared_model else "share its description only"
-        lines.append(f"several Data of a Model {alone}")
-        if self.data_per_process is not None:
-            lines.append(f"Data that one process can hold: {self.data_per_process}")
-        for name, behaviour in self.behaviours.items():
-            lines.append(f"{name}: {behaviour.support}; {behaviour.note}")
+        refused = {
+            reason: [name for name, why in self.refused.items() if why == reason]
+            for reason in self.refused.values()
+        }
+        shared = "share the compiled model" if self.shared_model else "share its description only"
+        held = self.data_per_process
+        lines = [
+            f"options of replace: {', '.join(self.options)}",
+            *(f"not {', '.join(names)}: {reason}" for reason, names in refused.items()),
+            f"integrators: {', '.join(self.integrators) or 'as in the file'}",
+            f"several Data of a Model {shared}",
+            *([] if held is None else [f"Data that one process can hold: {held}"]),
+            *(f"{name}: {kept.support}; {kept.note}" for name, kept in self.behaviours.items()),
+        ]
         return "\n".join(lines)
 
 

@@ -192,9 +192,10 @@ def _write_columns(file: str, trace: Trace) -> None:
 
 def _write_contacts(file: str, trace: Trace) -> None:
     header = trace.header
-    labels = ["time", "geom_1", "geom_2", "body_1", "body_2", "dist"]
-    labels += [f"pos.{axis}" for axis in "xyz"]
-    labels += ["force.normal", "force.tangent_1", "force.tangent_2"]
+    labels = [
+        *("time", "geom_1", "geom_2", "body_1", "body_2", "dist", "pos.x", "pos.y", "pos.z"),
+        *("force.normal", "force.tangent_1", "force.tangent_2"),
+    ]
     columns = (
         trace[f"contact_{name}"].tolist() for name in ("row", "geom", "dist", "pos", "force")
     )

@@ -20,6 +20,7 @@ from ..errors import BadInputError, DivergedError, EngineError, StateMachineErro
 from ..installed import DEFAULT
 from ..interface import (
     DERIVED,
+    INPUTS,
     Array,
     Data,
     Model,
@@ -180,14 +181,13 @@ def _run(
     except DivergedError as error:
         if not data._trouble:  # a controller's own, of another Data
             raise
-        ended = str(error).partition(". This Data")[
-            0
-        ]  # without its advice, which is of no use here
-    inputs = {"time": np.array(times)}
-    for name, parts, width in zip(
-        ("qpos", "qvel", "ctrl"), rows, (model.nq, model.nv, model.nu), strict=True
-    ):
-        inputs[name] = np.frombuffer(b"".join(parts)).reshape(len(times), width)
+        # Without its advice, which is of no use here.
+        ended = str(error).partition(". This Data")[0]
+    kept = zip(INPUTS, rows, (model.nq, model.nv, model.nu), strict=True)
+    inputs = {"time": np.array(times)} | {
+        name: np.frombuffer(b"".join(parts)).reshape(len(times), width)
+        for name, parts, width in kept
+    }
     # The last rows may have finite numbers that no trace holds.
     state = np.hstack([inputs["qpos"], inputs["qvel"]])
     stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))

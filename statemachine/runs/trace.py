@@ -15,6 +15,7 @@ from ..errors import TraceError, refuse
 from ..interface import Array, Ints
 from ..interface.options import HUGE, index_of
 from ..measures import ContactNames, overlaps
+from ..measures.text import grouped
 from .header import COLUMNS, CONTACTS, INPUTS, Header
 
 # Bytes that a trace may unfold into: this many, or so many times the size of its file.
@@ -178,11 +179,8 @@ class Trace:
     @cached_property
     def contact_pairs(self) -> Mapping[str, Ints]:
         """Which contacts are of each pair of bodies: their places by "gripper on box"."""
-        of_pair: dict[str, list[int]] = {}
-        if "contact_geom" in self:
-            names = self._contact_names
-            for place, geoms in enumerate(self["contact_geom"].tolist()):
-                of_pair.setdefault(names.pair(*geoms), []).append(place)
+        geoms = self["contact_geom"].tolist() if "contact_geom" in self else []
+        of_pair = grouped((self._contact_names.pair(*pair), k) for k, pair in enumerate(geoms))
         return {pair: np.array(places) for pair, places in of_pair.items()}
 
     @cached_property

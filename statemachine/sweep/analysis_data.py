@@ -225,5 +225,4 @@ def median(values: Array, axis: int = -1) -> Array:
 def drawn_again(count: int) -> Iterator[Ints]:
     """Places of samples that are drawn again from `count` of them, many times: a bootstrap."""
     draw = np.random.default_rng(0)
-    for _ in range(_RESAMPLES):
-        yield draw.integers(0, count, count)
+    return (draw.integers(0, count, count) for _ in range(_RESAMPLES))

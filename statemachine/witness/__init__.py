@@ -208,9 +208,11 @@ def _read_mjcf(pin: Any, file: PlainMjcf, path: Path) -> WitnessModel:
         if frame.type in (types.BODY, types.OP_FRAME)
     }
     bodies = [frames[body.written] for body in file.bodies]
-    joints: list[tuple[str, Segment]] = []
-    for body, frame in zip(file.bodies, bodies, strict=True):
-        joints += _segments(pin, model, body, frame, path)
+    joints = [
+        segment
+        for body, frame in zip(file.bodies, bodies, strict=True)
+        for segment in _segments(pin, model, body, frame, path)
+    ]
     sites = [site for body in file.bodies for site in body.sites]
     if sum(segment.nq for _, segment in joints) != model.nq:
         raise ModelError(f"Pinocchio finds other joints in {path.name} than there are")

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from .. import models
-from ..errors import ModelError
+from ..errors import ModelError, refuse
 from ..models import included_file
 from ..rotations import HERE, Array, Placement, matrix_from_quat, rotation
 
@@ -154,12 +154,19 @@ def compiler_of(root: Element, path: Path) -> Compiler:
     for element in root.findall("compiler"):
         given |= element.attrib
     angle, eulerseq = given.get("angle", "degree"), given.get("eulerseq", "xyz")
-    if angle not in ("degree", "radian"):
-        raise ModelError(f"{path.name} has angles in {angle!r}")
-    if len(eulerseq) != 3 or not set(eulerseq) <= set("xyzXYZ"):
-        raise ModelError(f"{path.name} has an eulerseq of {eulerseq!r}")
-    if given.get("coordinate", "local") != "local":
-        raise ModelError(f"{path.name} has {given['coordinate']} coordinates, which are no more")
+    coordinate = given.get("coordinate", "local")
+    refuse(
+        (angle not in ("degree", "radian"), f"{path.name} has angles in {angle!r}"),
+        (
+            len(eulerseq) != 3 or not set(eulerseq) <= set("xyzXYZ"),
+            f"{path.name} has an eulerseq of {eulerseq!r}",
+        ),
+        (
+            coordinate != "local",
+            f"{path.name} has {coordinate} coordinates, which are no more",
+        ),
+        error=ModelError,
+    )
     return Compiler(angle == "degree", eulerseq, given.get("alignfree") == "true")
 
 

@@ -330,9 +330,11 @@ def _shapes_of(
     model: Model, n: int, derived: Sequence[str]
 ) -> dict[str, tuple[tuple[int, ...], str]]:
     """Shape and type of the arrays of n worlds; of three more `_holder` and `_worker` tell."""
-    sizes = {"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()}
-    sizes |= {"xpos": (model.nbody, 3), "xquat": (model.nbody, 4)}
-    sizes |= {"site_xpos": (model.nsite, 3), "site_xmat": (model.nsite, 9)}
+    sizes = {
+        **{"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()},
+        **{"xpos": (model.nbody, 3), "xquat": (model.nbody, 4)},
+        **{"site_xpos": (model.nsite, 3), "site_xmat": (model.nsite, 9)},
+    }
     floats = {name: (n, *sizes.get(name, (model.nv,))) for name in (*INPUTS, "time", *derived)}
     shapes = {name: (shape, "f8") for name, shape in floats.items()}
     return {**shapes, "ids": ((n,), "u1"), "rows": ((n,), "i8"), "stop": ((1,), "i8")}

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from ...engines.records import ModelDifference
+from ...measures.text import grouped
 from ...page import Figures
 
 Value = float | str | tuple[float, ...] | None
@@ -262,9 +263,8 @@ class Ledger:
 
     def ordered(self) -> tuple[Figures, ...]:
         """The differences, by subject; the subject with the weightiest one first."""
-        weight: dict[str, float] = {}
-        for row in self.differences:
-            weight[row.subject] = max(weight.get(row.subject, -1.0), row.share + row.matters)
+        by_subject = grouped((row.subject, row.share + row.matters) for row in self.differences)
+        weight = {subject: max(weights) for subject, weights in by_subject.items()}
         return tuple(
             sorted(
                 self.differences,

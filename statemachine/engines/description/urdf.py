@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ... import models
-from ...errors import ModelError
+from ...errors import ModelError, refuse
 from ...interface import Array
 from ...measures.text import grouped
 from ...rotations import HERE, Placement
@@ -65,11 +65,17 @@ def _parse(path: Path) -> Element:
         raise
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise ModelError(f"it is no XML: {error}") from None
-    if root.tag != "robot":
-        raise ModelError(f"it is no URDF: its root element is <{root.tag}>, not <robot>")
-    for element in root.iter():
-        if "xacro" in element.tag:
-            raise ModelError("it is a xacro: turn it into a URDF first (xacro file > file.urdf)")
+    refuse(
+        (
+            root.tag != "robot",
+            f"it is no URDF: its root element is <{root.tag}>, not <robot>",
+        ),
+        (
+            any("xacro" in element.tag for element in root.iter()),
+            "it is a xacro: turn it into a URDF first (xacro file > file.urdf)",
+        ),
+        error=ModelError,
+    )
     return root
 
 
@@ -84,10 +90,14 @@ class _Reader:
     def robot(self) -> Robot:
         root = _parse(self.path)
         elements = _by_name(root, "link")
-        if len(elements) > _MOST:
-            raise ModelError(f"it has {len(elements):,} links, and {_MOST:,} are the most here")
-        if not elements:
-            raise ModelError("it has no <link>")
+        refuse(
+            (
+                len(elements) > _MOST,
+                f"it has {len(elements):,} links, and {_MOST:,} are the most here",
+            ),
+            (not elements, "it has no <link>"),
+            error=ModelError,
+        )
         hung: dict[str, tuple[str, Element]] = {}
         for joint in _by_name(root, "joint").values():
             parent, child = _end(joint, "parent", elements), _end(joint, "child", elements)
@@ -219,12 +229,13 @@ def _joint(element: Element) -> RobotJoint | None:
     # What the format takes where no axis is given.
     axis = _numbers(element, "axis", "xyz", 3, where, (1.0, 0.0, 0.0))
     length = float(np.linalg.norm(axis))
-    if length < 1e-9 and kind != "floating":
-        raise ModelError(f"the axis of {where} is zero")
-    limits = follows = None
-    if kind in ("revolute", "prismatic"):
-        if element.find("limit") is None:
-            raise ModelError(f"{where} is {kind} and has no <limit>")
+    limits, follows, limited = None, None, kind in ("revolute", "prismatic")
+    refuse(
+        (length < 1e-9 and kind != "floating", f"the axis of {where} is zero"),
+        (limited and element.find("limit") is None, f"{where} is {kind} and has no <limit>"),
+        error=ModelError,
+    )
+    if limited:
         low, high = (_said(element, "limit", end, where) or 0.0 for end in ("lower", "upper"))
         limits = (low, high) if low <= high else None  # PyBullet's way to say "none"
     if (mimic := element.find("mimic")) is not None:

@@ -223,10 +223,12 @@ def _run(
         settings.write_text("[pytest]\n", encoding="utf-8")
         record.touch()
         # -P: what lies beside the file must not pass for a module of pytest's.
-        command = [sys.executable, "-P", "-m", "pytest", "-c", str(settings), "--rootdir", folder]
-        command += ["--noconftest", "--tb=short", "--no-summary", "-q", "-p", "no:cacheprovider"]
-        command += ["-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)]
-        command += [os.path.join(os.curdir, path.name)]  # brackets in a whole path confuse pytest
+        command = [
+            *(sys.executable, "-P", "-m", "pytest", "-c", str(settings), "--rootdir", folder),
+            *("--noconftest", "--tb=short", "--no-summary", "-q", "-p", "no:cacheprovider"),
+            *("-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)),
+            os.path.join(os.curdir, path.name),  # brackets in a whole path confuse pytest
+        ]
         env = _environment() | ({FAULT: fault} if fault else {})  # where no test looks for it
         outcome = sandbox.run(
             command,

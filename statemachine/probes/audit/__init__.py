@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from ...engines import room
 from ...engines.auditing import ITSELF, ONLY, Driver, ReferenceRun, SavePoint
 from ...engines.measured import FutureGap, worst
-from ...errors import BadInputError, DivergedError
+from ...errors import BadInputError, DivergedError, refuse
 from ...interface import Model
 from ...interface.options import as_count
 from ...measures.text import grouped
@@ -49,10 +49,10 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
         BadInputError: `steps` or `seed` is no such number, or nothing in the model moves.
     """
     nstep = as_count(steps, "steps")
-    if seed < 0:
-        raise BadInputError(f"seed must not be negative; got {seed}")
-    if not model.nv:
-        raise BadInputError(f"nothing moves in {model.path.name}: it has no state to audit")
+    refuse(
+        (seed < 0, f"seed must not be negative; got {seed}"),
+        (not model.nv, f"nothing moves in {model.path.name}: it has no state to audit"),
+    )
     save_points, without = points(model, seed)
     drivers = drivers_of(model, seed)
     interface = next(driver for driver in drivers if isinstance(driver, InterfaceDriver))
