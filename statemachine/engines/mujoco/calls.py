@@ -63,9 +63,10 @@ class _MjModel(_Object):
 
     def contents(self, thoroughly: bool) -> Contents:
         model, options = self.thing, self.thing.opt
-        names = [name for name, size in self._sizes.items() if thoroughly or size <= _LARGE]
         return {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options} | {
-            name: getattr(model, name).tobytes() for name in names
+            name: getattr(model, name).tobytes()
+            for name, size in self._sizes.items()
+            if thoroughly or size <= _LARGE
         }
 
 
