@@ -648,8 +648,26 @@ def _screens(seen: str, columns: int) -> list[int]:
 def test_nothing_scrolls_away_unread(lesson: str, columns: int, lines: int) -> None:
     typed = [("Your prediction", "a\n")] * (6 if lesson == "questions" else 1)
     seen = _at_a_terminal("lesson", lesson, typed=typed, columns=columns, lines=lines)
-    assert max(_screens(seen, columns)) <= lines
+    *screens, _ = _screens(seen, columns)  # the last is the shell's
+    assert max(screens) <= lines
+    assert min(screens) > 3 or lines < 20  # no line or two above a prompt
     assert re.search(r"You\s+predicted", seen)
+
+
+@pytest.mark.parametrize(
+    ("rows", "blocks", "ends"),
+    [
+        ([1] * 23, {0}, [23]),
+        ([1] * 24, {0}, [12, 24]),  # not 23 and a line alone
+        ([1] * 24, {0, 22}, [12, 24]),  # nor 22 and two
+        ([1] * 30, {0, 14}, [14, 30]),  # a block whole
+        ([1] * 30, {0, 29}, [15, 30]),
+        ([20, *[1] * 10], {1}, [1, 11]),  # under what stands there already
+        ([1, 40, 1], {0, 1, 2}, [1, 2, 3]),  # a line that no window has room for
+    ],
+)
+def test_windows_are_filled_evenly(rows: list[int], blocks: set[int], ends: list[int]) -> None:
+    assert quiz.windows(rows, blocks, 23) == ends
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")

@@ -200,6 +200,8 @@ def _last_page(options: argparse.Namespace, reader: Any) -> int:
     except MissingEngineError as error:  # nobody can compute it here
         complain(error, MISSING)
     (reader.read if reader else sys.stdout.write)(_NEXT)
+    if reader:
+        reader.show()
     return code
 
 

@@ -5,12 +5,13 @@ What they predict is written to a file to hand in, where they want it.
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from ..page import LETTERS, Question
 from ..runs.whole import replace_text
 
 _WIDTH_MOST = 100
+_SPLIT = 0.25  # what it costs to part a block: as much as half of a window that stays empty
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -48,24 +50,28 @@ class Reader:
     def __init__(self, lesson: str = "") -> None:
         self.lesson = lesson  # whose questions are asked now
         self._rows = 0  # shown since they last typed something
+        self._new: list[list[str]] = []  # blocks of lines that are still to be shown
 
     def read(self, text: str) -> None:
-        """Show text; wait first if the window has no room for it under what is new there.
+        """Take a block of text; it is shown with what follows it, by `show`."""
+        self._new.append(text.splitlines(keepends=True))
 
-        Text that no window of this height has room for is shown in parts.
+    def show(self) -> None:
+        """Show what is new, a windowful at a time, under what is new there already.
 
         Raises:
             Stopped: The reader typed q, or Ctrl-D, when it waited.
         """
-        lines = text.splitlines(keepends=True)
-        if self._rows and self._rows + sum(map(_rows, lines)) > _room():
-            self.go_on()
-        for k, line in enumerate(lines):
-            end = len(lines) if k == len(lines) - 2 else k + 1  # the last line is not left alone
-            if self._rows and self._rows + sum(map(_rows, lines[k:end])) > _room():
+        lines = ["", *itertools.chain(*self._new)]
+        rows = [self._rows, *map(_rows, lines[1:])]
+        blocks = {*itertools.accumulate(map(len, self._new), initial=1)}
+        self._new, begin = [], 0
+        for end in windows(rows, blocks, _room()):
+            if begin:
                 self.go_on()
-            self._rows += _rows(line)
-            sys.stdout.write(line)
+            self._rows = sum(rows[begin:end])
+            sys.stdout.write("".join(lines[begin:end]))
+            begin = end
         sys.stdout.flush()
 
     def ask(self, question: Question) -> int | None:
@@ -75,6 +81,7 @@ class Reader:
             Stopped: The reader typed q.
         """
         self.read("\n" + "".join(f"{line}\n" for line in _asked(question)))
+        self.show()
         letters = LETTERS[: len(question.choices)]
         while True:
             typed = self._typed(
@@ -87,11 +94,12 @@ class Reader:
             print(f"Please type one of {', '.join(letters)}.")
 
     def go_on(self, what: str = "more") -> None:
-        """Wait until the reader wants to see `what`.
+        """Show what is new, and wait until the reader wants to see `what`.
 
         Raises:
             Stopped: The reader typed q, or Ctrl-D.
         """
+        self.show()
         while self._typed(f"Enter for {what} (q to stop) ", end="q"):
             pass
 
@@ -183,6 +191,36 @@ def _forget_typed_ahead() -> None:
 
     with suppress(termios.error):  # it has gone
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
+
+
+def windows(rows: Sequence[int], blocks: Container[int], room: int) -> list[int]:
+    """Part lines into windows that are filled evenly, so that none has a line or two alone.
+
+    The sum over all windows of the square of the rows that stay empty is least.
+
+    Args:
+        rows: (n,) rows that each line takes.
+        blocks: Lines with which a block begins, by number; a block is parted only where windows
+            would stay emptier otherwise.
+        room: Rows of a window.
+
+    Returns:
+        For each window the line before which it ends.
+    """
+    best = [(0.0, 0)]  # for the lines before each: the least cost, and where the last window begins
+    for end in range(1, len(rows) + 1):
+        costs = [
+            (best[begin][0] + (room - sum(rows[begin:end])) ** 2, begin)
+            for begin in range(max(0, end - room - 1), end)
+            if begin == end - 1 or sum(rows[begin:end]) <= room
+        ]
+        cost, begin = min(costs)
+        parted = end < len(rows) and end not in blocks
+        best.append((cost + _SPLIT * room**2 * parted, begin))
+    ends = [len(rows)]
+    while best[ends[-1]][1]:
+        ends.append(best[ends[-1]][1])
+    return ends[::-1]
 
 
 def _room() -> int:

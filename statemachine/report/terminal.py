@@ -121,6 +121,8 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
         last.append(Text(footer))
     _write(tell, last)
     tell("\n")
+    if reader:
+        reader.show()
 
 
 def spelled(error: Any) -> tuple[str, int]:
