@@ -59,9 +59,10 @@ def test_another_file_is_not_overwritten(tmp_path: Path, text: str) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_a_lesson_at_a_terminal_is_recorded(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
-    typed = [("Your prediction", "c\n")]
     assert_in(
-        _at_a_terminal("lesson", "state", "--record", str(file), typed=typed),
+        _at_a_terminal(
+            *("lesson", "state", "--record", str(file)), typed=[("Your prediction", "c\n")]
+        ),
         "You predicted it",
         "mine.json: 1 of 1 predictions right",
     )

@@ -45,9 +45,13 @@ def run(options: argparse.Namespace) -> int:
     own = [(f"{name}=={engine_version(name)}", python_version(), NONE) for name in available()[0]]
     rows = [(r.name, r.python, f"{r.size / 1e6:.0f} MB") for r in here]
     table = Table(("release", "python", "size"), [*rows, *own])
-    hint = Text(f"To add one: {PROGRAM} engines add mujoco==3.3.7")
-    origin = f"those with a size are in {folder()}, the others beside this program"
-    terminal.show(Page("Releases of engines", origin, [table, hint]))
+    terminal.show(
+        Page(
+            "Releases of engines",
+            f"those with a size are in {folder()}, the others beside this program",
+            [table, Text(f"To add one: {PROGRAM} engines add mujoco==3.3.7")],
+        )
+    )
     return 0
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, TraceError
+from ..errors import BadInputError, TraceError, refuse
 from ..interface import Array, Data, Ints, JointType, Model
 from ..measures import amount, common_moments
 from ..page import Figures
@@ -53,11 +53,14 @@ def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
     sizes: dict[str, float] = {}
     for word in words:
         value, unit = amount(word)
-        kind = {"m": "length", "rad": "angle"}.get(unit)
-        if kind is None or np.isnan(value):
-            raise BadInputError(f"an uncertainty reads like 0.1mm or 0.1deg; got {word!r}")
-        if kind in sizes:
-            raise BadInputError(f"the {kind} that is uncertain is given twice: {word!r}")
+        kind = {"m": "length", "rad": "angle"}.get(unit, "")
+        refuse(
+            (
+                not kind or np.isnan(value),
+                f"an uncertainty reads like 0.1mm or 0.1deg; got {word!r}",
+            ),
+            (kind in sizes, f"the {kind} that is uncertain is given twice: {word!r}"),
+        )
         sizes[kind] = value
     return Uncertainty(**sizes)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..backends import backend_names, check_backend, load
 from ..engines import room
-from ..errors import BadInputError, StateMachineError, check_name, shown, unknown_name
+from ..errors import BadInputError, StateMachineError, check_name, refuse, shown, unknown_name
 from ..installed import DEFAULT, PAIR
 from ..interface import OPTIONS, Model
 from ..measures.text import listed
@@ -206,7 +206,7 @@ def _refuse_mistyped(word: str) -> None:
         BadInputError: It reads as FILE@, FILE:ENGINE, FILE,FILE or the name of an option.
     """
     parts, (before, _, after) = word.split(","), word.rpartition(":")
-    for meant, says in (
+    refuse(
         (
             word.endswith("@") and len(word) > 1,
             f"{word} names no engine: type {word}{DEFAULT}, or {word[:-1]}",
@@ -220,9 +220,7 @@ def _refuse_mistyped(word: str) -> None:
             f"two sides are two words: type {' '.join(parts)}",
         ),
         (word in OPTIONS, f"{word} is an option of a side: type {word}=VALUE"),
-    ):
-        if meant:
-            raise BadInputError(says)
+    )
 
 
 def _option(text: str) -> tuple[str, Any]:

@@ -231,9 +231,11 @@ class StageMeasure:
         A body that is elsewhere takes along all that hangs on it, so that the first one counts; a
         mass shows in the entries of every joint that carries it, so that the last of these counts.
         """
-        hits = np.flatnonzero(self.beyond[row]).tolist()
-        if self.stage == MASS:
-            hits = [k for k in hits if " and " not in self.names[k]]
+        hits = [
+            k
+            for k in np.flatnonzero(self.beyond[row]).tolist()
+            if self.stage != MASS or " and " not in self.names[k]
+        ]
         if hits and self.stage in (KINEMATICS, MASS):
             return self.names[hits[0 if self.stage == KINEMATICS else -1]]
         return self.names[int(np.argmax(self.apart[row]))]

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ..backends import check_backend
-from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError
+from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError, refuse
 from ..installed import DEFAULT
 from ..interface import Model
 from ..measures import common_moments
@@ -385,5 +385,9 @@ def _other_side(request: Request, own: Side) -> Side:
 def _refuse_of_run(request: Request, **given: bool) -> None:
     """Raise BadInputError for an option that has no meaning for a trace."""
     refused = {"seconds": request.seconds is not None, "seed": request.seed != 0, **given}
-    for option in (name for name, wrong in refused.items() if wrong):
-        raise BadInputError(f"--{option} is of a run, and a trace is a run that was made")
+    refuse(
+        *(
+            (wrong, f"--{option} is of a run, and a trace is a run that was made")
+            for option, wrong in refused.items()
+        )
+    )

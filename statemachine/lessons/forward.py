@@ -118,9 +118,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figure
 
 def _steps(model: Model, options: Mapping[str, Any]) -> int:
     """Over how many steps to look at the lag; 0 if it is not asked for."""
-    seconds = options["seconds"]
-    if seconds is None and options["lag"]:
-        seconds = _SECONDS
+    seconds = _SECONDS if options["lag"] and options["seconds"] is None else options["seconds"]
     return 0 if seconds is None else steps_in(model, seconds)
 
 

@@ -131,8 +131,7 @@ def blocks_of(
     if sign == "✓":
         return [Verdict(prefix + said, value == "True")]
     asked, *choices, because = (part.strip() for part in _PARTS.split(said))
-    right = None if value == "None" else int(value)
-    return [Question(asked, choices, right, because, always)]
+    return [Question(asked, choices, None if value == "None" else int(value), because, always)]
 
 
 def origin(results: Mapping[str, Any]) -> str:

@@ -203,7 +203,24 @@ def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
     title = "What is made once, and what for each world, on this machine, now"
     return {
         "made": by_engine(results, made, title),
-        "costs": [_costs(name, result) for name, result in results.items()],
+        "costs": [
+            Table(
+                ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
+                [
+                    (
+                        f"{cost.n:,}",
+                        f"{cost.workers}",
+                        duration(cost.made),
+                        duration(cost.step),
+                        cost.faster.spread(" ×"),
+                    )
+                    for cost in result.costs
+                ],
+                title=f"Wall time with the number of worlds: {name}",
+                words=frozenset(),
+            )
+            for name, result in results.items()
+        ],
         "curves": Traces(
             "What a step of one world costs",
             "number of worlds: 2 to the power of",
@@ -218,24 +235,6 @@ def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
             log=True,
         ),
     }
-
-
-def _costs(name: str, result: Figures) -> Table:
-    return Table(
-        ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
-        [
-            (
-                f"{cost.n:,}",
-                f"{cost.workers}",
-                duration(cost.made),
-                duration(cost.step),
-                cost.faster.spread(" ×"),
-            )
-            for cost in result.costs
-        ],
-        title=f"Wall time with the number of worlds: {name}",
-        words=frozenset(),
-    )
 
 
 def _memory(size: float | None) -> str:

@@ -28,6 +28,7 @@ from .finding import (
     name_of,
     short_labels,
     subject,
+    traces_of,
     window,
 )
 from .over_time import BothRuns, charts_of
@@ -244,30 +245,27 @@ def _models(models: Page, has_emulated: bool) -> Section:
     verdicts = [block for block in models.blocks if isinstance(block, Verdict)]
     rest = [block for block in models.blocks if not isinstance(block, Verdict)]
     first = Text("Before anything moves.")
-    if has_emulated:
-        first = Text(
-            "Before anything moves. What the backends then do about it for the runs above is in",
-            see=_EMULATED,
-        )
+    more = "Before anything moves. What the backends then do about it for the runs above is in"
     folded = Section("", models.title, rest, folded=True)
     heading = "What each engine makes of the model"
-    return Section("models", heading, [first, *verdicts, folded], detail=True)
+    return Section(
+        "models",
+        heading,
+        [Text(more, see=_EMULATED) if has_emulated else first, *verdicts, folded],
+        detail=True,
+    )
 
 
 def _origin(comparison: Comparison) -> str:
-    headers, labels = (
-        (comparison.one.trace.header, comparison.two.trace.header),
-        long_labels(comparison),
-    )
-    made_by = [header.provenance for header in headers]
-    files = dict.fromkeys(f"{source.model_file} ({source.model_sha256[:8]})" for source in made_by)
-    engine = [] if headers[0].label in labels[0] else [f"both on {headers[0].label}"]
-    seeds = ["" if source.seed is None else f", seed {source.seed}" for source in made_by]
-    words = [
-        f"{label}, {milliseconds(header.timestep)}{seed}"
-        for label, header, seed in zip(labels, headers, seeds, strict=True)
-    ]
-    return "; ".join([*files, *engine, *words])
+    files: dict[str, None] = {}
+    words, labels = list[str](), long_labels(comparison)
+    for label, trace in zip(labels, traces_of(comparison), strict=True):
+        source = trace.header.provenance
+        files[f"{source.model_file} ({source.model_sha256[:8]})"] = None
+        seed = "" if source.seed is None else f", seed {source.seed}"
+        words.append(f"{label}, {milliseconds(trace.header.timestep)}{seed}")
+    engine = comparison.one.trace.header.label
+    return "; ".join([*files, *([] if engine in labels[0] else [f"both on {engine}"]), *words])
 
 
 FAILED = "{largest} apart at {at:g} s; the tolerance is {tolerance}, {reason}"

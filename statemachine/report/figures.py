@@ -105,15 +105,6 @@ def saved(
     return out.getvalue()
 
 
-def svg(picture: Drawn) -> str:
-    """A picture as SVG; the same figures give the same text.
-
-    Raises:
-        MissingEngineError: matplotlib is not installed.
-    """
-    return drawn([picture], "svg").decode()
-
-
 def write_pictures(blocks: Sequence[Block], path: Path) -> int:
     """Write all pictures among some blocks into one file, one above the other; its bytes.
 
@@ -327,16 +318,15 @@ def _heat_map(axes: Any, picture: HeatMap) -> None:
     norm = (LogNorm if wide else Normalize)(low if wide else 0.0, high or 1.0)
     pale = ListedColormap(matplotlib.colormaps["YlOrBr"](np.linspace(0, 0.85, 256)))
     rows, columns = (np.arange(n + 1) - 0.5 for n in values.shape)
-    cells = axes.pcolormesh(columns, rows, shown, norm=norm, cmap=pale, edgecolors="face")
+    line: dict[str, Any] = {"edgecolors": "#999999", "linewidth": 0.3}
+    cells = axes.pcolormesh(columns, rows, shown, norm=norm, cmap=pale, **line)
+    unread = np.ma.masked_where(~np.isfinite(values) | ~hatched, values)
+    axes.pcolor(columns, rows, unread, cmap=ListedColormap([_PAPER]), hatch="////", **line)
     axes.set_facecolor(_BELOW)
     for (r, c), value in np.ndenumerate(values):
         if not np.isfinite(value):
             axes.text(c, r, "no run", fontsize=6, **_CENTRE)
             continue
-        look: dict[str, Any] = {"edgecolor": "#999999", "linewidth": 0.3, "fill": False}
-        if hatched[r, c]:
-            look |= {"fill": True, "facecolor": _PAPER, "hatch": "////"}
-        axes.add_patch(Rectangle((c - 0.5, r - 0.5), 1, 1, **look))
         if picture.framed[r][c]:
             inner = c - 0.46, r - 0.46
             axes.add_patch(Rectangle(inner, 0.92, 0.92, fill=False, edgecolor=_COLOURS[2], lw=1.6))

@@ -24,7 +24,7 @@ from ..compare import Comparison, labels_of
 from ..drawing import drawing_of
 from ..drawing.scene import Camera, Motion, Pixels, camera_for, framed, poses_through
 from ..engines.pictures import Renderer, drawn, renderer_here
-from ..errors import BadInputError, EngineError, MissingEngineError, TraceError
+from ..errors import BadInputError, EngineError, MissingEngineError, TraceError, refuse
 from ..installed import require_extra
 from ..interface import Array, Model
 from ..measures import nearest
@@ -33,9 +33,9 @@ from ..processes import last_line
 from ..runs import Trace
 from ..runs.drive import Progress, silent
 from ..runs.whole import beside, replace_file
-from .figures import require_matplotlib, svg
+from . import figures
 from .film_overlay import Overlay
-from .over_time import QuantityChart, charts_of
+from .over_time import charts_of
 
 SUFFIXES = (".webp", ".mp4")
 _LONGEST = 5000  # pictures of one film
@@ -83,24 +83,27 @@ def check_film(path: Path, size: tuple[int, int], fps: float, slow: float) -> No
         MissingEngineError: An extra is missing.
     """
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        hint = "; WebP is smaller and has all colours" if suffix == ".gif" else ""
-        raise BadInputError(f"a film is a file {' or '.join(SUFFIXES)}; got {path.name!r}{hint}")
+    hint = "; WebP is smaller and has all colours" if suffix == ".gif" else ""
+    sides = zip(("width", "height"), size, _SMALLEST, _LARGEST, strict=True)
+    refuse(
+        (
+            suffix not in SUFFIXES,
+            f"a film is a file {' or '.join(SUFFIXES)}; got {path.name!r}{hint}",
+        ),
+        (not 1 <= fps <= 60, f"--fps is from 1 to 60 pictures a second; got {fps:g}"),
+        (not 0.05 <= slow <= 100, f"--slow is from 0.05 to 100 times as long; got {slow:g}"),
+        *(
+            (
+                not least <= pixels <= most or pixels % 2,
+                f"the {word} of a film is even, from {least} to {most} pixels; got {pixels}",
+            )
+            for word, pixels, least, most in sides
+        ),
+    )
     require_extra("PIL.Image", "a film", "Pillow", "render")
-    require_matplotlib()
+    figures.require_matplotlib()
     if suffix == ".mp4":
         require_extra("imageio_ffmpeg", "mp4", "ffmpeg", "mp4", "WebP needs nothing more")
-    if not 1 <= fps <= 60:
-        raise BadInputError(f"--fps is from 1 to 60 pictures a second; got {fps:g}")
-    if not 0.05 <= slow <= 100:
-        raise BadInputError(f"--slow is from 0.05 to 100 times as long; got {slow:g}")
-    for word, pixels, least, most in zip(
-        ("width", "height"), size, _SMALLEST, _LARGEST, strict=True
-    ):
-        if not least <= pixels <= most or pixels % 2:
-            raise BadInputError(
-                f"the {word} of a film is even, from {least} to {most} pixels; got {pixels}"
-            )
 
 
 def write_film(
@@ -141,7 +144,13 @@ def write_film(
     """
     check_film(path, size, fps, slow)
     timing = timing_of(traces, fps, slow)
-    header, strip = traces[0].header, _strip(comparison)
+    header = traces[0].header
+    # How far apart the fingertips are; without one, what is farthest beyond its tolerance.
+    strip = max(
+        charts_of(comparison) if comparison else (),
+        key=lambda chart: (chart.curve.kind == "tip", chart.agreement.tolerances()),
+        default=None,
+    )
     labels = labels_of(header, traces[1].header).long if len(traces) > 1 else [header.label]
     overlay = Overlay(size, timing.times, slow, header.experiment, labels, strip)
     shots = frames(traces, models, overlay.inner, timing, renderer)
@@ -239,15 +248,6 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
     return Motion(drawing_of(model), xpos, xquat)
 
 
-def _strip(comparison: Comparison | None) -> QuantityChart | None:
-    """How far apart the fingertips are; without one, what is farthest beyond its tolerance."""
-    return max(
-        charts_of(comparison) if comparison else (),
-        key=lambda chart: (chart.curve.kind == "tip", chart.agreement.tolerances()),
-        default=None,
-    )
-
-
 def write_webp(out: BinaryIO, pictures: Iterator[Any], milliseconds: list[int]) -> None:
     """Write an animated WebP; `pictures` are Pillow's images, taken one at a time."""
     reel = next(pictures).copy()
@@ -341,7 +341,7 @@ def drawn_picture(picture: Picture) -> tuple[bytes, str]:
     """
     if isinstance(picture, RobotPicture):
         return webp(picture), "webp"
-    return svg(picture).encode(), "svg+xml"
+    return figures.drawn([picture], "svg"), "svg+xml"
 
 
 def inline(picture: Picture) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from ..compare.models.ledger import SUBJECTS, Value
 from ..lessons.template import by_engine
@@ -48,6 +48,19 @@ _EXPLAINED = {
     "load": ("centre of mass", "load"),
     "felt": ("inertia", "M_ii"),
 }
+# How a side was read, and what it has.
+_READ: Mapping[str, Callable[[Figures], str]] = {
+    "file": lambda side: side.file,
+    "read": lambda side: (
+        f"loaded into {side.reader}"
+        if side.format == "engine"
+        else f"{side.format}, by {side.reader}"
+    ),
+    "links": lambda side: str(side.links),
+    "joints": lambda side: str(side.joints),
+    "shapes": lambda side: str(side.shapes),
+    "mass": lambda side: rounded(side._mass, "kg", 4),
+}
 # Figures that say no more than the name of their difference.
 _SAID_BY_ITS_NAME = {
     *("ctrlrange", "forcerange", "gear", "range", "axis", "origin", "moments", "stiffness"),
@@ -83,7 +96,7 @@ def page(result: Figures, everything: bool = False) -> Page:
         "model_diff",
         **{f"{name}_name": _name(side) for name, side in named.items()},
         origin=versions_of(result.versions),
-        sides=_sides(named),
+        sides=by_engine(named, _READ, ""),
         none_differ=None if matter or result.skipped else True,
         digits=result.digits,
         not_all_compared=False if result.skipped and not matter else None,
@@ -114,26 +127,6 @@ def page(result: Figures, everything: bool = False) -> Page:
 def _name(side: Figures) -> str:
     """A file, and of one that an engine has read the engine."""
     return f"{side.file} on {side.reader.split()[0]}" if side.format == "engine" else side.file
-
-
-def _sides(sides: Mapping[str, Figures]) -> Table:
-    """How each side was read, and what it has."""
-    return by_engine(
-        sides,
-        {
-            "file": lambda side: side.file,
-            "read": lambda side: (
-                f"loaded into {side.reader}"
-                if side.format == "engine"
-                else f"{side.format}, by {side.reader}"
-            ),
-            "links": lambda side: str(side.links),
-            "joints": lambda side: str(side.joints),
-            "shapes": lambda side: str(side.shapes),
-            "mass": lambda side: rounded(side._mass, "kg", 4),
-        },
-        "",
-    )
 
 
 def _subject(subject: str, differences: list[Figures], everything: bool) -> list[Block]:
@@ -176,9 +169,7 @@ def _subject(subject: str, differences: list[Figures], everything: bool) -> list
 def _row(subject: str, group: Sequence[Figures]) -> list[str]:
     first, last = group[0], group[-1]
     unit = _MOMENT if subject == "inertia" and first.unit == "kg m²" else first.unit
-    effect = first.effect
-    if last.effect != effect:
-        effect = f"{effect} … {last.effect}"
+    effect = " … ".join(dict.fromkeys((first.effect, last.effect)))
     values = [_value(value, unit) for value in (first.one, first.two)]
     apart = ""
     if first.size is not None and (first.one is None) == (first.two is None):
@@ -198,13 +189,14 @@ def _label(row: Figures, more: int) -> str:
 
 
 def _value(value: Value, unit: str) -> str:
-    if value is None:
-        return "not said"
-    if isinstance(value, str):
-        return value
-    if isinstance(value, tuple):
-        factor, shown = _SHOWN.get(unit, (1.0, "" if len(value) == 3 else f" {unit}"))
-        return (" ".join(significant(entry * factor) for entry in value) + shown).strip()
+    match value:
+        case None:
+            return "not said"
+        case str():
+            return value
+        case tuple():
+            factor, shown = _SHOWN.get(unit, (1.0, "" if len(value) == 3 else f" {unit}"))
+            return (" ".join(significant(entry * factor) for entry in value) + shown).strip()
     return _number(value, unit, _SHOWN)
 
 

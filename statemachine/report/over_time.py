@@ -66,9 +66,10 @@ class QuantityChart(Interactive):
         curve, scale = self.curve, reading(self.curve.unit)[0]
         if not curve.one.size:
             return None
-        sides = [curve.one, curve.two]
-        if curve.one.ndim > 1:
-            sides = [np.linalg.norm(side - curve.one[0], axis=1) for side in sides]
+        sides = [
+            np.linalg.norm(side - curve.one[0], axis=1) if side.ndim > 1 else side
+            for side in (curve.one, curve.two)
+        ]
         curves = dict(zip(self.labels, ((curve.time, scale * side) for side in sides), strict=True))
         # What does not matter is not blown up to the height of the chart.
         least = 20 * scale * self.agreement.tolerance

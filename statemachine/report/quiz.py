@@ -207,20 +207,20 @@ def windows(rows: Sequence[int], blocks: Container[int], room: int) -> list[int]
     Returns:
         For each window the line before which it ends.
     """
-    best = [(0.0, 0)]  # for the lines before each: the least cost, and where the last window begins
+    best: list[tuple[float, list[int]]] = [(0.0, [])]  # of the lines before each: cost, windows
     for end in range(1, len(rows) + 1):
-        costs = [
-            (best[begin][0] + (room - sum(rows[begin:end])) ** 2, begin)
-            for begin in range(max(0, end - room - 1), end)
-            if begin == end - 1 or sum(rows[begin:end]) <= room
-        ]
-        cost, begin = min(costs)
-        parted = end < len(rows) and end not in blocks
-        best.append((cost + _SPLIT * room**2 * parted, begin))
-    ends = [len(rows)]
-    while best[ends[-1]][1]:
-        ends.append(best[ends[-1]][1])
-    return ends[::-1]
+        parted = _SPLIT * room**2 * (end < len(rows) and end not in blocks)
+        best.append(
+            min(
+                (
+                    best[begin][0] + (room - sum(rows[begin:end])) ** 2 + parted,
+                    [*best[begin][1], end],
+                )
+                for begin in range(max(0, end - room - 1), end)
+                if begin == end - 1 or sum(rows[begin:end]) <= room
+            )
+        )
+    return best[-1][1]
 
 
 def _room() -> int:
@@ -243,5 +243,6 @@ def _asked(question: Question) -> Iterator[str]:
     text = question.text if question.always else f"Before you read on: {question.text}"
     yield from textwrap.wrap(text.replace("`", ""), width)
     for choice in lettered(question):
-        choice = choice.replace("`", "")  # noqa: PLW2901
-        yield from textwrap.wrap(choice, width, initial_indent="  ", subsequent_indent="     ")
+        yield from textwrap.wrap(
+            choice.replace("`", ""), width, initial_indent="  ", subsequent_indent="     "
+        )

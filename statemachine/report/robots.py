@@ -85,7 +85,24 @@ def _table(survey: Survey, others: Sequence[str], widest: int, tried: bool) -> T
         columns[f"{of}contacts"] = partial(_gap, other=other, without=False)
     columns["witness"] = _witness
     if tried:
-        columns |= {"runs": _runs, "cost": _cost}
+        columns |= {
+            "runs": lambda row: (
+                " ".join(
+                    str(list(backend.scenarios.values()).count(RUNS))
+                    for backend in row.backends.values()
+                    if backend.scenarios
+                )
+                or NONE
+            ),
+            "cost": lambda row: (
+                " ".join(
+                    f"{backend.cost:.3g}"
+                    for backend in row.backends.values()
+                    if backend.cost is not None
+                )
+                or NONE
+            ),
+        }
     words = {"model", "bits", "witness", "runs"}
     return Table.of(survey.models, columns, words=words, wide={"cost"})
 
@@ -123,18 +140,6 @@ def _witness(row: ExaminedModel) -> str:
     if row.witness.gap is None:
         return "refused"
     return f"{row.witness.grade.partition(' ')[0]} {rough(row.witness.gap)}"
-
-
-def _runs(row: ExaminedModel) -> str:
-    tried = [
-        list(backend.scenarios.values()) for backend in row.backends.values() if backend.scenarios
-    ]
-    return " ".join(str(words.count(RUNS)) for words in tried) or NONE
-
-
-def _cost(row: ExaminedModel) -> str:
-    costs = [f"{backend.cost:.3g}" for backend in row.backends.values() if backend.cost is not None]
-    return " ".join(costs) or NONE
 
 
 def _sums(survey: Survey, others: Sequence[str]) -> Table:

@@ -56,9 +56,11 @@ def commanded(comparison: Comparison) -> list[Block]:
         for side, trace in traces.items()
         for when, row in (("at the start", 0), ("in the end", -1))
     }
-    for miss, label in zip(misses, labels, strict=True):
-        if angle:
-            columns[f"missed in the end, {label}"] = [quantity(far, "rad") for far in miss.tolist()]
+    if angle:
+        columns |= {
+            f"missed in the end, {label}": [quantity(far, "rad") for far in miss.tolist()]
+            for miss, label in zip(misses, labels, strict=True)
+        }
     rows = list(zip(actuators, *columns.values(), strict=True))
     heading = f"What was commanded ({'' if same else 'not '}the same on both sides)"
     title = f"{'Commanded' if angle else 'ctrl'}, by actuator"
@@ -211,8 +213,12 @@ def provenance(comparison: Comparison) -> Table:
         ("rows", f"{comparison.one.rows}", f"{comparison.two.rows}"),
         *((name, a[name], b[name]) for name in a if a[name] or b[name]),
     ]
-    heads = ("what", *long_labels(comparison))
-    return Table(heads, rows, "What made the two runs", words=frozenset({0, 1, 2}))
+    return Table(
+        ("what", *long_labels(comparison)),
+        rows,
+        "What made the two runs",
+        words=frozenset({0, 1, 2}),
+    )
 
 
 def facts_of(header: Header) -> dict[str, str]:
@@ -242,11 +248,10 @@ def trace_page(trace: Trace, name: str) -> Page:
         "time": f"{trace.time[0]:g} to {trace.time[-1]:g} s, {len(trace)} rows",
         "versions": versions_of(header.provenance.versions),
         **facts_of(header),
+        "rewritten": f"the controller wrote into the state in {header.rewritten} rows"
+        * bool(header.rewritten),
+        "ended": header.ended,
     }
-    if header.rewritten:
-        facts["rewritten"] = f"the controller wrote into the state in {header.rewritten} rows"
-    if header.ended:
-        facts["ended"] = header.ended
     touches = [
         (
             pair,

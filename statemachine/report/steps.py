@@ -85,10 +85,9 @@ def _limits(limits: Sequence[Figures], title: str) -> Table:
 
 
 def _of_the_limit(result: Figures, touch: str) -> Headline:
-    if all(limit.verdict == "rounding" for limit in result.whole):
-        return Headline(LEADS["rounding"])
     if result.vanishes:
-        return Headline(LEADS["vanishes"])
+        verdicts = {limit.verdict for limit in result.whole}
+        return Headline(LEADS["vanishes" if verdicts - {"rounding"} else "rounding"])
     stay = [limit for limit in result.whole if limit.verdict in ("stays", "in part")]
     same = [limit for limit in stay if limit.unit == stay[0].unit]
     lead = LEADS["neither"]

@@ -194,13 +194,11 @@ def _sensitive(sweep: SweepReport) -> list[Block]:
         for index in shares.indices
     ]
     heads = ("parameter", "first order", "95 %", "total", "95 %")
-    table = Table(heads, rows, "Shares of the gap's variance")
-    if rank:
-        table = Table(("parameter", "rank²"), [row[:2] for row in rows], "What the gap goes with")
+    ranks = Table(("parameter", "rank²"), [row[:2] for row in rows], "What the gap goes with")
     samples = {shares.method: shares.samples}
     return template.blocks(
         "sweep_shares",
-        table=table,
+        table=ranks if rank else Table(heads, rows, "Shares of the gap's variance"),
         shares=if_true(not rank),
         sobol=samples.get("sobol"),
         factorial=samples.get("factorial"),

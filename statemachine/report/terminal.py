@@ -23,7 +23,6 @@ from ..page import (
     RobotPicture,
     Section,
     Table,
-    TableCell,
     Text,
     Verdict,
 )
@@ -191,8 +190,11 @@ def _drawn(block: Page | Block, plain: bool, width: int) -> list[RenderableType]
 
     match block:
         case Page(title, origin):
-            heading = RichText(_shown(title, plain), "bold")
-            return ["", heading, _coded(_shown(origin, plain), "dim")]
+            return [
+                "",
+                RichText(_shown(title, plain), "bold"),
+                _coded(_shown(origin, plain), "dim"),
+            ]
         case Heading(text):
             return ["", _coded(_shown(text, plain), "bold")]
         case Text(text, (_, linked)):
@@ -257,8 +259,7 @@ def _grid(block: Table, plain: bool, width: int) -> RenderableType:
 
 def _loud(cell: str) -> str:
     """A cell; that something differs is seen without a colour."""
-    differs = isinstance(cell, TableCell) and cell.verdict == "differs"
-    return cell.upper() if differs else cell
+    return cell.upper() if getattr(cell, "verdict", "") == "differs" else cell
 
 
 def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) -> list[int | None]:

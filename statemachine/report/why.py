@@ -159,7 +159,16 @@ def causes(result: Explanation) -> list[Block]:
         chaos=floor if result.is_rounding and not small else None,
         same=if_true(not result.shares and not result.found_in),
         table=_table(result, able),
-        located=[block for place in result.found_in for block in _located_note(place)],
+        located=[
+            block
+            for place in result.found_in  # left out on both sides, or an integrator
+            for block in template.blocks(
+                "why_located",
+                cause=None if place.values or place.is_still else place.name,
+                idle=place.name if place.is_still and not place.values else None,
+                integrator=place.values and place.without,
+            )
+        ],
         hardly_move=", ".join(result.still) or None,
         add_up=f"{100 * ADDS_UP:g} %" if method == "one at a time" else None,
         all_sets=if_true(method == "all sets"),
@@ -178,16 +187,6 @@ def causes(result: Explanation) -> list[Block]:
         noise=floor if noisy else None,
         quiet=floor if result.floor and not (noisy or result.is_rounding) else None,
         noise_part=percent(result.floor / result.gap) if noisy else None,
-    )
-
-
-def _located_note(place: Figures) -> list[Block]:
-    """How a feature that was left out on both sides, or an integrator, was found."""
-    return template.blocks(
-        "why_located",
-        cause=None if place.values or place.is_still else place.name,
-        idle=place.name if place.is_still and not place.values else None,
-        integrator=place.values and place.without,
     )
 
 
@@ -232,13 +231,15 @@ def _table(result: Explanation, able: Sequence[Figures]) -> list[Block]:
         share = sum(row.share or 0.0 for row in small)
         explains = TableCell(percent(share), share=share)
         rows.append((f"{len(small)} more, none above 0.1 %", NONE, NONE, explains, NONE, NONE))
-    title = "What differs"
-    if not result.is_rounding:
-        title = TITLE.format(
+    title = (
+        "What differs"
+        if result.is_rounding
+        else TITLE.format(
             gap=_amount(result, result.gap),
             quantity=result.quantity,
             measure=_MEASURES[result.measure],
         )
+    )
     words = frozenset({0, 1, 2})
     most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
     heading = f"{len(rows) - most} more differences, with smaller parts"
@@ -302,14 +303,15 @@ def _relative(figure: tuple[str, object, object]) -> float:
 
 
 def _value(value: object, unit: str) -> str:
-    if value is None:
-        return NONE
-    if isinstance(value, tuple):
-        return " ".join(_value(number, "") for number in value)
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    if isinstance(value, int | float):
-        return quantity(float(value), unit) if unit else significant(float(value))
+    match value:
+        case None:
+            return NONE
+        case tuple():
+            return " ".join(_value(number, "") for number in value)
+        case bool():
+            return "on" if value else "off"
+        case int() | float():
+            return quantity(float(value), unit) if unit else significant(float(value))
     return str(value)
 
 

@@ -114,8 +114,7 @@ def require_viser() -> ModuleType:
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
     """
-    viser: ModuleType = require_extra("viser", "view", "viser", "view")
-    return viser
+    return require_extra("viser", "view", "viser", "view")
 
 
 def free_port(host: str, port: int) -> int:

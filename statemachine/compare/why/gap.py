@@ -157,13 +157,12 @@ class Ruler:
     def distances(self, quantity: str, one: Curves, two: Curves) -> Array:
         """(n,) how far apart: the worst joint, or the length of the way between."""
         a, b = one[quantity], two[quantity]
-        if quantity == BALLS:
-            return turns(a, b).max(axis=1)
-        if self._kinds[quantity] == "body rotation":
-            return turns(a, b)
-        if quantity in ("joints", "slides"):
-            return farthest(a, b)
-        return distances(a, b)
+        match self._kinds[quantity]:
+            case "body":
+                return distances(a, b)
+            case "body rotation":
+                return turns(a, b)
+        return turns(a, b).max(axis=1) if quantity == BALLS else farthest(a, b)
 
     def gap(self, quantity: str, one: Curves, two: Curves) -> Deviation:
         """In one quantity."""

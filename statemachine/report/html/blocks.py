@@ -273,7 +273,6 @@ def _number(value: float, tolerance: float) -> str:
     return f"{value:.4f}" if abs(value) >= 1e-3 or value == 0 else figure(value)
 
 
-_VOID = ("br", "hr", "img", "input", "meta", "col")
 _SPOKEN = ("aria_label", "aria_valuetext", "title")
 # What turns the text around, and halves of pairs of characters.
 _TURNS = re.compile("[\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
@@ -319,7 +318,7 @@ def tag(name: str, *content: object, **attributes: object) -> Html:
         if value is not True:
             text = with_minus(str(value)) if key in _SPOKEN else str(value)
             said += f'="{html.escape(_printable(text))}"'
-    if name in _VOID:
+    if name == "img":  # the only one without an end
         return Html(f"<{name}{said}>")
     if name in ("code", "pre"):
         content = tuple(p if isinstance(p, Html) or p is None else literal(p) for p in content)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import itertools
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -40,21 +39,41 @@ def report(page: Page, looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK)) -> str:
     runs = next((block for block in page.blocks if isinstance(block, BothRuns)), None)
     stage, data, notes = (Html(""), None, []) if runs is None else staged(runs, looks)
 
-    opening = list(itertools.takewhile(_opens, page.blocks))
+    # What stands above all sections.
+    opening = list(
+        itertools.takewhile(
+            lambda block: (
+                not (isinstance(block, Interactive) or (isinstance(block, Section) and block.name))
+            ),
+            page.blocks,
+        )
+    )
     rest: list[Block] = [*page.blocks[len(opening) :]]
     if notes:
         rest.append(Section("picture", "Of the picture", [Items(notes)]))
-    parts = [_header(page, opening, stage, runs), drawn(rest, stage)]
-    about = f"statemachine {__version__}; this file asks for nothing but itself."
-    footer = tag("footer", tag("p", non_breaking(page.origin)), tag("p", about))
-    body = joined((tag("main", *parts), footer))
-    title = page.headline.lead if page.headline else page.title
-    return _assembled(title, body, data)
-
-
-def _opens(block: Block) -> bool:
-    """Whether a block belongs to the opening of a page, above all sections."""
-    return not (isinstance(block, Interactive) or (isinstance(block, Section) and block.name))
+    main = tag("main", _header(page, opening, stage, runs), drawn(rest, stage))
+    footer = tag(
+        "footer",
+        tag("p", non_breaking(page.origin)),
+        tag("p", f"statemachine {__version__}; this file asks for nothing but itself."),
+    )
+    # Without data for a script there is none.
+    script = "\n".join(template(name) for name in _SCRIPTS)
+    script = "" if data is None else f"(() => {{\n'use strict';\n{script}\n}})();"
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
+    slots = {
+        "policy": Html(policy),
+        "title": page.headline.lead if page.headline else page.title,
+        "style": Html(template("page.css")),
+        "body": joined((main, footer)),
+        "data": data_of(data or {}),
+        "script": Html(script),
+    }
+    return filled("page.html", slots)
 
 
 def _header(page: Page, opening: Sequence[Block], stage: Html, runs: BothRuns | None) -> Html:
@@ -64,10 +83,15 @@ def _header(page: Page, opening: Sequence[Block], stage: Html, runs: BothRuns | 
             tag("span", tag("i", class_=f"key {look}"), label, class_="side")
             for look, label in zip(("one", "two"), long_labels(runs.comparison), strict=True)
         )
-        against = tag("span", "against", class_="against")
         theme = tag("button", "Dark", id="theme", type="button", hidden=True,
                     aria_label="Dark colours")  # fmt: skip
-        name = [tag("span", runs.title, class_="experiment"), one, against, two, theme]
+        name = [
+            tag("span", runs.title, class_="experiment"),
+            one,
+            tag("span", "against", class_="against"),
+            two,
+            theme,
+        ]
     lead = [block for block in opening[:1] if isinstance(block, Text)]
     return tag(
         "header",
@@ -78,27 +102,7 @@ def _header(page: Page, opening: Sequence[Block], stage: Html, runs: BothRuns | 
     )
 
 
-def _assembled(title: str, body: Html, data: dict[str, Any] | None) -> str:
-    """The file; without data for a script there is none."""
-    script = "\n".join(template(name) for name in _SCRIPTS)
-    script = "" if data is None else f"(() => {{\n'use strict';\n{script}\n}})();"
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    policy = (
-        f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
-        "img-src data:; base-uri 'none'; form-action 'none'"
-    )
-    slots = {
-        "policy": Html(policy),
-        "title": title,
-        "style": Html(template("page.css")),
-        "body": body,
-        "data": data_of(data or {}),
-        "script": Html(script),
-    }
-    return filled("page.html", slots)
-
-
-def check_target(path: str | os.PathLike[str]) -> Path:
+def check_target(path: str | Path) -> Path:
     """Where a report is to be written, checked before anything is run.
 
     Raises:
@@ -111,16 +115,15 @@ def check_target(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def write_report(path: str | os.PathLike[str], text: str) -> Path:
+def write_report(path: str | Path, text: str) -> Path:
     """Write a report; it is there whole or not at all.
 
     Raises:
         BadInputError: See `check_target`.
         OSError: It cannot be written.
     """
-    target = check_target(path)
-    replace_text(target, text)
-    return target
+    replace_text(check_target(path), text)
+    return Path(path)
 
 
 _TICKS = 6  # of the axis of time
