@@ -92,6 +92,8 @@ def test_fingertip_of_other_models_and_frames(here: Cli, pinocchio: None) -> Non
 
 MOVED, LONGER = ("-0.098127", "-0.078227"), ("-0.11257 -0.028 0", "-0.11258 -0.028 0")
 TURNED = ('-0.098127" quat="0.7071067811865475 0 0.7071067811865475 0', '-0.078227" quat="1 0 0 0')
+NEARLY = ('pos="0.012 -0.000218', 'pos="0.01201 -0.000218')
+NEARLY_TURNED = ('quat="0.7071067811865475 0 0.7071067811865475', 'quat="0.70711 0 0.7071')
 RENAMED = ('body name="gripper"', 'body name="hand"')
 
 
@@ -99,6 +101,8 @@ RENAMED = ('body name="gripper"', 'body name="hand"')
     ("edits", "said"),
     [
         ((TURNED,), ("19.90 mm, 90.00°", "refused")),
+        ((NEARLY,), ("refused",)),
+        ((NEARLY_TURNED,), ("refused",)),
         ((LONGER,), ("DISAGREE", "1.0e-05")),
         ((RENAMED,), ()),
         ((RENAMED, MOVED), ("19.90 mm, 0.00°",)),

@@ -380,15 +380,6 @@ def test_each_figure_of_a_model_is_found_and_brought_over(model):
     assert tried > 15
 
 
-def test_shapley_values_of_a_game_whose_values_are_known():
-    """Of v(S) = 1 - max over S each gets what it adds, as in the airport game."""
-    costs = {"a": 0.1, "b": 0.3, "c": 0.6, "d": 1.0}
-    found = shapley(list(costs), lambda s: 1.0 - max((costs[n] for n in s), default=0.0), 1.0)
-    known = {"a": 0.025, "b": 0.025 + 0.2 / 3, "c": 0.025 + 0.2 / 3 + 0.15}
-    known["d"] = 1.0 - sum(known.values())
-    assert_has(found, method="all sets", share=pytest.approx(known))
-
-
 def test_drawn_orders_come_with_their_error():
     names = [f"cause {k}" for k in range(10)]
 

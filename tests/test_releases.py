@@ -332,14 +332,6 @@ class TestReleases:
             ),
         )
 
-    @pytest.mark.parametrize("call", [2, 7, 100])
-    def test_steps_in_one_call_are_steps_one_by_one(self, call: int) -> None:
-        model = sm.load("so101/scene", backend=OLD)
-        singly, _ = run_of(model, 700)
-        together, data = run_of(model, 700, call)
-        assert np.array_equal(together, singly[call - 1 :: call])
-        assert data.time == pytest.approx(3.5)
-
     @pytest.mark.parametrize("release", [SAME, BULLET])
     def test_the_contract_is_kept(self, release: str) -> None:
         assert not [o for o in conformance.run(release) if o.result == "failed"]
@@ -419,24 +411,6 @@ class TestReleases:
                 lambda: sm.load("so101", backend=STRANGE),
             )
         )
-
-    @pytest.mark.parametrize(
-        "options",
-        [
-            {"contacts": False},
-            {"gravity": (0, 0, -1)},
-            {"mass": 2.0},
-            {"kp": 9.0},
-            {"timestep": 1e-3},
-        ],
-        ids=str,
-    )
-    def test_options_reach_it(self, options: dict[str, Any]) -> None:
-        model = sm.load("so101/scene", backend=SAME)
-        if "mass" in options:
-            options = {"mass": model.body_mass * 2}
-        ours = sm.load("so101/scene").replace(**options)
-        assert np.array_equal(run_of(ours)[0], run_of(model.replace(**options))[0])
 
     def test_a_dead_process_is_one_error_and_the_others_go_on(self) -> None:
         model = sm.load("so101", backend=OLD)

@@ -18,6 +18,9 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+
+
 def _print(line: bytes) -> None:
     ctypes.CDLL(None).puts(line)
 
@@ -79,10 +82,8 @@ def test_what_another_thread_prints_is_not_caught(capfd: pytest.CaptureFixture[s
     assert capfd.readouterr() == ("one\n", "two\n")
 
 
-@pytest.mark.usefixtures("bullet")
-def test_nothing_is_lost_while_worlds_are_made() -> None:
-    """A thread prints two hundred numbered lines while the engine loads and is quiet."""
-    code = """
+# A thread prints two hundred numbered lines while the engine loads and is quiet.
+PRINTING = """
 import os, threading, time
 import statemachine as sm
 
@@ -100,13 +101,9 @@ while printing.is_alive() or made < 3:
     sm.make_data(model).close()
     made += 1
 """
-    runs_in_silence(code, ROOT, "".join(f"{k}\n" for k in range(200)))
 
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
-def test_a_fork_meanwhile_does_not_hang() -> None:
-    """The child has neither the other thread's lock nor its streams."""
-    code = """
+# The child has neither the other thread's lock nor its streams.
+FORKING = """
 import ctypes, os, threading
 from statemachine.installed import silence
 
@@ -133,14 +130,9 @@ ended.set()
 thread.join()
 assert status == 0, status
 """
-    runs_in_silence(code, ROOT, "seen\n")
 
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
-@pytest.mark.usefixtures("bullet")
-def test_a_fork_while_a_world_is_used_does_not_hang() -> None:
-    """The worlds that the Data of one Model share are behind a lock, too."""
-    code = """
+# The worlds that the Data of one Model share are behind a lock, too.
+USING = """
 import os, threading
 import statemachine as sm
 from statemachine.backends import HiddenWorld
@@ -166,4 +158,17 @@ ended.set()
 thread.join()
 assert status == 0, status
 """
-    runs_in_silence(code, ROOT)
+
+
+@pytest.mark.parametrize(
+    ("code", "printed"),
+    [
+        (PRINTING, "".join(f"{k}\n" for k in range(200))),
+        pytest.param(FORKING, "seen\n", marks=forks),
+        pytest.param(USING, "", marks=forks),
+    ],
+    ids=["printing", "forking", "using"],
+)
+@pytest.mark.usefixtures("bullet")
+def test_other_threads_lose_nothing_and_a_fork_does_not_hang(code: str, printed: str) -> None:
+    runs_in_silence(code, ROOT, printed)

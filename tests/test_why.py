@@ -220,19 +220,28 @@ def test_finer_splits_what_changed_alike(arm: Model) -> None:
     assert sum(shares(result).values()) == pytest.approx(1.0, abs=0.05)
 
 
-def test_causes_that_do_nothing_alone_and_nothing_last_get_their_part() -> None:
-    """Either of two redundant causes takes away what both do, once a third is brought over."""
-    result = shapley(
-        ["a", "b", "c"],
+AIRPORT = {"a": 0.1, "b": 0.3, "c": 0.6, "d": 1.0}
+# A game, and the part of each: of v(S) = 1 - max over S each gets what it adds, as in the airport
+# game; either of two redundant causes takes away what both do, once a third is brought over.
+GAMES: list[tuple[Any, dict[str, float]]] = [
+    (
+        lambda brought: 1.0 - max((AIRPORT[name] for name in brought), default=0.0),
+        {"a": 0.025, "b": 0.025 + 0.2 / 3, "c": 0.175 + 0.2 / 3, "d": 0.775 - 0.4 / 3},
+    ),
+    (
         lambda brought: 1.0 - ("a" in brought) * (0.73 + 0.27 * bool(brought & {"b", "c"})),
-        1.0,
-    )
-    assert result.alone["b"] == result.last["b"] == 0.0
-    assert result.share == {
-        "a": pytest.approx(0.73 + 0.27 * 2 / 3),
-        "b": pytest.approx(0.27 / 6),
-        "c": pytest.approx(0.27 / 6),
-    }
+        {"a": 0.73 + 0.27 * 2 / 3, "b": 0.27 / 6, "c": 0.27 / 6},
+    ),
+]
+
+
+@pytest.mark.parametrize(("value", "shares"), GAMES)
+def test_shapley_values_of_games_whose_values_are_known(
+    value: Any, shares: dict[str, float]
+) -> None:
+    found = shapley(list(shares), value, 1.0)
+    assert_has(found, method="all sets", share=pytest.approx(shares))
+    assert "d" in shares or found.alone["b"] == found.last["b"] == 0.0
 
 
 def test_a_cause_that_needs_another_comes_after_it() -> None:
