@@ -26,7 +26,7 @@ from statemachine.backends import backend_engine, backend_names
 from statemachine.cli import main
 from statemachine.errors import MissingEngineError, StateMachineError
 from statemachine.installed import ENGINES, engine_version, require
-from statemachine.interface import Data, Model, make_data, reset, step
+from statemachine.interface import Data, Model, forward, make_data, reset, step
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import take
 from statemachine.measures.quantities import readings
@@ -265,11 +265,17 @@ def distribution(folder: Path, name: str, version: str, entries: str = "") -> Pa
 
 @contextmanager
 def opened(
-    model: Model, keyframe: int | str | None = None, *, nstep: int = 0, **inputs: Any
+    model: Model,
+    keyframe: int | str | None = None,
+    *,
+    nstep: int = 0,
+    derived: bool = False,
+    **inputs: Any,
 ) -> Iterator[tuple[Model, Data]]:
     """A Model and a Data of it, in a keyframe or in the default state, or some steps later.
 
-    The inputs, `qpos`, `qvel` or `ctrl`, are written before those steps.
+    The inputs, `qpos`, `qvel` or `ctrl`, are written before those steps. `derived` says whether
+    what follows from the state is computed then.
     """
     with make_data(model) as data:
         if keyframe is not None:
@@ -278,6 +284,8 @@ def opened(
             getattr(data, name)[:] = value
         if nstep:
             step(model, data, nstep)
+        if derived:
+            forward(model, data)
         yield model, data
 
 

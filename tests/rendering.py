@@ -73,8 +73,7 @@ def overlaps_of_silhouettes(one: sm.Model, other: str | Path, at: Path) -> np.nd
     """Intersection over union of two arms' silhouettes, from several sides, in poses."""
     shots = []
     for qpos in POSES:
-        with opened(one, qpos=qpos) as (model, data):
-            sm.forward(model, data)
+        with opened(one, qpos=qpos, derived=True) as (_, data):
             middle = (data.xpos[1:].min(axis=0) + data.xpos[1:].max(axis=0)) / 2
         shots += [(qpos, Camera(tuple(middle), 0.62, *view, fovy=45)) for view in VIEWS]
     masks = [silhouettes(path, shots, (480, 360), at) for path in (one.path, other)]

@@ -50,8 +50,7 @@ def test_forces_sum_with_the_bias_on_the_other_side() -> None:
 
 def test_gravity_is_read_at_the_moment_of_the_end(mujoco_scene: sm.Model) -> None:
     found = lesson_result("gravity", mujoco_scene, seconds=1.0)
-    with opened(mujoco_scene, nstep=200) as (_, data):
-        sm.forward(mujoco_scene, data)
+    with opened(mujoco_scene, nstep=200, derived=True) as (_, data):
         assert found.servos_on.forces["actuator"] == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()
     touch = found.servos_off.touches["gripper on floor (fixed_stud_1)"]

@@ -122,8 +122,7 @@ def test_after_a_write_everything_is_of_before(model: Model) -> None:
 
 def test_each_array_has_its_own_inputs(model: Model) -> None:
     """Found by value: poses do not hear of qvel and ctrl, nor the bias of ctrl."""
-    with opened(model, qpos=TARGET, ctrl=TARGET) as (_, data):
-        sm.forward(model, data)
+    with opened(model, qpos=TARGET, ctrl=TARGET, derived=True) as (_, data):
         data.ctrl[1] += 1e-3
         by_ctrl = set(sm.freshness(model, data).stale)
         # kp · 0.001 rad, unsaturated: the servo is affine in ctrl.
@@ -411,8 +410,7 @@ def test_a_figure_and_its_place_stay_on_one_line() -> None:
 
 def test_contacts_are_matched_by_what_touches() -> None:
     """One moves, one of its pair comes, another pair goes."""
-    with opened(sm.load("so101/scene_box"), keyframe=1) as (model, data):
-        sm.forward(model, data)
+    with opened(sm.load("so101/scene_box"), keyframe=1, derived=True) as (model, data):
         now = data.contacts
     assert len(now) == 4
 
@@ -452,8 +450,7 @@ def test_a_forward_that_omits_the_forces() -> None:
 
 def test_what_is_written_past_the_interface_is_seen() -> None:
     """A force that only the engine's own object takes."""
-    with opened(sm.load("so101")) as (model, data):
-        sm.forward(model, data)
+    with opened(sm.load("so101"), derived=True) as (model, data):
         data.raw.qfrc_applied[1] = 0.1
         assert "qacc" in sm.freshness(model, data).stale
         with sm.watch_freshness(model, data, raise_on_stale=True):

@@ -147,18 +147,6 @@ def test_the_box_is_held_by_the_action_0_and_dropped_by_open_jaws(backend: str) 
         assert not info["diverged"]
 
 
-def test_what_was_before_decides_nothing(backend: str) -> None:
-    with _make(HELD_BOX, backend) as env:
-        runs = []
-        for _ in range(2):
-            env.action_space.seed(1)
-            run = [env.reset(seed=9)[0]]
-            run += [env.step(0.3 * env.action_space.sample())[0] for _ in range(10)]
-            runs.append(np.array(run))
-            env.step(np.ones(6, dtype=np.float32))
-        assert runs[0].tobytes() == runs[1].tobytes()
-
-
 def _against_single(task: str, backend: str, mode: AutoresetMode, workers: int, steps: int) -> int:
     """Ours against Gymnasium's own loop over single ones; how many episodes ended."""
     ours = _make_vec(task, backend, 3, workers=workers, autoreset_mode=mode, max_episode_steps=9)

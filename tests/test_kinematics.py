@@ -33,8 +33,7 @@ def _against_mujoco(model: sm.Model, qpos: np.ndarray, site: str) -> float:
     """The worst difference of pose and of Jacobian."""
     kinematics = sm.Kinematics(model.path)
     where = model.site_id(site)
-    with opened(model, qpos=qpos) as (_, data):
-        sm.forward(model, data)
+    with opened(model, qpos=qpos, derived=True) as (_, data):
         pose = kinematics.pose(qpos, site)
         jacobian = np.zeros((6, model.nv))
         mujoco.mj_jacSite(model.raw, data.raw, jacobian[:3], jacobian[3:], where)

@@ -83,8 +83,7 @@ def test_parts_of_the_constraint_force_add_up(
         "<joint joint='a' coef='1'/><joint joint='b' coef='1'/></fixed></tendon>"
         "<equality><joint joint1='b' polycoef='0.1 0 0 0 0'/></equality>",
     )
-    with opened(model, nstep=60) as (_, data):
-        sm.forward(model, data)
+    with opened(model, nstep=60, derived=True) as (_, data):
         parts = {
             n: getattr(data, f"qfrc_{n}") for n in ("contact", "friction", "limit", "equality")
         }
@@ -208,8 +207,7 @@ except (KeyboardInterrupt, sm.errors.DivergedError) as error:
 
 
 def test_what_raw_shows_stays_writable() -> None:
-    with opened(sm.load("so101")) as (model, data):
-        sm.forward(model, data)
+    with opened(sm.load("so101"), derived=True) as (model, data):
         data.raw.qacc[:] = 0.0
         mujoco.mj_inverse(model.raw, data.raw)
         assert not data.qacc.flags.writeable

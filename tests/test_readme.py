@@ -228,8 +228,7 @@ def test_numbers_of_the_models_readme(mujoco_arm: Model) -> None:
     assert f"{mujoco_arm.raw.body_mass.sum():.2f} kg" in text
     assert_in(text, "0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744")
     assert mujoco_arm.dof_armature[0] == 0.028
-    with opened(sm.load("so101/scene_box"), keyframe=0) as (box, data):
-        sm.forward(box, data)
+    with opened(sm.load("so101/scene_box"), keyframe=0, derived=True) as (box, data):
         geom = box.geom_id("box")
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         turn = data.raw.geom_xmat[geom].reshape(3, 3)
