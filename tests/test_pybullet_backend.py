@@ -23,8 +23,6 @@ from statemachine.errors import (
     EngineWarning,
     UnsupportedError,
 )
-from statemachine.interface import DERIVED
-from statemachine.rotations import matrix_from_quat
 
 from .conftest import (
     ROOT,
@@ -37,7 +35,7 @@ from .conftest import (
     runs_in_silence,
     written,
 )
-from .small_models import TREES, TWO_ROOTS, on_both
+from .small_models import TWO_ROOTS, on_both
 from .test_golden import angles
 
 Golden = Callable[[str], np.ndarray]
@@ -122,51 +120,13 @@ def _world(inside: str) -> str:
 # Other models than the arm.
 
 
-def zoo(folder: Path, turn: float = 1.0) -> list[tuple[sm.Model, sm.Data]]:
-    """A model with one of everything, in one random state, on MuJoCo and on PyBullet."""
-    random = np.random.default_rng(0)
-    pairs = [(model, sm.make_data(model)) for model in on_both(mjcf(folder, TREES))]
-    qpos = pairs[0][1].qpos.copy()
-    qpos[:5] = random.uniform(-0.5, 0.5, 5)
-    qpos[5] = 0.4
-    for start in (6, 13):
-        quat = random.normal(size=4)
-        qpos[start + 3 : start + 7] = quat / np.linalg.norm(quat)
-    qvel = random.uniform(-1, 1, 18)
-    qvel[15:] *= turn
-    for model, data in pairs:
-        data.qpos, data.qvel, data.ctrl = qpos, qvel, (0.1, 0.3, -0.2, 0.1)
-        sm.forward(model, data)
-    return pairs
-
-
-def test_zoo_is_what_mujoco_says(tmp_path: Path) -> None:
-    """Poses and forces of a state are closed forms: 3e-14 is the worst that was measured."""
-    (_, theirs), (_, ours) = zoo(tmp_path)
-    assert len(ours.contacts) == len(theirs.contacts) == 0
-    for name in (*DERIVED[:4], "qfrc_bias", "qfrc_passive", "qfrc_actuator", "qacc"):
-        expected, found = getattr(theirs, name), getattr(ours, name)
-        assert np.abs(expected).max() > 0.01, name
-        if name == "xquat":  # a body's quaternion and its negative are one rotation
-            expected, found = matrix_from_quat(expected), matrix_from_quat(found)
-        assert np.abs(found - expected).max() < 1e-10, name
-    # Dry friction is a sum over sweeps; the joint that has it moves too fast to stick.
-    assert np.abs(ours.qfrc_friction - theirs.qfrc_friction).max() < 1e-6
-    assert not ours.qfrc_limit.any()
-    assert np.abs(ours.qfrc_contact).max() < 1e-10
-
-
 def test_a_fast_ball_has_the_signs_of_mujoco(tmp_path: Path) -> None:
     """Its quaternion turns through both halves of the sphere, step by step."""
-    pairs = zoo(tmp_path, turn=60.0)
-    signs = set()
-    for _ in range(300):
-        for model, data in pairs:
-            sm.step(model, data)
-        (_, theirs), (_, ours) = pairs
-        signs.add(bool(theirs.qpos[16] > 0))
-        assert ours.qpos[16:20] @ theirs.qpos[16:20] > 0.99
-    assert signs == {True, False}
+    ball = _world("<body><freejoint/><geom size='0.1'/></body>")
+    start = {"nstep": 300, "qvel": (0.1, 0.2, 0.3, 40, -30, 20)}
+    theirs, ours = (path(model, **start)[:, 3:] for model in on_both(mjcf(tmp_path, ball)))
+    assert (np.einsum("ni,ni->n", theirs, ours) > 0.99).all()
+    assert set(np.sign(theirs[:, 0])) == {1, -1}
 
 
 def test_two_free_bodies_are_two(tmp_path: Path) -> None:
