@@ -168,6 +168,12 @@ ALONE = {
     "no spring": Case(
         f"{_OPTION}/>", f'{_OPTION}><flag spring="disable"/></option>', "spring", "slides"
     ),
+    "servos off": Case(
+        f"{_OPTION}/>", f'{_OPTION}><flag actuation="disable"/></option>', "actuation"
+    ),
+    "contacts off": Case(
+        f"{_OPTION}/>", f'{_OPTION}><flag contact="disable"/></option>', "contact", "ball"
+    ),
     "weight": _more('<body name="upper"', 'gravcomp="1"', "weight taken off of upper"),
     "geom moved": _more(_BALL, 'pos="0.003 0 0"', "place of ball_shape", "ball"),
     "size": Case(f'{_BALL} size="0.05"', f'{_BALL} size="0.055"', "shape of ball_shape", "ball"),

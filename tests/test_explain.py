@@ -572,6 +572,7 @@ HIP = with_changes(
         ('0 0.2 1 0 0 0  0"', '0 0.2 1 0 0 0  1 0 0 0  0"'),
     ],
 )  # fmt: skip
+SHORT = with_changes(ARM, [('range="-2 2"', 'range="-.3 .3"')])  # the motion reaches its ends
 ASLEEP = with_changes(ARM, [('implicitfast"/>', 'implicitfast"><flag sleep="enable"/></option>')])
 # A floating body falls onto a table that was moved: the table moved, not the robot.
 TABLE = with_changes(
@@ -620,6 +621,14 @@ ARM.replace("<actuator>", TENDON.format(1)), ARM.replace("<actuator>", TENDON.fo
     ),
     "other actuators for who writes by number": (
         ARM, _swapped(ARM), ["order of ctrl"], {"scenario": BY_NUMBER}
+    ),
+    "limits off": (
+        SHORT,
+        with_changes(
+            SHORT, [('implicitfast"/>', 'implicitfast"><flag limit="disable"/></option>')]
+        ),
+        ["limit"],
+        {},
     ),
     "no command on either side": (
         ARM, OTHER_CTRL, ["ctrl of the start"], {"scenario": HOME_LEAVE}

@@ -26,7 +26,6 @@ from statemachine.interface import DERIVED
 
 from .conftest import (
     ROOT,
-    after,
     bits,
     interrupted_at,
     opened,
@@ -104,21 +103,6 @@ def _in_each_step(data: sm.Data, act: Callable[[], object]) -> None:
     """Let something happen in a step, as in a callback or a signal handler."""
     advance = data._advance
     object.__setattr__(data, "_advance", lambda *args: (advance(*args), act()))
-
-
-def test_another_data_is_not_refused(model: sm.Model) -> None:
-    """The Model, and what its Data share behind it, may be used by all threads."""
-    with sm.make_data(model) as data, sm.make_data(model) as other:
-
-        def use() -> None:
-            sm.step(model, other, 5)
-            sm.forward(model, other)
-            assert other.qacc.any()
-            after(model, 1)
-
-        raised = meanwhile(data, use, "_advance")
-        sm.step(model, data)
-        assert raised == [None]
 
 
 def test_a_hook_may_use_what_its_own_data_offers(
