@@ -9,7 +9,8 @@ it: their faces are then where they belong, and their edges are rounded.
 
 from __future__ import annotations
 
-from functools import cache, cached_property
+from collections.abc import Sequence
+from functools import cache, cached_property, lru_cache
 from typing import Any
 
 import mujoco
@@ -37,6 +38,7 @@ _MESH, ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_EL
 HULLS = (_MESH, ELLIPSOID)
 MARGIN = 1e-3  # [m] PyBullet's, around each hull that it reads from a file
 _THINNEST = 0.25  # a hull is made smaller by this part of its smallest width at most
+_HULLS_KEPT, _AT_ONCE = 128, 16  # of a process; vertices for which planes are tried together
 # An icosahedron that is divided three times: 642 vertices.
 _SPHERE = """<mujoco><asset><mesh name="ball" builtin="sphere" params="3"/></asset><worldbody>
 <geom type="mesh" mesh="ball"/></worldbody></mujoco>"""
@@ -107,7 +109,7 @@ class Plan:
     def hulls(self) -> dict[int, Hull]:
         """Hulls of the geoms that touch and are meshes or ellipsoids."""
         geoms = (geom for solid in self.surfaces.solids for geom in solid.geoms)
-        return {g: Hull(self.raw, g) for g in geoms if int(self.raw.geom_type[g]) in HULLS}
+        return {g: hull_of(self.raw, g) for g in geoms if int(self.raw.geom_type[g]) in HULLS}
 
     def _describe(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
         """URDF of a tree of bodies as a world of that kind reads it.
@@ -216,27 +218,45 @@ class Hull:
 
     Attributes:
         allowance: How much smaller it can be made [m]: the margin, or what its thickness allows.
+        obj: Gives OBJ of it [m], with PyBullet's margin taken off or not.
     """
 
-    def __init__(self, raw: mujoco.MjModel, geom: int) -> None:
-        self._vertices, self._faces = _solid(raw, geom)
-        self._planes = normals, offsets = _planes(self._vertices, self._faces)
-        widths = offsets - (self._vertices @ normals.T).min(axis=0)
+    def __init__(self, vertices: Array, faces: Faces) -> None:
+        self._vertices, self._faces = vertices, faces
+        normals, offsets = _planes(vertices, faces)
+        near = 1e-9 * float(np.abs(vertices).max()) + 1e-12
+        # By plane how far the farthest vertex is behind it, by vertex which planes it is on.
+        widths, meeting = np.zeros(len(offsets)), list[Array]()
+        for start in range(0, len(vertices), _AT_ONCE):
+            depths = offsets - vertices[start : start + _AT_ONCE] @ normals.T
+            widths = np.maximum(widths, depths.max(axis=0))
+            vertex, plane = np.nonzero(np.abs(depths) < near)
+            meeting += np.split(normals[plane], vertex.searchsorted(range(1, len(depths))))
+        self._meeting = meeting
         self.allowance = min(MARGIN, round(_THINNEST * float(widths.min()), 10))
+        self.obj = cache(self._obj)
 
-    def obj(self, smaller: bool) -> str:
-        """OBJ of it [m].
-
-        Args:
-            smaller: Whether to take PyBullet's margin off.
-        """
+    def _obj(self, smaller: bool) -> str:
         vertices = self._vertices
         if smaller:
-            vertices = _inset(vertices, *self._planes, self.allowance)
+            vertices = _inset(vertices, self._meeting, self.allowance)
         # Rounded: the last bits of NumPy's sums are those of the processor.
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in (np.round(vertices, 10) + 0.0).tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (self._faces + 1).tolist()]
         return "\n".join([*lines, ""])
+
+
+@lru_cache(_HULLS_KEPT)
+def _kept_hull(vertices: bytes, faces: bytes) -> Hull:
+    return Hull(
+        np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(faces, np.int64).reshape(-1, 3)
+    )
+
+
+def hull_of(raw: mujoco.MjModel, geom: int) -> Hull:
+    """The hull of a geom; one for all geoms and models that have the same."""
+    vertices, faces = _solid(raw, geom)
+    return _kept_hull(vertices.tobytes(), faces.astype(np.int64).tobytes())
 
 
 def roughness(size: Array) -> float:
@@ -286,13 +306,20 @@ def _planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
     return normals, np.einsum("ij,ij->i", normals, a[~flat])
 
 
-def _inset(vertices: Array, normals: Array, offsets: Array, distance: float) -> Array:
-    """Vertices of a hull whose planes are a distance [m] further in, as well as they allow."""
-    scale = float(np.abs(vertices).max())
-    moved = vertices.copy()
-    for k, vertex in enumerate(vertices):
-        meeting = normals[np.abs(normals @ vertex - offsets) < 1e-9 * scale + 1e-12]
-        if len(meeting):  # where more than three planes meet, as near to all as it goes
-            step = np.linalg.lstsq(meeting, np.full(len(meeting), -distance), rcond=1e-6)[0]
-            moved[k] += step * min(1.0, 4 * distance / max(float(np.linalg.norm(step)), 1e-300))
-    return moved
+def _inset(vertices: Array, meeting: Sequence[Array], distance: float) -> Array:
+    """Vertices (n, 3) of a hull whose planes are a distance [m] further in.
+
+    Where more than three planes meet, as near to all as it goes: least squares.
+
+    Args:
+        vertices: Of the hull.
+        meeting: By vertex the normals (k, 3) of the planes that it is on.
+        distance: How far.
+    """
+    most = max(map(len, meeting))
+    normals, goal = np.zeros((len(vertices), most, 3)), np.zeros((len(vertices), most, 1))
+    for k, own in enumerate(meeting):
+        normals[k, : len(own)], goal[k, : len(own)] = own, -distance
+    steps = (np.linalg.pinv(normals, rcond=1e-6) @ goal)[..., 0]
+    far = np.linalg.norm(steps, axis=1, keepdims=True)
+    return vertices + steps * np.minimum(1.0, 4 * distance / np.maximum(far, 1e-300))

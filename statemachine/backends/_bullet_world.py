@@ -144,7 +144,8 @@ class World:
         self._changes: dict[int, tuple[Array, Array]] = {}
         for body, (centre, axes) in self._frames.items():
             inward = matrix_from_quat(wxyz_from_xyzw(np.array(axes))).T.copy()
-            lever = np.cross(np.eye(3), centre).T.copy()  # times w: w × centre
+            # Times w: w × centre.
+            lever = np.array(np.cross(np.eye(3), centre).T, dtype=np.float64, order="C")
             change = np.zeros((6, 6))
             change[:3, 3:], change[3:, 3:] = inward, dense.product(inward, lever)
             self._changes[body] = change, inward
