@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from functools import partial
 from pathlib import Path
@@ -31,7 +32,7 @@ TREE = """<body name="base" pos=".1 .2 1" euler="10 20 30"> {base}
   <inertial pos=".1 0 0" mass=".7" diaginertia=".002 .003 .004"/>
   <body name="lower" pos=".2 0 0">
    <joint name="s" type="slide" axis="1 0 .2" stiffness="40" damping="1"/>
-   <joint name="b" axis="1 0 .2" frictionloss=".02" damping=".05"/>
+   <joint name="b" axis="1 0 .2" frictionloss=".02" damping=".05" armature=".004"/>
    <inertial pos="0 .05 .1" quat="1 .2 .3 .1" mass=".4" diaginertia=".001 .0015 .002"/>
    <site name="tip" pos=".1 .1 .02" quat="1 .1 .2 .3"/>
   </body>
@@ -126,6 +127,26 @@ def test_what_acts_on_each_body(tmp_path: Path, medium: str, base: str) -> None:
     assert gap(models) < 1e-6
     raw = models[0].compiled
     assert raw.ngravcomp or raw.opt.density or raw.opt.viscosity
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_a_tree_of_milligrams(tmp_path: Path, base: str) -> None:
+    """What the engine's base weighs does not count, whatever the tree weighs."""
+    laws = r'(armature|damping|stiffness|frictionloss)="[^"]*"'
+    world = re.sub(laws, "", TREE.format(base=BASES[base]))
+    assert gap(both(tmp_path, world, '<compiler settotalmass="1e-6"/>', option("Euler"))) < 1e-6
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_a_tree_of_as_many_joints_as_there_is_room_for(tmp_path: Path, base: str) -> None:
+    """119 and the link of the base: bodies with two joints have two links."""
+    body = '<body pos=".02 0 .01"><joint axis="0 1 {}" damping=".1"/>{}<geom size=".02"/>'
+    slide = '<joint type="slide" stiffness="90" damping="3"/>'
+    rows = [body.format(k % 2, slide if k % 2 else "") for k in range(79)]
+    world = f'<body>{BASES[base]}<geom size=".1"/><site/>{"".join(rows)}{"</body>" * 80}'
+    models = both(tmp_path, world, "", option("Euler", 'gravity="0 2 -3"'), contacts=False)
+    assert (models[0].nv - 6 * (base == "floating")) == 118
+    assert gap(models) < 1e-6
 
 
 PAIRED = """<geom name="floor" type="plane" size="3 3 .1" contype="0" conaffinity="0"/>
@@ -255,6 +276,10 @@ TOLD = {
     "springyield of a tendon": ("", f'<tendon><fixed stiffness="3" springyield="9">{SUM}</tendon>'),
     "diagexact": ("", '<option><flag diagexact="enable"/></option>'),
     "adhesion": ('adhesion="1"', ""),
+    "an actuator of adhesion": (
+        "",
+        '<actuator><adhesion body="lower" ctrlrange="0 1"/></actuator>',
+    ),
     "the margin of a pair": (" ", PAIR.format('margin=".05"')),
     "the second friction of a pair": (" ", PAIR.format('friction="1 .5 .005 .0001 .0001"')),
     "solref, solimp or solreffriction of a pair": (" ", PAIR.format('solref=".1 1"')),

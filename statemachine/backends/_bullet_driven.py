@@ -22,7 +22,7 @@ from ._bullet_contacts import contacts_of
 from ._bullet_drives import in_force
 from ._bullet_law import Law
 from ._bullet_plan import Plan
-from ._bullet_world import Tree, World, body_frames
+from ._bullet_world import Tree, World
 from ._hidden_world import HiddenWorld, Memory, Moment, Read, bounded
 from .compiled import gravity
 
@@ -276,7 +276,7 @@ class Ghost(World):
         xpos, xquat = (array.copy() for array in self.still[:2])
         for tree, centres in zip(self.trees, self._states(qpos), strict=True):
             bodies = list(tree.links)
-            xpos[bodies], xquat[bodies] = body_frames(raw, bodies, *centres)
+            xpos[bodies], xquat[bodies] = self.frames(bodies, *centres)
         for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
             body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
             quat = qpos[start + 3 : start + 7]

@@ -55,7 +55,8 @@ class Drives:
         joints = raw.dof_jntid[tree.dofs]
         on_tendon = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
         target = raw.actuator_trnid[:, 0]
-        driven = np.where(on_tendon, np.isin(target, tendons.ids), np.isin(target, joints))
+        on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+        driven = np.isin(target, tendons.ids) & on_tendon | np.isin(target, joints) & on_joint
         ids = np.flatnonzero(driven & (not off["actuation"]) & in_force(raw))
         self._ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
         self._gear = np.zeros((len(joints), len(ids)))

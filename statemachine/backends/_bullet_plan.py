@@ -26,8 +26,9 @@ _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 # which it grips soon and the eigenvalue of `_padding` is 0.97 at most.
 _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
 _YIELDS = 0.02
-# PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
-MOST_PARTS = 120
+# PyBullet has room for 128 numbers of a tree, and of a position for 7 of its base; from 122 joints
+# on what it tells is wrong, and from 127 links on it has no such tree.
+MOST_LINKS = 120
 _EQ, SITE = mujoco.mjtEq, int(mujoco.mjtObj.mjOBJ_SITE)
 _SUMS, PLACES = (_EQ.mjEQ_JOINT, _EQ.mjEQ_TENDON), (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD)
 
@@ -111,6 +112,12 @@ class Plan:
         geoms = (geom for solid in self.surfaces.solids for geom in solid.geoms)
         return {g: hull_of(self.raw, g) for g in geoms if int(self.raw.geom_type[g]) in HULLS}
 
+    def links(self, root: int) -> int:
+        """How many links a tree has in PyBullet, without those of sites: one a joint or a solid."""
+        bodies = urdf.tree(self.raw, root)
+        further = [s for s in self.surfaces.solids if s.part and s.body in bodies]
+        return len(further) + sum(max(1, len(urdf.axes(self.raw, body))) for body in bodies)
+
     def _describe(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
         """URDF of a tree of bodies as a world of that kind reads it.
 
@@ -130,7 +137,7 @@ class Plan:
             dynamics=kind == "engine",
             anchored=bool(root) and not loose,
             padding=self.padding if kind == "stepped" else None,
-            tips=kind != "stepped" and urdf.parts(raw, root) + sites <= MOST_PARTS,
+            tips=kind != "stepped" and self.links(root) + sites <= MOST_LINKS,
             hulls=frozenset(hulls),
             parts={geom: solid.part for solid in self.surfaces.solids for geom in solid.geoms},
         )

@@ -13,8 +13,8 @@ from ..interface import Array, JointType
 from ..measures.text import few
 from ._bullet_contacts import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_drives import DYNAMICS, in_force
-from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_PARTS, Plan, ends_of, linear_sum, roughness
-from ._bullet_urdf import parts, roots
+from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_LINKS, Plan, ends_of, linear_sum, roughness
+from ._bullet_urdf import roots
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 # What MuJoCo's contacts have by default; and the part of a speed that is a bounce to tell of.
@@ -42,7 +42,7 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     """
     raw = plan.raw
     problems = _of_the_whole(raw)
-    rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw), *_of_ties(raw)]
+    rows = [*_of_joints(raw), *_of_bodies(plan), *_of_actuators(raw), *_of_ties(raw)]
     if as_it_comes:
         problems += _of_the_law(raw)
     rows += _of_geoms(plan)
@@ -106,11 +106,11 @@ def _of_joints(raw: mujoco.MjModel) -> Rows:
     return [("joint", feature, which, "has it") for feature, which in features.items()]
 
 
-def _of_bodies(raw: mujoco.MjModel) -> Rows:
-    large = np.zeros(raw.nbody, dtype=bool)
-    for root in roots(raw):
-        large[root] = parts(raw, root) > MOST_PARTS
-    much = f"has more than {MOST_PARTS} bodies and joints"
+def _of_bodies(plan: Plan) -> Rows:
+    large = np.zeros(plan.raw.nbody, dtype=bool)
+    for root in roots(plan.raw):
+        large[root] = plan.links(root) > MOST_LINKS
+    much = f"has more than {MOST_LINKS} joints and rigid parts"
     return [
         ("body", "a tree of so many parts", large, much),
     ]
@@ -122,6 +122,7 @@ def _of_actuators(raw: mujoco.MjModel) -> Rows:
     used, joints = in_force(raw), raw.actuator_trnid[:, 0]
     on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
     on_tendon = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+    used &= ~_sticks(raw)
     turning = np.zeros(raw.nactuator, dtype=bool)
     turning[on_joint] = np.isin(raw.jnt_type[joints[on_joint]], (_FREE, _BALL))
     between = (raw.actuator_delay != 0) & (raw.actuator_history[:, 1] != 0)
@@ -204,6 +205,7 @@ def ignored(plan: Plan) -> list[str]:
         "diagexact": enabled["DIAGEXACT"],
         "springyield of a tendon": raw.tendon_springyield.any(),
         "adhesion": touches and (raw.geom_adhesion.any() or raw.pair_adhesion.any()),
+        "an actuator of adhesion": touches and (_sticks(raw) & in_force(raw)).any(),
         "the margin of a pair": touches and raw.pair_margin.any(),
         "the second friction of a pair": touches and np.ptp(slide, axis=1).any(),
         "the second rolling friction of a pair": touches and np.ptp(roll, axis=1).any(),
@@ -229,6 +231,11 @@ def ignored(plan: Plan) -> list[str]:
             sentences.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
         sentences += _bounces(plan)
     return sentences
+
+
+def _sticks(raw: mujoco.MjModel) -> Any:
+    """(nactuator,) bool: which actuators act on the contacts of a body alone."""
+    return raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_BODY)
 
 
 def _own_softness(raw: mujoco.MjModel) -> bool:

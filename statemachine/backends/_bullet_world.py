@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any, Literal
 
-import mujoco
 import numpy as np
 
 from ..installed import silence
@@ -140,6 +139,11 @@ class World:
             for tree in self.trees
             if tree.free
         }
+        # The axes of each body in those of its inertia, which armature turns in what is stepped.
+        self._inward = raw.body_iquat * INVERSE
+        for body, link, b in self.links() if kind == "stepped" else ():
+            axes = pb.getDynamicsInfo(body, link, self.client)[4]
+            self._inward[b] = wxyz_from_xyzw(np.array(axes)) * INVERSE
         # Of their bases: what of T is constant, see `_base_axes`, and the body's axes in the frame.
         self._changes: dict[int, tuple[Array, Array]] = {}
         for body, (centre, axes) in self._frames.items():
@@ -476,7 +480,13 @@ class World:
     def body_poses(self, tree: Tree, bodies: Sequence[int]) -> tuple[Array, Array]:
         """The xpos (n, 3) and xquat (n, 4) of bodies that are not the engine's base."""
         links = [tree.links[body] for body in bodies]
-        return body_frames(self._raw, bodies, *self.centres(tree, links))
+        return self.frames(bodies, *self.centres(tree, links))
+
+    def frames(self, bodies: Sequence[int], centres: Array, axes: Array) -> tuple[Array, Array]:
+        """The xpos (n, 3) and xquat (n, 4) of bodies, from what `centres` tells of their links."""
+        quats = quat_times(wxyz_from_xyzw(axes), self._inward[bodies])
+        turns = matrix_from_quat(quats)
+        return centres - np.einsum("bij,bj->bi", turns, self._raw.body_ipos[bodies]), quats
 
     def centres(self, tree: Tree, links: Sequence[int]) -> tuple[Array, Array]:
         """Centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of some links."""
@@ -535,15 +545,6 @@ class World:
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""
         return pb.getContactPoints(physicsClientId=self.client)
-
-
-def body_frames(
-    raw: mujoco.MjModel, bodies: Sequence[int], centres: Array, axes: Array
-) -> tuple[Array, Array]:
-    """The xpos (n, 3) and xquat (n, 4) of bodies, from what the engine tells of their centres."""
-    quats = quat_times(wxyz_from_xyzw(axes), raw.body_iquat[bodies] * INVERSE)
-    turns = matrix_from_quat(quats)
-    return centres - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies]), quats
 
 
 ENGINE_TIMESTEP = 1 / 240
