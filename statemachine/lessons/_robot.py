@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ..errors import BadInputError, check_name
 from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
-from ..kinematics import Kind
 from ..measures.quantities import readings
 from ..page import Figures
 from ..runs.robot import carried_by, farther, is_servo, load_at_start, scalar_joint, start_keyframe
-from ..witness import labels
 
 USUAL = "shoulder_lift"  # the arm's joint that lessons are about
 _VALUE = 0.8  # rad
@@ -98,7 +96,7 @@ class Tip(NamedTuple):
     """
 
     name: str
-    kind: Kind
+    kind: Literal["site", "body"]
     number: int
     body: int
     named: bool
@@ -125,6 +123,8 @@ def tips_of(model: Model, name: str | None) -> list[Tip]:
         UnknownNameError: There is no such site or body.
         BadInputError: No name is given, and nothing moves.
     """
+    from ..witness import labels  # its room is of no use to other lessons
+
     sites = labels("site", model.site_names)
     bodies = labels("body", model.body_names)
     wanted = FINGERTIP if name is None and FINGERTIP in sites else name
