@@ -76,8 +76,9 @@ NEEDS, EXCLUDES = "{flag} goes with {others}", "{flag} goes without {others}"
 
 def add_rules(parser: argparse.ArgumentParser, *rules: Rule) -> None:
     """What options need of each other, which `check_rules` refuses before a command runs."""
-    usual = {action.dest: action.default for action in parser._actions}
-    parser.set_defaults(rules=rules, usual=usual)
+    parser.set_defaults(
+        rules=rules, usual={action.dest: action.default for action in parser._actions}
+    )
 
 
 def check_rules(options: argparse.Namespace) -> None:

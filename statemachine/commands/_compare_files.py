@@ -129,8 +129,11 @@ def write_pictures(
         from ..report import plot
 
         with progress("figure"):
-            two = comparison is not None
-            figure = plot.of_comparison(comparison, floor) if two else plot.of_trace(*traces)
+            figure = (
+                plot.of_comparison(comparison, floor)
+                if comparison is not None
+                else plot.of_trace(*traces)
+            )
             size = plot.write_plot(figure, options.plot)
         complain(f"{options.plot}: a figure, {_bytes(size)}", 0)
     if options.film is not None:

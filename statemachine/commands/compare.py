@@ -313,8 +313,14 @@ def _run_compare(
     more: dict[str, Any] = {"why_not": "" if comparison.ended else why_not}  # the page says it
     if options.html:
         more = questions.for_page(options, request, run.traces, comparison.ended)
-    given = run if request.sides else None
-    page = report.page(comparison, said=run.said, run=given, played=played, **parts, **more)
+    page = report.page(
+        comparison,
+        said=run.said,
+        run=run if request.sides else None,
+        played=played,
+        **parts,
+        **more,
+    )
     if options.html:
         files.write_page(options, request, run.traces, page)
     files.write_tests(options, [comparison])
@@ -344,8 +350,12 @@ def _floor(options: argparse.Namespace, comparison: Any, rerun: Any, uncertain: 
     if options.no_chaos:
         return None
     if rerun is None:
-        says = "--uncertainty runs the left side again, and it is a recorded run"
-        refuse((options.uncertainty, says))
+        refuse(
+            (
+                options.uncertainty,
+                "--uncertainty runs the left side again, and it is a recorded run",
+            )
+        )
         return None
     from ..compare import chaos_floor
     from ..report.terminal import progress

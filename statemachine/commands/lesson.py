@@ -162,8 +162,9 @@ def run_path(options: argparse.Namespace) -> int:
             page, everything[lesson.name] = _compute(options, lesson, lesson.model, lesson.defaults)
             code = code if page.holds else SAYS_NO
             if not options.json:
-                title = f"{number} of {len(PATH)}, {page.title}"
-                terminal.show(replace(page, title=title), "", reader)
+                terminal.show(
+                    replace(page, title=f"{number} of {len(PATH)}, {page.title}"), "", reader
+                )
         if options.json:
             print(dumps(everything))
         elif code == 0:
@@ -195,8 +196,7 @@ def _last_page(options: argparse.Namespace, reader: Any) -> int:
         )
         certificate = page(results)
         code = 0 if certificate.holds else SAYS_NO
-        title = f"The last page: {certificate.title}"
-        terminal.show(replace(certificate, title=title), "", reader)
+        terminal.show(replace(certificate, title=f"The last page: {certificate.title}"), "", reader)
     except MissingEngineError as error:  # nobody can compute it here
         complain(error, MISSING)
     (reader.read if reader else sys.stdout.write)(_NEXT)

@@ -37,8 +37,13 @@ def broken(way: str, first: Array, second: Array) -> Figures:
     """
     gap = np.abs(first - second).max(axis=1)
     peak, step = largest(gap)
-    close = bool(np.allclose(first[-1], second[-1]))
-    return Figures(way=way, close=close, peak=peak, peak_step=step, end=float(gap[-1]))
+    return Figures(
+        way=way,
+        close=bool(np.allclose(first[-1], second[-1])),
+        peak=peak,
+        peak_step=step,
+        end=float(gap[-1]),
+    )
 
 
 def broken_table(results: Mapping[str, Sequence[Figures]]) -> list[Table]:

@@ -73,8 +73,12 @@ def _tips(name: str, result: Figures) -> Table:
     ]
     head = ("tip", "position, worst [m]", "rotation matrix, worst", "distance of the two frames")
     worst = f"the worst of {len(result.tips)}"
-    title = f"{name} against the witness, {worst} ({result.grade})"
-    return Table(head, rows, title=title, wide=frozenset({3}))
+    return Table(
+        head,
+        rows,
+        title=f"{name} against the witness, {worst} ({result.grade})",
+        wide=frozenset({3}),
+    )
 
 
 def _offset(offset: Figures | None) -> str:

@@ -35,8 +35,9 @@ _SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits t
 
 def _offset(distance: float, angle: float) -> Figures:
     """From the engine's frame to the witness's [m, rad], and whether the two are one frame."""
-    same = distance <= _SAME_FRAME and angle <= _SAME_FRAME
-    return Figures(distance=distance, angle=angle, same=same)
+    return Figures(
+        distance=distance, angle=angle, same=distance <= _SAME_FRAME and angle <= _SAME_FRAME
+    )
 
 
 def certify(
@@ -92,8 +93,12 @@ def certify(
         (seed < 0, f"seed must not be negative; got {seed}"),
     )
     tips = tips_of(model, site)
-    several = witness_frame is not None and len(tips) > 1
-    refuse((several, "--witness-frame names one frame: say which with --site"))
+    refuse(
+        (
+            witness_frame is not None and len(tips) > 1,
+            "--witness-frame names one frame: say which with --site",
+        )
+    )
     known, asked, reason = _asked(model, tips, witness, witness_frame)
     joints = shared_joints(known, model.joint_names)
     configurations = random_qpos(model, joints, wanted, seed)

@@ -312,8 +312,9 @@ def _apart(runs: str, touched: bool | None, left: Figures, right: Figures) -> st
     first = round(min(touches) / timestep) if touches else steps
     rows = {None: slice(None), False: slice(first + 1), True: slice(first, None)}[touched]
     time = np.arange(steps, dtype=np.float64) * timestep
-    paths = pair[0].path[rows, None], pair[1].path[rows, None]
-    return largest_gap(*paths, [left.slide], [""], time[rows])
+    return largest_gap(
+        pair[0].path[rows, None], pair[1].path[rows, None], [left.slide], [""], time[rows]
+    )
 
 
 def _ends_apart(label: str, left: Figures, right: Figures) -> str:

@@ -257,8 +257,7 @@ def _touch(left: Figures, right: Figures) -> int:
 
 def _apart(left: Figures, right: Figures, rows: slice) -> str:
     """The largest gap of a joint in some rows of two runs."""
-    paths = left.qpos[rows], right.qpos[rows]
-    return largest_gap(*paths, left.slides, left.joints, left.time[rows])
+    return largest_gap(left.qpos[rows], right.qpos[rows], left.slides, left.joints, left.time[rows])
 
 
 def _apart_freely(left: Figures, right: Figures) -> str:

@@ -78,7 +78,6 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figure
     shares = [part_of(progress, 0.5 + 0.25 * k / worlds, 0.25 / worlds) for k in range(worlds)]
     singly = [_in_turn(model, [k], worlds, shares[k])[0] for k in range(worlds)]
     together = _in_turn(model, range(worlds), worlds, part_of(progress, 0.75, 0.25))
-    after = _arrays(model)
     return Figures(
         loading=costs["load"],
         making=costs["make"],
@@ -89,7 +88,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figure
         alone=all(map(np.array_equal, singly, together)),
         different=len({end.tobytes() for end in together}),
         arrays=len(before),
-        constant=before == after,
+        constant=before == _arrays(model),
         shared=shared,
         provenance=provenance(model),
     )
@@ -146,8 +145,7 @@ def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
         "a Data takes": lambda a, b: f"{b.making / a.making:.1f} ×",
         "a step takes": lambda a, b: f"{b.stepping / a.stepping:.1f} ×",
     }
-    title = "What each costs on this machine, now (median of five)"
     return {
-        "costs": by_engine(results, costs, title),
+        "costs": by_engine(results, costs, "What each costs on this machine, now (median of five)"),
         "differences": differences(results, against),
     }

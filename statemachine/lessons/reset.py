@@ -161,17 +161,19 @@ def slots(result: Figures) -> dict[str, Any]:
 
 def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """What each keyframe shows, and what becomes of it."""
-    rises = {
-        f"rise of the {scene.body}, {scene.name}": partial(_rise, k)
-        for k, scene in enumerate(first.scenes)
-        if scene.body
-    }
     return {
         "keyframes": [
             _keyframe(k, {name: result.scenes[k] for name, result in results.items()})
             for k in range(len(first.scenes))
         ],
-        "differences": differences(results, rises),
+        "differences": differences(
+            results,
+            {
+                f"rise of the {scene.body}, {scene.name}": partial(_rise, k)
+                for k, scene in enumerate(first.scenes)
+                if scene.body
+            },
+        ),
     }
 
 
@@ -197,5 +199,6 @@ def _keyframe(number: int, scenes: Mapping[str, Figures]) -> Table:
 
 
 def _rise(number: int, left: Figures, right: Figures) -> str:
-    rises = [millimetres(result.scenes[number].rise, 3) for result in (right, left)]
-    return " instead of ".join(rises)
+    return " instead of ".join(
+        millimetres(result.scenes[number].rise, 3) for result in (right, left)
+    )

@@ -200,9 +200,10 @@ def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
         "memory of a Data": lambda r: _memory(r.data_bytes),
         "memory of a world": lambda r: _memory(r.world_bytes),
     }
-    title = "What is made once, and what for each world, on this machine, now"
     return {
-        "made": by_engine(results, made, title),
+        "made": by_engine(
+            results, made, "What is made once, and what for each world, on this machine, now"
+        ),
         "costs": [
             Table(
                 ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),

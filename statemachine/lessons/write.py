@@ -146,7 +146,8 @@ def slots(result: Figures) -> dict[str, Any]:
 
 def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     """What is refused."""
-    words = frozenset({0, 1})
     return {
-        "refused": Table(("you type", "and read"), first.refused, "What is refused", words=words)
+        "refused": Table(
+            ("you type", "and read"), first.refused, "What is refused", words=frozenset({0, 1})
+        )
     }

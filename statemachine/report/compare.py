@@ -159,8 +159,9 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
     agreements, checked = comparison.agreements, list[Block]()
     sides: dict[str, Any] = dict.fromkeys(("site", "rows", "by", "left_off", "right_off"))
     if witness is not None:
-        compiled = if_true(witness.grade == SAME_READING)
-        text = template.blocks("compare_witness", site=witness.site, compiled=compiled)
+        text = template.blocks(
+            "compare_witness", site=witness.site, compiled=if_true(witness.grade == SAME_READING)
+        )
         checked.append(Section("", "", text, detail=True))
         sides = {name: getattr(witness, name) for name in ("site", "rows", "by")}
         sides |= {"left_off": f"{1e3 * witness.one:.0e}", "right_off": f"{1e3 * witness.two:.0e}"}

@@ -140,8 +140,7 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
         for axes, picture in zip(rows, pictures, strict=True):
             draw_picture(axes, picture)
             if heights[1:]:
-                title = textwrap.fill(picture.title, _TITLE)
-                axes.set_title(title, fontsize="medium", loc="left")
+                axes.set_title(textwrap.fill(picture.title, _TITLE), fontsize="medium", loc="left")
         return figure
 
     return saved(draw, form)
@@ -204,8 +203,7 @@ def _traces(axes: Any, picture: Traces) -> None:
         return
     axes.grid(alpha=0.3)
     if len(picture.curves) > 1:
-        beside = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
-        axes.legend(fontsize="small", frameon=False, **beside)
+        axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
 def _spanned(axes: Any, values: Array, least: float) -> None:
@@ -290,12 +288,17 @@ def _pipeline(axes: Any, picture: Pipeline) -> None:
             y = top - 0.85 - 0.32 * line
             axes.text(x + 0.2, y, text, va="center", family="monospace", fontsize=8)
         if k:
-            arrow = {"arrowstyle": "->", "color": INK}
-            axes.annotate("", (x - 0.05, top / 2), (x - 0.55, top / 2), arrowprops=arrow)
+            axes.annotate(
+                "",
+                (x - 0.05, top / 2),
+                (x - 0.55, top / 2),
+                arrowprops={"arrowstyle": "->", "color": INK},
+            )
     for k, (name, first, last) in enumerate(picture.spans):
         y, left, right = -0.5 - 0.6 * k, 3.2 * first, 3.2 * last + 2.6
-        ends = {"arrowstyle": "|-|, widthA=.3, widthB=.3"}
-        axes.annotate("", (right, y), (left, y), arrowprops=ends)
+        axes.annotate(
+            "", (right, y), (left, y), arrowprops={"arrowstyle": "|-|, widthA=.3, widthB=.3"}
+        )
         paper = {"facecolor": _PAPER, "edgecolor": "none", "pad": 2}
         axes.text((left + right) / 2, y, name, family="monospace", bbox=paper, **_CENTRE)
     axes.set_xlim(-0.2, 3.2 * len(picture.stages) - 0.4)
@@ -340,8 +343,13 @@ def _heat_map(axes: Any, picture: HeatMap) -> None:
     axes.set_ylabel(textwrap.fill(picture.up, _UP))
     steps = LogLocator(subs=(1, 2, 5) if high < 1e4 * low else (1,)) if wide else None
     # Beside its map, whatever room the legends of other panels take.
-    beside = axes.inset_axes((1.02, 0.0, 0.02, 1.0))
-    bar = axes.figure.colorbar(cells, beside, ticks=steps, format="{x:g}", label=picture.unit)
+    bar = axes.figure.colorbar(
+        cells,
+        axes.inset_axes((1.02, 0.0, 0.02, 1.0)),
+        ticks=steps,
+        format="{x:g}",
+        label=picture.unit,
+    )
     bar.minorticks_off()
 
 

@@ -106,8 +106,12 @@ class Overlay:
         image.paste(Image.fromarray(shot), (0, self._high))
         draw, pad = ImageDraw.Draw(image), round(0.3 * self._text)
         digits = 3 if self._times[-1] < 100 else 1
-        text = f"t = {time:.{digits}f} s, {self._speed}"
-        draw.text((pad, pad + round(1.35 * self._text)), text, font=self._font, fill=INK)
+        draw.text(
+            (pad, pad + round(1.35 * self._text)),
+            f"t = {time:.{digits}f} s, {self._speed}",
+            font=self._font,
+            fill=INK,
+        )
         if self._strip is not None:
             top = height - self._low
             share = time / max(float(self._strip.curve.time[-1]), 1e-12)

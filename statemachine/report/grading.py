@@ -152,6 +152,5 @@ def gradescope_results(grade: Grade | None, refusal: str = "", points: float = 1
             }
         )
     versions = grade.versions if grade else {}
-    output = versions_of(versions)
-    document = {"tests": tests, "output": output or refusal, "visibility": "visible"}
+    document = {"tests": tests, "output": versions_of(versions) or refusal, "visibility": "visible"}
     return json.dumps(document, indent=1, ensure_ascii=False) + "\n"

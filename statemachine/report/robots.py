@@ -103,8 +103,9 @@ def _table(survey: Survey, others: Sequence[str], widest: int, tried: bool) -> T
                 or NONE
             ),
         }
-    words = {"model", "bits", "witness", "runs"}
-    return Table.of(survey.models, columns, words=words, wide={"cost"})
+    return Table.of(
+        survey.models, columns, words={"model", "bits", "witness", "runs"}, wide={"cost"}
+    )
 
 
 def _bits(survey: Survey, row: ExaminedModel) -> str:
@@ -213,13 +214,12 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
     }
     rows = [(fact, *map(cell, row.backends.values())) for fact, cell in facts.items()]
     rows = [cells for cells in rows if set(cells[1:]) != {NONE}]
-    table = Table(("what", *row.backends), rows, words=frozenset(range(9)))
     return template.page(
         "robots_one",
         file=row.file,
         made_with=row.made_with,
         **{name: getattr(row, name) for name in ("nq", "nv", "nu", "nbody", "ngeom", "took")},
-        table=table,
+        table=Table(("what", *row.backends), rows, words=frozenset(range(9))),
         backends=[block for name in row.backends for block in _refusals(name, row.backends[name])],
         refusal=None if witness.gap is not None else reason,
         grade=witness.grade,

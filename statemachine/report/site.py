@@ -110,8 +110,11 @@ def _why_as_they_come(name: str, backends: tuple[str, str]) -> Page:
     asked = scenario(name)
     left, right = (load(asked.model, backend=backend, defaults="engine") for backend in backends)
     page = why.page(explain(left, right, asked))
-    title = f"{name}, engines as they come: why"
-    return replace(page, title=title, blocks=[Text(f"{page.title}."), *page.blocks])
+    return replace(
+        page,
+        title=f"{name}, engines as they come: why",
+        blocks=[Text(f"{page.title}."), *page.blocks],
+    )
 
 
 def _write(folder: Path, name: str, page: Page, typed: str, lead: str = "") -> Path:

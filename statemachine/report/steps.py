@@ -47,7 +47,6 @@ def convergence(result: Figures, experiment: str) -> Page:
     """
     at = "" if result.touch is None else short_time(result.touch)
     title = f"The gap with finer steps, before the first touch at {at}"
-    steps = dict.fromkeys(milliseconds(step, 3) for step in result.steps)
     return template.page(
         "convergence",
         _of_the_limit(result, at),
@@ -55,7 +54,7 @@ def convergence(result: Figures, experiment: str) -> Page:
         left=result.labels[0],
         right=result.labels[1],
         until=result.until,
-        steps=" and ".join(steps),
+        steps=" and ".join(dict.fromkeys(milliseconds(step, 3) for step in result.steps)),
         before=_limits(result.before, title) if at else None,
         whole=_limits(result.whole, "The gap with finer steps, over the whole run"),
         touch=if_true(at),

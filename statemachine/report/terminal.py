@@ -150,8 +150,9 @@ def _write(tell: Callable[[str], object], blocks: Sequence[Page | Block]) -> Non
     from rich.console import Console, detect_legacy_windows
 
     legacy = detect_legacy_windows()  # it would show the codes of colours as text
-    colours = None if legacy else "auto"
-    console = Console(highlight=False, emoji=False, markup=False, color_system=colours)
+    console = Console(
+        highlight=False, emoji=False, markup=False, color_system=None if legacy else "auto"
+    )
     plain = legacy or console.options.ascii_only
     piped = not console.is_terminal
     console.width = _WIDTH_PIPED if piped else min(console.width, _WIDTH_MOST)
@@ -201,8 +202,7 @@ def _drawn(block: Page | Block, plain: bool, width: int) -> list[RenderableType]
             return ["", _coded(_shown(f"{text} {linked}." if linked else text, plain))]
         case Items(texts, ordered):
             marks = (f"{k}." if ordered else "-" for k in itertools.count(1))
-            items = (_shown(text, plain) for text in texts)
-            return ["", *map(_hanging, marks, items)]
+            return ["", *map(_hanging, marks, (_shown(text, plain) for text in texts))]
         case Code(lines):
             return ["", *(RichText(f"    {_shown(line, plain)}", "cyan") for line in lines)]
         case Printed(by_engine):
@@ -250,8 +250,12 @@ def _grid(block: Table, plain: bool, width: int) -> RenderableType:
     )
     rows = [[_shown(_loud(c), plain) for c in row] for row in (block.headers, *block.rows)]
     for k, cells in enumerate(_widths(rows, block.words, width)):
-        justify = "left" if k in block.words else "right"
-        grid.add_column(rows[0][k], justify=justify, overflow="fold", width=cells)
+        grid.add_column(
+            rows[0][k],
+            justify="left" if k in block.words else "right",
+            overflow="fold",
+            width=cells,
+        )
     for k, row in enumerate(rows[1:]):
         grid.add_row(*row, style="bold" if k in block.emphasis else None)
     return grid

@@ -262,8 +262,13 @@ def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
         explains, alone, last = NONE, NONE, NONE
     elif abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
         explains, alone, last = f"< {percent(noise)}", NONE, NONE
-    share = None if result.is_rounding else row.share
-    return what, *_values(row), TableCell(explains, share=share), alone, last
+    return (
+        what,
+        *_values(row),
+        TableCell(explains, share=None if result.is_rounding else row.share),
+        alone,
+        last,
+    )
 
 
 def _values(row: Figures) -> tuple[str, str]:

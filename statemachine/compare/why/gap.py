@@ -223,5 +223,4 @@ def first_touch(traces: Sequence[Trace], time: Array, apart: Array) -> Figures |
     # A contact found at a moment acts from that moment on: the moment itself is before it. Where
     # something touches at the start no moment shows the rest alone.
     before = apart[(time <= when + 1e-9) & (when > 0)]
-    largest = float(before.max(initial=0.0))
-    return Figures(time=when, what=what, before=largest, moments=len(before))
+    return Figures(time=when, what=what, before=float(before.max(initial=0.0)), moments=len(before))

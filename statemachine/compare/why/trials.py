@@ -416,8 +416,7 @@ class Trials:
 
     def _measured(self, side: int, model: Model, trace: Trace) -> Figures:
         curves = self.ruler.curves(trace, self._posed(model), side)
-        reason = trace.header.ended or "it left every bound"
-        return Figures(curves=curves, reason=reason, ran=True)
+        return Figures(curves=curves, reason=trace.header.ended or "it left every bound", ran=True)
 
     def _posed(self, model: Model) -> Model:
         """A Model of the same bodies by which poses are computed, on the engine that is fastest."""

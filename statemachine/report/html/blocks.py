@@ -72,8 +72,9 @@ def _block(block: Block, stage: Html, level: int) -> Html:
             link = (" ", tag("a", heading, href=f"#{name}"), ".") if name else ()
             return tag("p", non_breaking(text), *link, class_="foot" if small else None)
         case Items(texts, ordered):
-            items = (tag("li", non_breaking(text)) for text in texts)
-            return tag("ol" if ordered else "ul", *items)
+            return tag(
+                "ol" if ordered else "ul", *(tag("li", non_breaking(text)) for text in texts)
+            )
         case Code(lines):
             return tag("pre", tag("code", "\n".join(lines)))
         case Table():

@@ -253,8 +253,7 @@ def _contacts(trace: Trace, rows: Ints, most: int) -> tuple[dict[str, str], floa
         a + np.argsort(-strength[a:b], kind="stable")[:count]
         for a, b, count in zip(begins, ends, counts, strict=True)
     ])  # fmt: skip
-    forces = world_forces(trace)[chosen]
-    where = np.nan_to_num(np.hstack([trace["contact_pos"][chosen], forces]))
+    where = np.nan_to_num(np.hstack([trace["contact_pos"][chosen], world_forces(trace)[chosen]]))
     strongest = float(np.linalg.norm(where[:, 3:], axis=1).max(initial=0.0))
     more = bool((ends - begins > most).any())
     return {"count": packed(counts, "u1"), "at": packed(where, "f4")}, strongest, more
