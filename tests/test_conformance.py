@@ -5,18 +5,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 import statemachine
+import statemachine as sm
 from statemachine import conformance
 from statemachine.backends import backend_names
-from statemachine.errors import UnknownNameError, UnsupportedError
+from statemachine.errors import DivergedError, EngineError, UnknownNameError, UnsupportedError
 from statemachine.interface import Behaviour
 
 from .conftest import assert_has, need_engine, refused, registered
-from .hidden_world import ExampleModel
+from .hidden_world import ExampleModel, ExampleWorld
 from .hidden_world import load as load_hidden
 
 
@@ -103,3 +105,109 @@ def test_an_option_that_a_record_lacks_is_refused() -> None:
 
 def test_an_unknown_backend_is_one_error() -> None:
     refused((UnknownNameError, "", lambda: conformance.run("nobody")))
+
+
+# What the base of a hidden world promises a backend, on the example that is built on it
+
+
+@pytest.fixture
+def model() -> Iterator[sm.Model]:
+    with registered("hidden", "tests.hidden_world:load") as name:
+        yield sm.load("so101/scene_box", backend=name)
+
+
+def held(model: sm.Model) -> sm.Data:
+    """A Data in the middle of contact, where the solver's memory decides the last bits."""
+    data = sm.make_data(model)
+    sm.reset(model, data, 0)
+    data.ctrl[0] += 0.2
+    sm.step(model, data, 25)
+    return data
+
+
+def test_a_step_that_fails_did_not_happen_and_what_was_not_read_before_is_computed_after_it(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with held(model) as data, held(model) as twin:
+        with monkeypatch.context() as patch:
+            patch.setattr(ExampleWorld, "read", lambda _: 1 / 0)
+            refused((ZeroDivisionError, "", lambda: sm.step(model, data)))
+        assert sm.get_state(model, data) == sm.get_state(model, twin)
+        # By another world, which starts from the moment before the last step.
+        assert np.array_equal(data.xpos, twin.xpos)
+        assert np.allclose(data.qfrc_constraint, twin.qfrc_constraint, atol=1e-9)
+        for each in (data, twin):
+            sm.step(model, each, 10)
+        assert sm.get_state(model, data) == sm.get_state(model, twin)
+
+
+def test_an_engine_that_gives_up_is_an_error_until_a_reset(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ExampleWorld, "errors", (OverflowError,))
+    with held(model) as data:
+        with monkeypatch.context() as patch:
+            patch.setattr(ExampleWorld, "step", Mock(side_effect=OverflowError("no memory")))
+            refused((EngineError, "MuJoCo gave up: no memory", lambda: sm.step(model, data)))
+        refused((DivergedError, "gave up", lambda: sm.step(model, data)))
+        sm.reset(model, data)
+        sm.step(model, data)
+
+
+@pytest.mark.parametrize("all_at_the_end", [False, True])
+def test_a_coordinate_that_diverges_is_named(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch, all_at_the_end: bool
+) -> None:
+    right = ExampleWorld.read
+
+    def growing(self: ExampleWorld) -> tuple[np.ndarray, np.ndarray]:
+        qpos, qvel = right(self)
+        qvel[2] = np.nan
+        return qpos, qvel
+
+    if all_at_the_end:
+        monkeypatch.setattr(ExampleWorld, "diverging", lambda *_: False)
+    with held(model) as data:
+        before, start = [array.copy() for array in (data.qpos, data.qvel)], data.time
+        with monkeypatch.context() as patch:
+            patch.setattr(ExampleWorld, "read", growing)
+            says = r"qvel\[2\] \(elbow_flex\)"
+            error = refused((DivergedError, says, lambda: sm.step(model, data, 4)))
+        steps = 4 if all_at_the_end else 1
+        assert error.time == pytest.approx(start + steps * model.timestep)
+        assert np.array_equal(data.qpos, before[0])
+        assert np.array_equal(data.qvel, before[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("qfrc_limit", "forces by part"), ("contacts", "contacts")]
+)
+def test_what_an_engine_does_not_tell_is_refused(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch, name: str, said: str
+) -> None:
+    monkeypatch.setattr(ExampleWorld, "untold", frozenset({name}))
+    with held(model) as data:
+        for verb in (sm.step, sm.forward):
+            verb(model, data)
+            refused((UnsupportedError, said, lambda: getattr(data, name)))
+            assert data.qfrc_bias.any()
+
+
+def test_a_world_that_keeps_traces_is_another_after_a_reset(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def renewed(self: ExampleWorld) -> ExampleWorld:
+        other = ExampleWorld(self._model)
+        self.close()
+        return other
+
+    monkeypatch.setattr(ExampleWorld, "renewed", renewed)
+    with held(model) as data:
+        first = data.raw
+        sm.reset(model, data)
+        assert data.raw is not first
+        again = data.raw
+        sm.reset(model, data)  # it was not used
+        assert data.raw is again
+        sm.forward(model, data)
+        assert data.xpos.any()

@@ -7,6 +7,7 @@ import dataclasses
 import fcntl
 import io
 import itertools
+import json
 import os
 import pty
 import re
@@ -31,7 +32,7 @@ from rich.cells import cell_len
 import statemachine as sm
 from statemachine.cli import main
 from statemachine.commands import lesson as lesson_command
-from statemachine.errors import StateMachineError
+from statemachine.errors import BadInputError, StateMachineError
 from statemachine.lessons import LESSONS, PATH, module, template, worlds
 from statemachine.lessons._falling import summed
 from statemachine.lessons.in_turns import Ratio
@@ -49,6 +50,7 @@ from statemachine.page import (
 )
 from statemachine.report import quiz
 from statemachine.report import terminal as bar
+from statemachine.report.quiz import RecordedReader
 from statemachine.runs import record_scenario
 from statemachine.runs.scenarios import SCENARIOS
 
@@ -822,3 +824,62 @@ def test_pictures_of_a_lesson(tmp_path: Path, here: Cli) -> None:
     assert [here(*words, file).returncode for file in files] == [0, 0]
     assert "distance to the goal" in files[0].read_text(encoding="utf-8")
     assert files[0].read_bytes() == files[1].read_bytes()
+
+
+# Predictions that are recorded
+
+
+ONE = Question("how many?", ("1", "2"), 1, "counted")
+NONE = Question("which?", ("x", "y"), None, "neither")
+
+
+def test_the_first_answer_counts_and_a_session_is_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.json"
+    typed = iter(["", "a", "b", "b"])
+    monkeypatch.setattr("builtins.input", lambda _: next(typed))
+    reader = RecordedReader(file, "state")
+    assert json.loads(file.read_text())["of"] == 0
+    assert reader.ask(ONE) is None  # passed: no answer
+    assert json.loads(file.read_text())["of"] == 0
+    assert reader.ask(ONE) == 0
+    again = RecordedReader(file, "state")
+    capsys.readouterr()
+    assert again.ask(ONE) == 1  # now right, but the first counts
+    assert "your first answer counts: 1" in capsys.readouterr().out
+    assert again.summary == "mine.json: 0 of 1 predictions right"
+    again.lesson = "reset"
+    assert again.ask(NONE) == 1
+    record = json.loads(file.read_text())
+    assert (record["score"], record["of"]) == (0, 2)
+    assert record["answers"] == [
+        {"lesson": "state", "question": "how many?", "predicted": "1", "found": "2",
+         "right": False},
+        {"lesson": "reset", "question": "which?", "predicted": "y", "found": None,
+         "right": False},
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", '{"kind": "x"}', '{"kind": "statemachine predictions", "answers": [1]}']
+)
+def test_another_file_is_not_overwritten(tmp_path: Path, text: str) -> None:
+    file = written(tmp_path / "mine.json", text)
+    refused((BadInputError, "no record of predictions", lambda: RecordedReader(file)))
+    assert file.read_text() == text
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_a_lesson_at_a_terminal_is_recorded(tmp_path: Path) -> None:
+    file = tmp_path / "mine.json"
+    assert_in(
+        _at_a_terminal(
+            *("lesson", "state", "--record", str(file)), typed=[("Your prediction", "c\n")]
+        ),
+        "You predicted it",
+        "mine.json: 1 of 1 predictions right",
+    )
+    record = json.loads(file.read_text())
+    assert (record["score"], record["of"]) == (1, 1)
+    assert record["answers"][0]["predicted"] == "12"

@@ -6,12 +6,15 @@ import os
 import subprocess
 import sys
 import threading
+import time
+from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from statemachine.processes import sandbox
+from statemachine.processes.parallel import worker_processes
 
 from .conftest import assert_has, lives, processes_with, refused
 
@@ -200,3 +203,14 @@ def test_signals_and_limits_are_told_alike(shut_in: bool, request: pytest.Fixtur
 def test_where_it_cannot_be_shut_in_it_runs_all_the_same(tmp_path: Path) -> None:
     done = _python("import os; print(os.getpid() > 2)", writable=tmp_path / "nowhere", cwd=tmp_path)
     assert (done.code, done.stdout) == (0, "True\n")
+
+
+# What processes share
+
+
+def test_a_worker_that_ends_loses_nothing_of_another() -> None:
+    pytest.importorskip("joblib")
+    with worker_processes(2) as (first, second):
+        waits = second(time.sleep, 1.0)
+        refused((BrokenProcessPool, "", first(os._exit, 1).result))
+        assert (first(abs, -1).result(60), waits.result(60)) == (1, None)
