@@ -33,6 +33,7 @@ import mujoco
 import numpy as np
 
 from ..interface import Array
+from ..rotations import matrix_from_quat
 from . import _dense as dense
 from ._bullet_constraints import (
     Equalities,
@@ -82,6 +83,8 @@ class Law:
         euler = raw.opt.integrator in _EXPLICIT
         self._later = 0.0 if euler else h  # how much of a velocity's change forces feel at once
         damped_later = 0.0 if euler and off["eulerdamp"] else h
+        # MuJoCo's implicitfast takes the gyroscopic force of what cannot bend at once.
+        self._whirls = tree.free and len(dofs) == 6 and not euler
         self._tendons = tendons = Tendons(raw, tree, off)
         # The inertia that constraints feel, and the one that velocities are found with.
         self._inertia = np.array([np.diag(armature), np.diag(armature + damped_later * damping)])
@@ -233,7 +236,28 @@ class Law:
             others = others + limit + equality
         self.friction = friction
         self._parts = bias, actuator, passive, friction, limit, equality
-        return dense.solved(implicit, others + friction)
+        acceleration = dense.solved(implicit, others + friction)
+        return self._whirled(implicit, acceleration) if self._whirls else acceleration
+
+    def _whirled(self, factor: Array, acceleration: Array) -> Array:
+        """The acceleration (6,) of a single rigid body that feels how its bias grows with it.
+
+        With the bias linear in the change of its spin: ω × (J·ω) about the body's origin.
+        """
+        spin, mass = self.speed[3:], self._mass
+        turn = matrix_from_quat(np.array(self._q[3:7]))
+        # What a spin gives of linear and of angular momentum, in the body's axes.
+        moving = dense.product(turn.T.copy(), mass[:3, 3:].copy())
+        slopes = [
+            (np.cross(spin, each.T) + np.cross(np.eye(3), dense.times(each, spin))).T
+            for each in (moving, mass[3:, 3:].copy())
+        ]
+        slope = np.vstack([dense.product(turn, slopes[0].copy()), slopes[1]])
+        felt = np.array([dense.solved(factor, self._timestep * part) for part in slope.T]).T.copy()
+        whole = np.eye(3) + felt[3:]
+        right = dense.times(whole.T.copy(), acceleration[3:])
+        turning = dense.solved(dense.factored(dense.product(whole.T.copy(), whole)), right)
+        return acceleration - dense.times(felt, turning)
 
     def _constrained(
         self,
