@@ -48,8 +48,7 @@ from ._bullet_constraints import (
     softness,
     springs,
 )
-from ._bullet_drives import Drives
-from ._bullet_medium import Medium
+from ._bullet_drives import Drives, Medium
 from ._bullet_world import Tree, World
 
 _OFF = mujoco.mjtDisableBit
