@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Callable
 from dataclasses import asdict
@@ -16,14 +15,14 @@ from numpy.typing import NDArray
 
 from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
-from statemachine.page import HeatMap, Traces
+from statemachine.page import Figures, HeatMap, Traces
 from statemachine.report.as_json import plain
 from statemachine.report.sweep_pictures import pictures
 from statemachine.report.sweep_report import page
 from statemachine.sweep import Design, Sweep, Vary, run_sweep
-from statemachine.sweep.analysis import SweepReport, sweep_report
+from statemachine.sweep.analysis import sweep_report
 from statemachine.sweep.analysis_data import SweepData, read_runs, sweep_data
-from statemachine.sweep.analysis_fit import fit_curves
+from statemachine.sweep.analysis_fit import fit_curves, values_within
 from statemachine.sweep.analysis_gaps import agreement_of, gap_map
 from statemachine.sweep.analysis_runs import ModelFacts, facts_of
 from statemachine.sweep.analysis_together import REFINED, brought_together
@@ -107,11 +106,11 @@ def grid(name: str, low: float, high: float, count: int, **more: Any) -> Vary:
     return Vary(name, values=tuple(np.linspace(low, high, count).tolist()), **more)
 
 
-def of(folder: Path, **given: Any) -> SweepReport:
+def of(folder: Path, **given: Any) -> Figures:
     return sweep_report(folder, run=False, **given)
 
 
-def shares(found: SweepReport) -> dict[str, tuple[float, float]]:
+def shares(found: Figures) -> dict[str, tuple[float, float]]:
     return {each.label: (each.first, each.total) for each in the(found.sensitivity).indices}
 
 
@@ -257,7 +256,7 @@ def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
 
 def fitted(
     folder: Path, best: float, least: float = 0.0, seeds: int = 4, spread: float = 0.0
-) -> SweepReport:
+) -> Figures:
     """Left and right part by 5 mm for each unit of gain from the best one, and by `least`."""
     design = Design((grid("gain", 0, 2, 9, kind="parameter"), grid("y", 0, 1, 2)))
 
@@ -277,10 +276,12 @@ def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
     assert the(found.fit).error == pytest.approx(0.0, abs=1e-3)  # the seeds are alike
     assert found.verdict == "together"
     reach = np.sqrt(0.2**2 - 0.1**2) / 5  # where hypot(5 mm · reach, 0.1 mm) is 0.2 mm
-    assert the(found.fit).within(0.2e-3) == pytest.approx((0.61 - reach, 0.61 + reach), abs=6e-3)
-    assert the(found.fit).within(0.05e-3) is None
+    assert values_within(the(found.fit), 0.2e-3) == pytest.approx(
+        (0.61 - reach, 0.61 + reach), abs=6e-3
+    )
+    assert values_within(the(found.fit), 0.05e-3) is None
     assert found.measured is None
-    assert np.interp(1.61, *the(found.fit).scan) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
+    assert np.interp(1.61, *the(found.fit)._scan) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
 
 
 def test_its_error_is_that_of_the_seeds(tmp_path: Path) -> None:
@@ -332,7 +333,7 @@ def test_runs_that_keep_fewer_moments_are_fitted_by_those_they_have() -> None:
     right = np.concatenate([moments([-1, 0, 1], steps) for steps in (4, 2)])
     found = fit_curves("qpos", levels, 0 * right, right, [0, 0])
     assert (the(found).value, the(found).curves) == (pytest.approx(1.0, abs=1e-3), 2)
-    assert the(found).scan[1][-1] == pytest.approx(1.0)
+    assert the(found)._scan[1][-1] == pytest.approx(1.0)
 
 
 def test_of_a_curve_with_runs_of_several_lengths_the_end_is_fitted() -> None:
@@ -471,7 +472,7 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
         cells=2 * (1 + REFINED),
     )
     assert found.after == min(the(found.tried)[1]) == pytest.approx(5.1e-3)
-    said = " ".join(shown(page(dataclasses.replace(report, together=(found,)))).split())
+    said = " ".join(shown(page(Figures(**vars(report) | {"together": (found,)}))).split())
     assert_in(
         said,
         "gain = 0.625 ± 0.031 in both brings mujoco and pybullet closer",
@@ -504,5 +505,5 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
     assert own.any()
     # Both engines have the same model: its own damping, or one near it, is the best.
     assert the(fit.fit).value == pytest.approx(1.0, abs=0.15)
-    assert the(fit.measured) < np.interp(0.6, *the(fit.fit).scan)
+    assert the(fit.measured) < np.interp(0.6, *the(fit.fit)._scan)
     assert found.ran == the(found.floor).cells + fit.cells

@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..measures.text import listed, reading, rounded
-from ..page import Bars, HeatMap, Traces
-from ..sweep.analysis import SweepReport
-from ..sweep.analysis_gaps import GapMap
-from ..sweep.analysis_together import BroughtTogether
+from ..page import Bars, Figures, HeatMap, Traces
 
 
-def pictures(sweep: SweepReport) -> list[HeatMap | Bars | Traces]:
+def pictures(sweep: Figures) -> list[HeatMap | Bars | Traces]:
     """The pictures of the page, in its order."""
     chosen = [map_picture(sweep), bars(sweep), *(fit_curve(sweep, t) for t in sweep.together)]
     return [picture for picture in chosen if picture is not None]
 
 
-def map_picture(sweep: SweepReport) -> HeatMap | Traces | None:
+def map_picture(sweep: Figures) -> HeatMap | Traces | None:
     chart, main = sweep.map, sweep.quantity
     if chart is None:
         return None
@@ -45,7 +42,7 @@ def map_picture(sweep: SweepReport) -> HeatMap | Traces | None:
     )
 
 
-def _curve(sweep: SweepReport, chart: GapMap, title: str) -> Traces:
+def _curve(sweep: Figures, chart: Figures, title: str) -> Traces:
     """The gap over one parameter."""
     main, (scale, unit) = sweep.quantity, reading(sweep.quantity.unit)
     place = sweep.parameters.index(chart.across)
@@ -67,7 +64,7 @@ def _curve(sweep: SweepReport, chart: GapMap, title: str) -> Traces:
     return Traces(title, axis(sweep, chart.across), f"gap [{unit.strip()}]", curves)
 
 
-def bars(sweep: SweepReport) -> Bars | None:
+def bars(sweep: Figures) -> Bars | None:
     shares = sweep.sensitivity
     if shares is None or shares.method == "rank" or len(shares.indices) == 1:
         return None
@@ -82,12 +79,12 @@ def bars(sweep: SweepReport) -> Bars | None:
     )
 
 
-def fit_curve(sweep: SweepReport, parameter: BroughtTogether) -> Traces | None:
+def fit_curve(sweep: Figures, parameter: Figures) -> Traces | None:
     """The predicted gap over a parameter, and what was measured."""
     if parameter.fit is None:
         return None
     scale, unit = reading(sweep.quantity.unit)
-    x, y = parameter.fit.scan
+    x, y = parameter.fit._scan
     curves: dict[str, tuple[Sequence[float], Sequence[float]]] = {
         "predicted": (x, [value * scale for value in y]),
         "tolerance": ([x[0], x[-1]], [sweep.quantity.tolerance * scale] * 2),
@@ -107,14 +104,14 @@ def fit_curve(sweep: SweepReport, parameter: BroughtTogether) -> Traces | None:
     )
 
 
-def axis(sweep: SweepReport, label: str) -> str:
+def axis(sweep: Figures, label: str) -> str:
     """A parameter with what its values are in."""
     if label in sweep.scaled:
         return f"{label} [times the model's own]"
     return f"{label} [{unit}]" if (unit := sweep.units.get(label)) else label
 
 
-def setting_word(sweep: SweepReport, label: str, value: object) -> str:
+def setting_word(sweep: Figures, label: str, value: object) -> str:
     """A value of a parameter: "0.5x", "on", "euler"."""
     if isinstance(value, bool):
         return "on" if value else "off"

@@ -6,11 +6,9 @@ from functools import partial
 from typing import Any
 
 from ..measures.text import NONE, count, few, fixed, listed, quantity, reading, rough, rounded
-from ..page import Block, Headline, Page, Section, Table, TableCell, Text
-from ..sweep import PreparedSweep, SweepSummary
-from ..sweep.analysis import SweepReport
-from ..sweep.analysis_gaps import GapMap, SettingGap
-from ..sweep.analysis_together import BroughtTogether
+from ..page import Block, Figures, Headline, Page, Section, Table, TableCell, Text
+from ..sweep import PreparedSweep
+from ..sweep.analysis_fit import values_within
 from . import template
 from .sweep_pictures import axis, bars, fit_curve, map_picture, setting_word
 from .template import if_true, versions_of
@@ -26,7 +24,7 @@ CAUSES = {
 }
 
 
-def page(sweep: SweepReport, command: str = "") -> Page:
+def page(sweep: Figures, command: str = "") -> Page:
     """The answer of a sweep.
 
     Args:
@@ -57,7 +55,7 @@ def page(sweep: SweepReport, command: str = "") -> Page:
     )
 
 
-def _headline(sweep: SweepReport) -> Headline:
+def _headline(sweep: Figures) -> Headline:
     main, shares, causes = sweep.quantity, sweep.sensitivity, []
     lead = LEAD.format(
         agreed=sweep.agreed,
@@ -75,7 +73,7 @@ def _headline(sweep: SweepReport) -> Headline:
     return Headline(lead, tuple(causes), holds=sweep.agreed == len(sweep.settings))
 
 
-def _floor_slots(sweep: SweepReport) -> dict[str, Any]:
+def _floor_slots(sweep: Figures) -> dict[str, Any]:
     """How high the chaos floor is, and how it was made; or why it is not known."""
     floor = sweep.floor
     if floor is None:
@@ -89,7 +87,7 @@ def _floor_slots(sweep: SweepReport) -> dict[str, Any]:
     }
 
 
-def _where(sweep: SweepReport) -> list[Block]:
+def _where(sweep: Figures) -> list[Block]:
     chart = sweep.map
     return template.blocks(
         "sweep_map",
@@ -118,7 +116,7 @@ def _where(sweep: SweepReport) -> list[Block]:
     )
 
 
-def _map_tables(sweep: SweepReport, chart: GapMap) -> list[Table]:
+def _map_tables(sweep: Figures, chart: Figures) -> list[Table]:
     """The map; of many columns, in parts that a terminal has room for."""
     tolerance = sweep.quantity.tolerance
     scale, unit = reading(sweep.quantity.unit)
@@ -149,7 +147,7 @@ def _map_tables(sweep: SweepReport, chart: GapMap) -> list[Table]:
     ]
 
 
-def _largest(sweep: SweepReport) -> Table:
+def _largest(sweep: Figures) -> Table:
     known = [setting for setting in sweep.settings if setting.median is not None]
     known.sort(key=lambda setting: -(setting.median or 0.0))
     unit = sweep.quantity.unit
@@ -166,13 +164,13 @@ def _largest(sweep: SweepReport) -> Table:
     )
 
 
-def _setting(sweep: SweepReport, setting: SettingGap) -> str:
+def _setting(sweep: Figures, setting: Figures) -> str:
     pairs = zip(sweep.parameters, setting.values, strict=True)
     words = [f"{name} {setting_word(sweep, name, value)}" for name, value in pairs]
     return few(words, 4) or "as it is"
 
 
-def _sensitive(sweep: SweepReport) -> list[Block]:
+def _sensitive(sweep: Figures) -> list[Block]:
     shares = None if sweep.only_rounding else sweep.sensitivity
     alone = shares is not None and len(shares.indices) == 1
     if shares is None or alone:
@@ -214,7 +212,7 @@ def _interval(pair: tuple[float, float] | None) -> str:
     return NONE if pair is None else f"{fixed(pair[0], 2)} to {fixed(pair[1], 2)}"
 
 
-def summary_page(ready: PreparedSweep, summary: SweepSummary) -> Page:
+def summary_page(ready: PreparedSweep, summary: Figures) -> Page:
     """The summary, and how the dataset is read."""
     asked, failed = ready.sweep, sum(summary.failed.values())
     before = summary.cells - summary.ran
@@ -257,13 +255,13 @@ LINES = {
 }
 
 
-def together(sweep: SweepReport) -> list[Block]:
+def together(sweep: Figures) -> list[Block]:
     """The sentence of each fit, how it was made, and its picture."""
     blocks = [block for fit in sweep.together for block in _fit(sweep, fit)]
     return blocks or [Text(NONE_FITTED[sweep.only_rounding])]
 
 
-def line(sweep: SweepReport, parameter: BroughtTogether) -> str:
+def line(sweep: Figures, parameter: Figures) -> str:
     """What a fit says, in a sentence."""
     unit, what = sweep.quantity.unit, sweep.quantity.says
     if parameter.fit is None:
@@ -280,7 +278,7 @@ def line(sweep: SweepReport, parameter: BroughtTogether) -> str:
     )
 
 
-def _is_own(parameter: BroughtTogether) -> bool:
+def _is_own(parameter: Figures) -> bool:
     """Whether the value is the model's own, as far as its error tells."""
     if parameter.fit is None or parameter.value is None or parameter.own is None:
         return False
@@ -288,12 +286,12 @@ def _is_own(parameter: BroughtTogether) -> bool:
     return abs(parameter.value - parameter.own) <= max(2 * (parameter.error or 0.0), 0.02 * wide)
 
 
-def _fit(sweep: SweepReport, parameter: BroughtTogether) -> list[Block]:
+def _fit(sweep: Figures, parameter: Figures) -> list[Block]:
     """What a fit says, how it was made, and what a run says of it."""
     unit, fit = sweep.quantity.unit, parameter.fit
     if fit is None:
         return [Text(line(sweep, parameter))]
-    within, measured = fit.within(sweep.quantity.tolerance), parameter.measured is not None
+    within, measured = values_within(fit, sweep.quantity.tolerance), parameter.measured is not None
     figures = {
         "the model's own value": parameter.own is not None and _times(parameter, parameter.own),
         "values looked at": " to ".join(_times(parameter, end) for end in fit.bounds),
@@ -327,7 +325,7 @@ def _fit(sweep: SweepReport, parameter: BroughtTogether) -> list[Block]:
     )
 
 
-def _fitted(parameter: BroughtTogether) -> str:
+def _fitted(parameter: Figures) -> str:
     """The value with its error, to the digits that the error leaves."""
     fit, value, error = parameter.fit, parameter.value, parameter.error
     assert fit is not None
@@ -339,5 +337,5 @@ def _fitted(parameter: BroughtTogether) -> str:
     return f"{value:.{digits}f}{times} ± {error:.{digits}f}{times}"
 
 
-def _times(parameter: BroughtTogether, value: float) -> str:
+def _times(parameter: Figures, value: float) -> str:
     return f"{value:.4g}{'x' if parameter.times else ''}"

@@ -21,7 +21,6 @@ from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,6 +28,7 @@ from typing import Any
 from .. import __version__
 from ..errors import BadInputError, WorkerEndedError, refuse
 from ..installed import require_extra
+from ..page import Figures
 from ..processes import checked_jobs
 from ..processes.parallel import unwinding, worker_processes
 from ..runs.drive import Progress, silent
@@ -45,7 +45,6 @@ __all__ = [
     "DesignPoint",
     "PreparedSweep",
     "Sweep",
-    "SweepSummary",
     "Vary",
     "design_of",
     "prepared",
@@ -67,38 +66,6 @@ _PATIENCE = 10.0  # seconds for a scheduler to answer
 _RUN_APART = partial(run_batch, own=True)
 
 
-@dataclass(frozen=True)
-class SweepSummary:
-    """What has become of a sweep.
-
-    Attributes:
-        folder: Where it is.
-        cells: How many it has; points: of the design.
-        points: See cells.
-        done: How many have a result.
-        failed: How many have none, by the class of the error.
-        ran: How many were run this time.
-        seconds: What this time took.
-        said: What a reader should know.
-        read: Python that opens the dataset.
-    """
-
-    folder: str
-    cells: int
-    points: int
-    done: int
-    failed: Mapping[str, int]
-    ran: int
-    seconds: float
-    said: tuple[str, ...] = ()
-    read: str = ""
-
-    @property
-    def missing(self) -> int:
-        """How many have not run."""
-        return self.cells - self.done - sum(self.failed.values())
-
-
 def run_sweep(
     sweep: Sweep | PreparedSweep,
     out: str | Path,
@@ -108,7 +75,7 @@ def run_sweep(
     extend: bool = False,
     retry_failed: bool = False,
     progress: Progress = silent,
-) -> SweepSummary:
+) -> Figures:
     """Run what is missing of a sweep.
 
     Args:
@@ -119,6 +86,17 @@ def run_sweep(
         extend: Whether the design may be larger than that of the folder.
         retry_failed: Whether cells that failed are run again; their rows are replaced.
         progress: Told the fraction of what is missing that is done.
+
+    Returns:
+        folder: Where it is.
+        cells: How many it has; points: of the design.
+        done: How many have a result.
+        failed: How many have none, by the class of the error.
+        ran: How many were run this time.
+        seconds: What this time took.
+        said: What a reader should know.
+        read: Python that opens the dataset.
+        missing: How many have not run.
 
     Raises:
         BadInputError: The folder is of another sweep, or in use; see `prepared` for the rest.
@@ -167,16 +145,18 @@ def run_sweep(
             finally:
                 writer.flush()
     place = (folder / CELLS).as_posix()
-    return SweepSummary(
+    done = kinds.pop(DONE, 0)
+    return Figures(
         folder=os.fspath(folder),
         cells=len(ready),
         points=ready.design.size,
-        done=kinds.pop(DONE, 0),
+        done=done,
         failed=dict(kinds.most_common()),
         ran=ran,
         seconds=time.monotonic() - began,
         said=ready.said,
         read=f'pyarrow.dataset.dataset("{place}", partitioning="hive").to_table()',
+        missing=len(ready) - done - sum(kinds.values()),
     )
 
 

@@ -9,7 +9,6 @@ print(found.agreed, "of", len(found.settings), "settings agree")
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,86 +16,17 @@ import numpy as np
 from ..errors import StateMachineError, check_name, refuse
 from ..interface import Array
 from ..measures.text import listed
+from ..page import Figures
 from ..runs.drive import Progress, part_of, silent
 from .analysis_data import SweepData, sweep_data
-from .analysis_gaps import (
-    GapMap,
-    QuantityAgreement,
-    SettingGap,
-    agreement_of,
-    gap_map,
-    only_rounding,
-)
-from .analysis_indices import Sensitivity, ranked, sensitivity
-from .analysis_runs import CellRunner, ModelFacts, SweepFloor, facts_of, floor_of, runner_of
-from .analysis_together import BroughtTogether, Varied, brought_together
-from .design import Design
+from .analysis_gaps import agreement_of, gap_map, only_rounding
+from .analysis_indices import ranked, sensitivity
+from .analysis_runs import CellRunner, ModelFacts, facts_of, floor_of, runner_of
+from .analysis_together import Varied, brought_together
 from .folder import design_of, read_manifest
 from .rows import read_cells
 
 FLOOR_CELLS = 64
-
-
-@dataclass(frozen=True, eq=False)
-class SweepReport:
-    """What a sweep says of two engines.
-
-    Attributes:
-        what: The experiment; folder: of the dataset.
-        folder: See what.
-        sides: The engines; versions: of what the dataset was made with.
-        versions: See sides.
-        parameters: What was varied, in the order of a setting's values; units: of each of them
-            that has one.
-        units: See parameters.
-        seeds: How many starts each setting has.
-        quantity: The one that the settings, the map, the indices and the fit are of.
-        quantities: Each that the dataset has.
-        settings: Every point of the design.
-        failed: How many cells failed, by the class of the error; missing: have not run.
-        missing: See failed.
-        floor: The chaos floor; None where it is not known, and no_floor says why.
-        no_floor: See floor.
-        map: The gap over one or two parameters; None where nothing is varied.
-        sensitivity: None where the gap is the same everywhere, or nothing is varied.
-        together: For each parameter that was fitted.
-        ran: How many cells were run for this report.
-    """
-
-    what: str
-    folder: str
-    sides: tuple[str, str]
-    versions: Mapping[str, str]
-    parameters: tuple[str, ...]
-    units: Mapping[str, str]
-    seeds: int
-    quantity: QuantityAgreement
-    quantities: tuple[QuantityAgreement, ...]
-    settings: tuple[SettingGap, ...]
-    failed: Mapping[str, int]
-    missing: int
-    floor: SweepFloor | None
-    no_floor: str
-    map: GapMap | None
-    sensitivity: Sensitivity | None
-    together: tuple[BroughtTogether, ...]
-    ran: int
-    design: Design = field(repr=False, metadata={"json": False})
-
-    @property
-    def agreed(self) -> int:
-        """In how many settings both sides agree at every seed."""
-        return self.quantity.counts.get("agrees", 0)
-
-    @property
-    def scaled(self) -> frozenset[str]:
-        """The parameters whose values are times the model's own."""
-        return frozenset(vary.label for vary in self.design.factors if vary.times)
-
-    @property
-    def only_rounding(self) -> bool:
-        """Whether every gap is inside the chaos floor, so that nothing has a cause to look for."""
-        return only_rounding(self.settings)
 
 
 def sweep_report(
@@ -112,7 +42,7 @@ def sweep_report(
     menagerie: str | None = None,
     jobs: int | None = None,
     progress: Progress = silent,
-) -> SweepReport:
+) -> Figures:
     """What the dataset of a sweep says of two engines.
 
     Args:
@@ -129,6 +59,26 @@ def sweep_report(
         menagerie: Where the name of a model is looked up.
         jobs: How many processes.
         progress: Told the fraction that is done.
+
+    Returns:
+        what: The experiment; folder: of the dataset.
+        sides: The engines; versions: of what the dataset was made with.
+        parameters: What was varied, in the order of a setting's values; units: of each of them
+            that has one.
+        seeds: How many starts each setting has.
+        quantity: The one that the settings, the map, the indices and the fit are of.
+        quantities: Each that the dataset has, see `agreement_of`.
+        settings: Every point of the design, see `agreement_of`.
+        failed: How many cells failed, by the class of the error; missing: have not run.
+        floor: The chaos floor, see `floor_of`; None where it is not known, and no_floor says why.
+        map: The gap over one or two parameters, see `gap_map`; None where nothing is varied.
+        sensitivity: See there; None where the gap is the same everywhere, or nothing is varied.
+        together: For each parameter that was fitted, see `brought_together`.
+        ran: How many cells were run for this report.
+        agreed: In how many settings both sides agree at every seed.
+        scaled: The parameters whose values are times the model's own.
+        only_rounding: Whether every gap is inside the chaos floor, so that nothing has a cause to
+            look for.
 
     Raises:
         BadInputError: There is no dataset, or none of two engines.
@@ -157,7 +107,7 @@ def sweep_report(
         else:
             floor = floor_of(data, runner, floor_cells, part_of(progress, 0.0, 0.5))
             no_floor = "" if floor else "no cell was to be run for it"
-    widths = {} if floor is None else floor.width
+    widths = {} if floor is None else floor._width
     agreements = {
         name: agreement_of(data, name, widths.get(name), facts, tolerances) for name in data.gaps
     }
@@ -168,7 +118,7 @@ def sweep_report(
         data, shares, agreement, widths.get(main), facts, fit, varied, runner,
         part_of(progress, 0.5, 0.5),
     )  # fmt: skip
-    return SweepReport(
+    return Figures(
         what=manifest["request"]["what"],
         folder=str(folder),
         sides=sides,
@@ -187,7 +137,9 @@ def sweep_report(
         sensitivity=shares,
         together=together,
         ran=(floor.cells if floor else 0) + sum(fit.cells for fit in together),
-        design=design,
+        agreed=agreement.counts.get("agrees", 0),
+        scaled=frozenset(vary.label for vary in design.factors if vary.times),
+        only_rounding=rounding,
     )
 
 
@@ -209,15 +161,15 @@ def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
 
 def _together(
     data: SweepData,
-    shares: Sensitivity | None,
-    agreement: QuantityAgreement,
+    shares: Figures | None,
+    agreement: Figures,
     width: Array | None,
     facts: ModelFacts,
     asked: Sequence[str],
     varied: Varied | None,
     runner: CellRunner | None,
     progress: Progress,
-) -> tuple[BroughtTogether, ...]:
+) -> tuple[Figures, ...]:
     """The fit of each parameter that is asked for, else of the one that counts most."""
     chosen = [vary for vary in data.design.factors if vary.label in asked]
     if not asked:  # not the timestep, which is no property of the robot

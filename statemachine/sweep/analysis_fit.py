@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..interface import Array
+from ..page import Figures
 from .analysis_data import Flags, drawn_again, length
 
 _SCAN = 401  # values that are looked at between the bounds, before the minimum is refined
@@ -17,41 +17,15 @@ _EDGE = 0.005  # of the range
 MOST_CURVES = 200
 
 
-@dataclass(frozen=True, eq=False)
-class FittedValue:
-    """The value of a parameter at which the gap is least.
-
-    Attributes:
-        value: Of the parameter.
-        error: Its standard error; of: what that is from.
-        of: See error.
-        gap: What is predicted there, the mean of the curves [SI].
-        bounds: The range of the design.
-        edge: Whether it is at the end of the range.
-        curves: From how many curves; of a sampled design, from how many settings.
-        scan: (n,) values between the bounds, and (n,) the predicted gap there.
-        by_curve: (c,) what is predicted at the value for each curve that was given, or NaN.
-    """
-
-    value: float
-    error: float | None
-    of: str
-    gap: float
-    bounds: tuple[float, float]
-    edge: bool
-    curves: int
-    scan: tuple[tuple[float, ...], tuple[float, ...]] = field(repr=False, metadata={"json": False})
-    by_curve: Array = field(repr=False, metadata={"json": False})
-
-    def within(self, good: float) -> tuple[float, float] | None:
-        """The least and the largest value whose predicted gap is at most so much; None if none."""
-        fine = [value for value, gap in zip(*self.scan, strict=True) if gap <= good]
-        return (fine[0], fine[-1]) if fine else None
+def values_within(fit: Figures, good: float) -> tuple[float, float] | None:
+    """The least and the largest value whose predicted gap is at most so much; None if none."""
+    fine = [value for value, gap in zip(*fit._scan, strict=True) if gap <= good]
+    return (fine[0], fine[-1]) if fine else None
 
 
 def fit_curves(
     name: str, levels: Array, left: Array, right: Array, seeds: Sequence[int]
-) -> FittedValue | None:
+) -> Figures | None:
     """The least gap over a parameter, from runs at some of its values.
 
     Each number of a run is interpolated over the parameter (PCHIP, which does not overshoot), and
@@ -66,7 +40,16 @@ def fit_curves(
         seeds: (c,) that of each curve: the curves of a seed are no independent figures.
 
     Returns:
-        The value; None if there are fewer than three values or no whole curve.
+        None if there are fewer than three values or no whole curve; else
+
+        value: Of the parameter.
+        error: Its standard error; of: what that is from.
+        gap: What is predicted there, the mean of the curves [SI].
+        bounds: The range of the design.
+        edge: Whether it is at the end of the range.
+        curves: From how many curves; of a sampled design, from how many settings.
+        _scan: (n,) values between the bounds, and (n,) the predicted gap there.
+        _by_curve: (c,) what is predicted at the value for each curve that was given, or NaN.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -103,7 +86,7 @@ def fit_curves(
             _curvature(difference(value)[used], difference.derivative()(value)[used]),
             "the curvature",
         )
-    return FittedValue(
+    return Figures(
         value=value,
         error=error,
         of=of,
@@ -111,12 +94,12 @@ def fit_curves(
         bounds=(low, high),
         edge=not low + _EDGE * (high - low) < value < high - _EDGE * (high - low),
         curves=len(chosen),
-        scan=(tuple(scan.tolist()), tuple(centre.tolist())),
-        by_curve=by_curve,
+        _scan=(tuple(scan.tolist()), tuple(centre.tolist())),
+        _by_curve=by_curve,
     )
 
 
-def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
+def fit_scatter(values: Array, gaps: Array) -> Figures | None:
     """The same from settings that differ in everything: a parabola through the squared gaps.
 
     Where a run is linear in its parameters the squared length of a difference is a parabola.
@@ -145,7 +128,7 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
     predicted = np.sqrt(np.maximum(squares, 0.0))
     value = float(scan[place])
     by_curve[known] = predicted[place]
-    return FittedValue(
+    return Figures(
         value=value,
         error=float(np.std(again)),
         of=f"{len(values)} settings drawn again",
@@ -153,8 +136,8 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
         bounds=(low, high),
         edge=place in (0, _SCAN - 1),
         curves=len(values),
-        scan=(tuple(scan.tolist()), tuple(predicted.tolist())),
-        by_curve=by_curve,
+        _scan=(tuple(scan.tolist()), tuple(predicted.tolist())),
+        _by_curve=by_curve,
     )
 
 

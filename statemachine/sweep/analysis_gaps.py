@@ -3,97 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ..interface import Array, Ints
 from ..measures import QUANTITIES, Tolerance, tolerance_of
+from ..page import Figures
 from .analysis_data import RUN_QUANTITIES, SweepData, largest_known, median
-from .analysis_indices import Sensitivity, ranked
+from .analysis_indices import ranked
 from .analysis_runs import ModelFacts
 from .design import Value, Vary
 from .rows import known
 
-SettingVerdict = Literal["agrees", "some seeds", "chaos", "differs", "no runs"]
-VERDICTS: tuple[SettingVerdict, ...] = ("agrees", "some seeds", "chaos", "differs", "no runs")
+VERDICTS = ("agrees", "some seeds", "chaos", "differs", "no runs")
 BINS = 6  # of a range that was sampled
-
-
-@dataclass(frozen=True)
-class SettingGap:
-    """One setting of a sweep.
-
-    Attributes:
-        values: Of the parameters.
-        median: The gap over the seeds [SI]; None without a run on both sides.
-        worst: The largest of the seeds.
-        floor: Its chaos floor; None where that is not known.
-        verdict: "agrees": within tolerance at every seed; "some seeds": at some of them; "chaos":
-            beyond, but inside the chaos floor; "differs"; "no runs".
-    """
-
-    values: tuple[Value, ...]
-    median: float | None
-    worst: float | None
-    floor: float | None
-    verdict: SettingVerdict
-
-    @property
-    def inside_floor(self) -> bool:
-        """Whether there is a gap, and it is inside the chaos floor."""
-        return self.median is not None and self.floor is not None and self.median <= self.floor
-
-
-@dataclass(frozen=True)
-class QuantityAgreement:
-    """The gap of one quantity over all settings.
-
-    Attributes:
-        name: Of the quantity; says: in words; unit: SI.
-        says: See name.
-        unit: See name.
-        tolerance: The gap that does not matter; reason: why that much.
-        reason: See tolerance.
-        counts: How many settings have each verdict.
-        median: Of all settings' medians [SI].
-        worst: The largest of any seed at any setting.
-    """
-
-    name: str
-    says: str
-    unit: str
-    tolerance: float
-    reason: str
-    counts: Mapping[str, int]
-    median: float
-    worst: float
-
-
-@dataclass(frozen=True)
-class GapMap:
-    """The gap over one or two parameters; over all others it is the median.
-
-    Attributes:
-        across: The parameter from left to right; up: from bottom to top, "" for none.
-        up: See across.
-        columns: Its values; of a sampled range the middles of equal parts.
-        rows: Of the other; one without a name if there is none.
-        gap: By row and column [SI]; None where there is no run.
-        inside: Whether the gap there is inside the chaos floor.
-        others: The parameters over which it is the median.
-        sampled: Which of the two are parts of a range.
-    """
-
-    across: str
-    up: str
-    columns: tuple[Value, ...]
-    rows: tuple[Value, ...]
-    gap: tuple[tuple[float | None, ...], ...]
-    inside: tuple[tuple[bool, ...], ...]
-    others: tuple[str, ...] = ()
-    sampled: tuple[str, ...] = ()
 
 
 def agreement_of(
@@ -102,7 +26,7 @@ def agreement_of(
     width: Array | None,
     facts: ModelFacts,
     given: Mapping[str, float] | None,
-) -> tuple[QuantityAgreement, tuple[SettingGap, ...]]:
+) -> tuple[Figures, tuple[Figures, ...]]:
     """The gap of a quantity at every setting, and how many agree.
 
     Args:
@@ -111,6 +35,25 @@ def agreement_of(
         width: (p) the chaos floor; None where it is not known.
         facts: Of the model.
         given: Tolerances by kind, instead of ours [SI].
+
+    Returns:
+        Over all settings:
+
+        name: Of the quantity; says: in words; unit: SI.
+        tolerance: The gap that does not matter; reason: why that much.
+        counts: How many settings have each verdict.
+        median: Of all settings' medians [SI].
+        worst: The largest of any seed at any setting.
+
+        Of each setting:
+
+        values: Of the parameters.
+        median: The gap over the seeds [SI]; None without a run on both sides.
+        worst: The largest of the seeds.
+        floor: Its chaos floor; None where that is not known.
+        verdict: "agrees": within tolerance at every seed; "some seeds": at some of them; "chaos":
+            beyond, but inside the chaos floor; "differs"; "no runs".
+        inside_floor: Whether there is a gap, and it is inside the chaos floor.
     """
     quantity, gap = RUN_QUANTITIES[name], data.gaps[name]
     tolerances = _tolerances(data, quantity.kind, facts, given)
@@ -120,7 +63,7 @@ def agreement_of(
     there, within = np.isfinite(gap), gap <= tolerance[:, None]
     floors = [None] * len(gap) if width is None else width.tolist()
     # The first of these that is true of a setting.
-    true: dict[SettingVerdict, Any] = {
+    true: dict[str, Any] = {
         "no runs": ~there.any(axis=1),
         "agrees": (within | ~there).all(axis=1),
         "chaos": centre <= (-np.inf if width is None else width),
@@ -128,20 +71,31 @@ def agreement_of(
     }
     verdicts = np.select([*true.values()], [*true], "differs").tolist()
     settings = [
-        SettingGap(point.values, known(middle), known(worst), floor, verdict)
+        Figures(
+            values=point.values,
+            median=known(middle),
+            worst=known(worst),
+            floor=floor,
+            verdict=verdict,
+            inside_floor=None not in (known(middle), floor) and middle <= floor,
+        )
         for point, middle, worst, floor, verdict in zip(
             data.points, centre, most, floors, verdicts, strict=True
         )
     ]
     return (
-        QuantityAgreement(
-            name, quantity.says, QUANTITIES[quantity.kind].unit, most_tolerant.value,
-            most_tolerant.reason,
-            {verdict: verdicts.count(verdict) for verdict in VERDICTS if verdict in verdicts},
-            float(median(centre)), float(largest_known(most)),
+        Figures(
+            name=name,
+            says=quantity.says,
+            unit=QUANTITIES[quantity.kind].unit,
+            tolerance=most_tolerant.value,
+            reason=most_tolerant.reason,
+            counts={name: verdicts.count(name) for name in VERDICTS if name in verdicts},
+            median=float(median(centre)),
+            worst=float(largest_known(most)),
         ),
         tuple(settings),
-    )  # fmt: skip
+    )
 
 
 def _tolerances(
@@ -155,22 +109,31 @@ def _tolerances(
     return [tolerance_of(kind, np.empty(0), np.empty(0), reach, step, given) for step in steps]
 
 
-def only_rounding(settings: Sequence[SettingGap]) -> bool:
+def only_rounding(settings: Sequence[Figures]) -> bool:
     """Whether every gap is inside the chaos floor."""
     there = [setting for setting in settings if setting.median is not None]
     return bool(there) and all(setting.inside_floor for setting in there)
 
 
 def gap_map(
-    data: SweepData, name: str, width: Array | None, shares: Sensitivity | None
-) -> GapMap | None:
-    """The map of a gap; None where nothing is varied.
+    data: SweepData, name: str, width: Array | None, shares: Figures | None
+) -> Figures | None:
+    """The gap over one or two parameters; over all others it is the median. None without any.
 
     Args:
         data: Of the sweep.
         name: Of the quantity.
         width: (p) the chaos floor; None where it is not known.
         shares: What the gap is most sensitive to.
+
+    Returns:
+        across: The parameter from left to right; up: from bottom to top, "" for none.
+        columns: Its values; of a sampled range the middles of equal parts.
+        rows: Of the other; one without a name if there is none.
+        gap: By row and column [SI]; None where there is no run.
+        inside: Whether the gap there is inside the chaos floor.
+        others: The parameters over which it is the median.
+        sampled: Which of the two are parts of a range.
     """
     if not data.design.factors:
         return None
@@ -183,15 +146,17 @@ def gap_map(
         [np.isfinite(centre) & (row == r) & (column == c) for c in range(len(columns))]
         for r in range(max(1, len(rows)))
     ]
-    return GapMap(
-        across.label,
-        "".join(vary.label for vary in rest[:1]),
-        tuple(columns),
-        tuple(rows),
-        tuple(tuple(known(median(centre[cell])) for cell in line) for line in cells),
-        tuple(tuple(bool(2 * fine[cell].sum() > cell.sum()) for cell in line) for line in cells),
-        tuple(vary.label for vary in rest[1:]),
-        tuple(vary.label for vary in (across, *rest[:1]) if vary.bounds is not None),
+    return Figures(
+        across=across.label,
+        up="".join(vary.label for vary in rest[:1]),
+        columns=tuple(columns),
+        rows=tuple(rows),
+        gap=tuple(tuple(known(median(centre[cell])) for cell in line) for line in cells),
+        inside=tuple(
+            tuple(bool(2 * fine[cell].sum() > cell.sum()) for cell in line) for line in cells
+        ),
+        others=tuple(vary.label for vary in rest[1:]),
+        sampled=tuple(vary.label for vary in (across, *rest[:1]) if vary.bounds is not None),
     )
 
 

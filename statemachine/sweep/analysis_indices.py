@@ -3,68 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from ..installed import require_extra
 from ..interface import Array
+from ..page import Figures
 from .analysis_data import SweepData, drawn_again, median
 from .design import Design, Vary
 
 _TAIL = 50 * (1 - 0.95)  # percent, on each side of an interval
 _LEAST_SEEDS = 3  # of which a bootstrap says something
 _LEAST_SAMPLES = 4
+_INTERVALS = ("first_interval", "total_interval")
 
 
-@dataclass(frozen=True)
-class ParameterIndex:
-    """How much of the variance of a figure a parameter explains.
-
-    Attributes:
-        label: Of the parameter.
-        first: The share that it explains alone, whatever the others are.
-        total: The share that vanishes where it is kept; what it does together with others
-            included.
-        first_interval: 95 % interval; None where there is nothing to compute it from.
-        total_interval: See first_interval.
-    """
-
-    label: str
-    first: float
-    total: float
-    first_interval: tuple[float, float] | None = None
-    total_interval: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """What a figure is sensitive to.
-
-    Attributes:
-        method: "sobol": Saltelli's estimators on his design; "factorial": the variance of a full
-            factorial taken apart; "rank": Spearman's correlation squared, which is neither.
-        indices: One for each parameter, the largest total first.
-        samples: From how many settings; of "sobol" how many in each block.
-        error: What the intervals are of; "" without.
-        notes: What a reader should know, sentences.
-    """
-
-    method: Literal["sobol", "factorial", "rank"]
-    indices: tuple[ParameterIndex, ...]
-    samples: int
-    error: str = ""
-    notes: tuple[str, ...] = ()
-
-
-def sensitivity(data: SweepData, figures: Array) -> Sensitivity | None:
+def sensitivity(data: SweepData, figures: Array) -> Figures | None:
     """What a figure of a sweep's points is sensitive to; None where nothing can be said.
 
     Args:
         data: Of the sweep.
         figures: (p, s) at each point and seed; NaN where there is none. Of the seeds the median
             counts.
+
+    Returns:
+        method: "sobol": Saltelli's estimators on his design; "factorial": the variance of a full
+            factorial taken apart; "rank": Spearman's correlation squared, which is neither.
+        indices: One for each parameter, the largest total first: label; first: the share of the
+            variance that it explains alone, whatever the others are; total: the share that
+            vanishes where it is kept, what it does together with others included; first_interval
+            and total_interval: of 95 %, None where there is nothing to compute them from.
+        samples: From how many settings; of "sobol" how many in each block.
+        error: What the intervals are of; "" without.
+        notes: What a reader should know, sentences.
     """
     centre = median(figures)
     known = centre[np.isfinite(centre)]
@@ -75,13 +47,13 @@ def sensitivity(data: SweepData, figures: Array) -> Sensitivity | None:
     return _rank(data, centre) if data.design.sampled else _factorial(data.design, figures)
 
 
-def ranked(design: Design, shares: Sensitivity | None) -> list[Vary]:
+def ranked(design: Design, shares: Figures | None) -> list[Vary]:
     """What is varied, the most sensitive first."""
     rank = {index.label: k for k, index in enumerate(shares.indices)} if shares else {}
     return sorted(design.factors, key=lambda vary: rank.get(vary.label, len(rank)))
 
 
-def _sobol(design: Design, centre: Array) -> Sensitivity | None:
+def _sobol(design: Design, centre: Array) -> Figures | None:
     """Saltelli's design: blocks A, B and A with one range from B."""
     labels = [vary.label for vary in design.sampled]
     # The samples change slowest: blocks, then samples, then the combinations of lists.
@@ -111,7 +83,7 @@ def _sobol(design: Design, centre: Array) -> Sensitivity | None:
     return _result("sobol", labels, shares, count, drawn, "the samples drawn again", notes)
 
 
-def _factorial(design: Design, figures: Array) -> Sensitivity | None:
+def _factorial(design: Design, figures: Array) -> Figures | None:
     """Every combination of lists and grids: the variance over the whole of it."""
     cube = figures.reshape(*(len(vary.values) for vary in design.factors), -1)
     levels = _without_holes(cube)
@@ -161,7 +133,7 @@ def _without_holes(cube: Array) -> list[list[int]]:
     return levels
 
 
-def _rank(data: SweepData, centre: Array) -> Sensitivity | None:
+def _rank(data: SweepData, centre: Array) -> Figures | None:
     """Where the design allows no indices: which parameter the figure goes with."""
     known = np.isfinite(centre)
     labels = [vary.label for vary in data.design.factors if vary.numeric]
@@ -190,18 +162,23 @@ def _result(
     drawn: Sequence[Array],
     error: str,
     notes: Sequence[str],
-) -> Sensitivity:
+) -> Figures:
     """The largest total first; `shares` (2, k) and `drawn`, many of them, are first and total."""
     intervals: Any = np.full((2, 2, len(labels)), None)
     if len(drawn):
         intervals = np.percentile(drawn, (_TAIL, 100 - _TAIL), axis=0)
     indices = [
-        ParameterIndex(
-            label,
-            *shares[:, k].tolist(),
-            *(None if None in pair else tuple(pair) for pair in intervals[..., k].T.tolist()),
+        Figures(
+            label=label,
+            **dict(zip(("first", "total"), shares[:, k].tolist(), strict=True)),
+            **{
+                name: None if None in pair else tuple(pair)
+                for name, pair in zip(_INTERVALS, intervals[..., k].T.tolist(), strict=True)
+            },
         )
         for k, label in enumerate(labels)
     ]
     indices.sort(key=lambda index: -index.total)
-    return Sensitivity(method, tuple(indices), samples, error, tuple(notes))
+    return Figures(
+        method=method, indices=tuple(indices), samples=samples, error=error, notes=tuple(notes)
+    )

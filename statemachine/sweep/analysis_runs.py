@@ -12,8 +12,9 @@ import numpy as np
 from ..backends import load
 from ..compare.perturbed import ROUNDING
 from ..errors import StateMachineError, refuse
-from ..interface import Array, Ints, Model, forward, make_data, reset
+from ..interface import Ints, Model, forward, make_data, reset
 from ..measures import JointPlaces
+from ..page import Figures
 from ..processes import checked_jobs
 from ..runs.controllers import function_file, is_function
 from ..runs.drive import Progress, silent
@@ -104,30 +105,9 @@ def runner_of(
     return CellRunner(ready, hinges, checked_jobs(jobs), data.runs.dtype)
 
 
-@dataclass(frozen=True, eq=False)
-class SweepFloor:
-    """The chaos floor at each setting of a sweep.
-
-    Attributes:
-        backend: The side that was run again.
-        settings: At how many settings; the others have that of the one nearest to them.
-        cells: How many runs it is made of.
-        seconds: What they took.
-        rounding: What starts and commands were changed by, relative.
-        width: (p) of each quantity [SI]; infinite where a perturbed run failed.
-    """
-
-    backend: str
-    settings: int
-    cells: int
-    seconds: float
-    rounding: float = ROUNDING
-    width: Mapping[str, Array] = field(default_factory=dict, metadata={"json": False})
-
-
 def floor_of(
     data: SweepData, runner: CellRunner, most: int, progress: Progress = silent
-) -> SweepFloor | None:
+) -> Figures | None:
     """The chaos floor, from cells of the left side, perturbed as `compare` does it.
 
     Args:
@@ -135,6 +115,14 @@ def floor_of(
         runner: Runs its cells.
         most: How many cells may be run.
         progress: Told the fraction that is done.
+
+    Returns:
+        backend: The side that was run again.
+        settings: At how many settings; the others have that of the one nearest to them.
+        cells: How many runs it is made of.
+        seconds: What they took.
+        rounding: What starts and commands were changed by, relative.
+        _width: (p) of each quantity [SI]; infinite where a perturbed run failed.
     """
     began = time.monotonic()
     done = np.isfinite(data.runs["time"][0])
@@ -152,7 +140,14 @@ def floor_of(
         gap = gap_between(name, data.runs[0, again, seed], runs).reshape(len(chosen), NUDGES)
         gap = np.where(np.isnan(gap), np.inf, gap)  # one of them failed
         width[name] = gap.max(axis=1)[nearest]
-    return SweepFloor(data.sides[0], len(chosen), len(cells), time.monotonic() - began, width=width)
+    return Figures(
+        backend=data.sides[0],
+        settings=len(chosen),
+        cells=len(cells),
+        seconds=time.monotonic() - began,
+        rounding=ROUNDING,
+        _width=width,
+    )
 
 
 def _nearest(data: SweepData, chosen: Ints) -> Ints:

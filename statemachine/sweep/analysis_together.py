@@ -3,71 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from ..interface import Array
+from ..page import Figures
 from ..runs.drive import Progress, silent
 from .analysis_data import Runs, SweepData, gap_between, median, vectors
-from .analysis_fit import FittedValue, fit_curves, fit_scatter
+from .analysis_fit import fit_curves, fit_scatter
 from .analysis_runs import CellRunner, evenly
 from .design import Value, Vary
 
 Setting = tuple[tuple[Value | None, ...], int]  # values of the factors, and a seed
 Varied = Literal["right", "both"]
-Verdict = Literal["together", "closer", "edge", "none"]
 MOST_REFERENCES = 24  # runs of the left side at the model's own value
 CHECKED = 4  # pairs of runs at a value
 REFINED = 9  # values that are run where a check contradicts the fit
 _LESS = 0.9  # of the gap before: what is above it is no improvement
 _NEAR = 0.5  # of the measured gap: a prediction that is farther off is contradicted
-
-
-@dataclass(frozen=True)
-class BroughtTogether:
-    """What varying one parameter does to the gap between two sides.
-
-    Attributes:
-        label: The parameter; times: whether its values are times the model's own.
-        times: See label.
-        varied: "right": the left side keeps the model's own value; "both": both have the same.
-        own: The model's own value; None where it is not known or has several.
-        before: The gap with the parameter as the model has it, as all of these the mean of
-            settings and seeds [SI]; None where that is not known.
-        fit: The value of the least gap; None where the design does not allow one.
-        value: The best known: of runs, else of the fit.
-        error: How far it is known: the distance of the runs, else the standard error of the fit.
-        after: The gap there: of runs, else as predicted [SI].
-        measured: The gap of runs at the fitted value; None where none was run.
-        predicted: What the fit says of the same runs.
-        pairs: How many pairs of runs.
-        tried: Where `measured` contradicts `predicted`, (n,) values near that one which were run,
-            and (n,) the gap of each, NaN where a run failed; the best of them is the value then,
-            and their distance the error.
-        verdict: "together": within tolerance or the chaos floor; "closer"; "edge": least at the
-            end of the range; "none": no value is better than the model's own; "" without a fit.
-        why_not: Why there is no fit, or no measurement.
-        cells: How many cells were run for it.
-    """
-
-    label: str
-    times: bool
-    varied: Varied
-    own: float | None
-    before: float | None = None
-    fit: FittedValue | None = None
-    value: float | None = None
-    error: float | None = None
-    after: float | None = None
-    measured: float | None = None
-    predicted: float | None = None
-    pairs: int = 0
-    verdict: Verdict | Literal[""] = ""
-    why_not: str = ""
-    cells: int = 0
-    tried: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
 
 def brought_together(
@@ -80,7 +34,7 @@ def brought_together(
     own: float | None = None,
     runner: CellRunner | None = None,
     progress: Progress = silent,
-) -> BroughtTogether:
+) -> Figures:
     """The value of a parameter that brings the two sides of a sweep together.
 
     Args:
@@ -92,50 +46,69 @@ def brought_together(
         own: That value; None where the model's parts have several.
         runner: Runs what the dataset has not; None for nothing.
         progress: Told the fraction that is done.
+
+    Returns:
+        label: The parameter; times: whether its values are times the model's own.
+        varied: "right": the left side keeps the model's own value; "both": both have the same.
+        own: The model's own value; None where it is not known or has several.
+        before: The gap with the parameter as the model has it, as all of these the mean of
+            settings and seeds [SI]; None where that is not known.
+        fit: The value of the least gap, see `fit_curves`; None where the design allows none.
+        value: The best known: of runs, else of the fit.
+        error: How far it is known: the distance of the runs, else the standard error of the fit.
+        after: The gap there: of runs, else as predicted [SI].
+        measured: The gap of runs at the fitted value; None where none was run.
+        predicted: What the fit says of the same runs.
+        pairs: How many pairs of runs.
+        verdict: "together": within tolerance or the chaos floor; "closer"; "edge": least at the
+            end of the range; "none": no value is better than the model's own; "" without a fit.
+        why_not: Why there is no fit, or no measurement.
+        cells: How many cells were run for it.
+        tried: Where `measured` contradicts `predicted`, (n,) values near that one which were run,
+            and (n,) the gap of each, NaN where a run failed; the best of them is the value then,
+            and their distance the error.
     """
-    nothing = BroughtTogether(vary.label, vary.times, varied, own)
+    unknown = dict.fromkeys(("before", "fit", "value", "error", "after", "measured", "predicted"))
+    answer = Figures(
+        **{"label": vary.label, "times": vary.times, "varied": varied, "own": own},
+        **{**unknown, "pairs": 0, "verdict": "", "why_not": "", "cells": 0, "tried": None},
+    )
     if varied == "right" and vary.kind != "option":
-        return replace(
-            nothing, why_not="the model has no value of its own that the left side could keep"
-        )
+        answer.why_not = "the model has no value of its own that the left side could keep"
+        return answer
     case = _Case(data, vary, quantity, varied, own, runner, progress)
     if runner is None and case.lacks_references:
-        return replace(
-            nothing,
-            why_not="the design has no run of the left side at the model's own value, and nothing "
-            "may be run",
+        answer.why_not = (
+            "the design has no run of the left side at the model's own value, and nothing may be "
+            "run"
         )
-    fit = case.scatter() if vary.bounds is not None else case.grid()
+        return answer
+    answer.fit = fit = case.scatter() if vary.bounds is not None else case.grid()
+    answer.cells = case.cells
     if fit is None:
-        return replace(
-            nothing, why_not="it needs three values of the parameter with runs", cells=case.cells
-        )
-    answer = replace(
-        nothing, before=case.own_gap(), fit=fit, value=fit.value, error=fit.error, after=fit.gap,
-        why_not="nothing was run at that value", cells=case.cells,
-    )  # fmt: skip
-    edge = fit.edge
+        answer.why_not = "it needs three values of the parameter with runs"
+        return answer
+    answer.before, edge = case.own_gap(), fit.edge
+    answer.value, answer.error, answer.after = fit.value, fit.error, fit.gap
+    answer.why_not = "nothing was run at that value"
     if runner is not None:
         before, gap, predicted, pairs = case.check(fit)
-        answer = replace(answer, before=answer.before if before is None else before)
+        answer.before = answer.before if before is None else before
         if gap is not None:
-            answer = replace(
-                answer, after=gap, measured=gap, predicted=predicted, pairs=pairs, why_not=""
-            )
+            answer.after, answer.measured, answer.predicted = gap, gap, predicted
+            answer.pairs, answer.why_not = pairs, ""
             if abs(predicted - gap) > max(_NEAR * gap, good):
-                values, gaps, apart = case.refined(fit, gap)
+                values, gaps, answer.error = case.refined(fit, gap)
                 best = int(np.nanargmin(gaps))
-                answer = replace(
-                    answer, tried=(tuple(values), tuple(gaps)), value=values[best], error=apart,
-                    after=gaps[best],
-                )  # fmt: skip
+                answer.tried = tuple(values), tuple(gaps)
+                answer.value, answer.after = values[best], gaps[best]
                 edge = values[best] in fit.bounds
-    before = max(fit.scan[1]) if answer.before is None else answer.before
-    verdict = _verdict(answer.after or 0.0, before, good, edge)
-    return replace(answer, verdict=verdict, cells=case.cells)
+    before = max(fit._scan[1]) if answer.before is None else answer.before
+    answer.verdict, answer.cells = _verdict(answer.after or 0.0, before, good, edge), case.cells
+    return answer
 
 
-def _verdict(gap: float, before: float, good: float, edge: bool) -> Verdict:
+def _verdict(gap: float, before: float, good: float, edge: bool) -> str:
     """What a value does whose gap was another one before, where one is as good as none."""
     if gap <= good:
         return "together"
@@ -184,7 +157,7 @@ class _Case:
         order = np.argsort([float(value) for value in self._vary.values])
         return cube.reshape(-1, lengths[axis], *values.shape[2:])[:, order]
 
-    def grid(self) -> FittedValue | None:
+    def grid(self) -> Figures | None:
         """From the values of a list or a grid."""
         left, right = (self._curves(vectors(self._quantity, runs)) for runs in self._data.runs)
         points, seeds = self._data.runs.shape[1:]
@@ -202,7 +175,7 @@ class _Case:
         seeds = [seed for _, seed in self._settings]
         return fit_curves(self._quantity, self._levels, left, right, seeds)
 
-    def scatter(self) -> FittedValue | None:
+    def scatter(self) -> Figures | None:
         """From samples of a range."""
         values = np.array(self._data.values(self._vary.label), dtype=float)
         chosen = evenly(len(values), len(values) if self._both else MOST_REFERENCES)
@@ -236,7 +209,7 @@ class _Case:
         pairs = left.reshape(-1, len(settings)), right.reshape(len(values), -1)
         return gap_between(self._quantity, *pairs)
 
-    def check(self, fit: FittedValue) -> tuple[float | None, float | None, float, int]:
+    def check(self, fit: Figures) -> tuple[float | None, float | None, float, int]:
         """Run both sides at the value.
 
         Returns:
@@ -247,9 +220,9 @@ class _Case:
         values = [fit.value, self._own] if self._vary.kind == "option" else [fit.value]
         gap, *before = self._gaps([self._settings[k] for k in picked], values, 0.5)
         own = _mean(before[0]) if before else None
-        return own, _mean(gap), float(np.mean(fit.by_curve[picked])), int(np.isfinite(gap).sum())
+        return own, _mean(gap), float(np.mean(fit._by_curve[picked])), int(np.isfinite(gap).sum())
 
-    def refined(self, fit: FittedValue, measured: float) -> tuple[list[float], list[float], float]:
+    def refined(self, fit: Figures, measured: float) -> tuple[list[float], list[float], float]:
         """Run both sides between the neighbours of the value in the design.
 
         A gap over a contact has jumps, which neither an interpolation nor a search for one
@@ -267,9 +240,9 @@ class _Case:
         apart = float(high - low) / (REFINED - 1)
         return [*values, fit.value], [*means.tolist(), measured], apart
 
-    def _picked(self, fit: FittedValue) -> list[int]:
+    def _picked(self, fit: Figures) -> list[int]:
         """The settings that are run at a value."""
-        known = np.flatnonzero(np.isfinite(fit.by_curve))
+        known = np.flatnonzero(np.isfinite(fit._by_curve))
         return known[evenly(len(known), CHECKED)].tolist()
 
     def own_gap(self) -> float | None:
