@@ -14,33 +14,18 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from .errors import BadInputError, EngineError, MissingEngineError, check_name, refuse
 from .installed import DEFAULT, ENGINES, engine_version
+from .page import Figures
 
 _NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)")
 _ADD = "not here: {}; to have it: statemachine engines add {}"
 _LARGE = 1e9  # [byte], more than any takes while it is made
 _EXAMPLE = f"{DEFAULT}==3.3.7"
-
-
-@dataclass(frozen=True)
-class Release:
-    """One that is here.
-
-    Attributes:
-        name: As "mujoco==3.3.7".
-        python: Version of its Python.
-        size: Of its files [byte].
-    """
-
-    name: str
-    python: str
-    size: int
 
 
 def is_release(name: str) -> bool:
@@ -148,15 +133,23 @@ def _python_in(place: Path) -> Path:
     return place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
-def releases() -> Iterator[Release]:
-    """Those that are here, by name."""
+def releases() -> Iterator[Figures]:
+    """Those that are here, by name.
+
+    Returns:
+        name: As "mujoco==3.3.7".
+        python: Version of its Python.
+        size: Of its files [byte].
+    """
     for place in sorted(folder().glob("[a-z]*==*")):  # one that is being made begins with a dot
         settings = place / "pyvenv.cfg"
         text = settings.read_text(encoding="utf-8") if settings.exists() else ""
         python = re.search(r"^version(?:_info)? *= *(\S+)", text, re.MULTILINE)
         files = (file for file in place.rglob("*") if not file.is_dir())
-        yield Release(
-            place.name, python[1] if python else "", sum(file.lstat().st_size for file in files)
+        yield Figures(
+            name=place.name,
+            python=python[1] if python else "",
+            size=sum(file.lstat().st_size for file in files),
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import tempfile
 import threading
@@ -29,7 +28,6 @@ from statemachine.page import Figures, Items, Page, Table
 from statemachine.probes import audit
 from statemachine.probes.audit import conclude, drivers_of, trials
 from statemachine.probes.audit.interface_driver import points, run_elsewhere
-from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
 from .conftest import (
@@ -310,18 +308,18 @@ QUESTIONS = {
 
 def asked(
     question: str, backend: str = "mujoco", only: Iterable[str] = ("keyframe", "limp")
-) -> list[AuditFinding]:
+) -> list[Figures]:
     """What a question finds of an engine and of the interface to it, in few steps."""
     model = sm.load(SCENE, backend=backend)
     places = tuple(point for point in points(model, 0)[0] if point.name in only)
-    found: list[AuditFinding] = []
+    found: list[Figures] = []
     for driver in drivers_of(model, 0):
         for point in places:
             found += QUESTIONS[question](driver, driver.run(point, 30))
     return found
 
 
-def broken(findings: Iterable[AuditFinding]) -> set[tuple[str, str]]:
+def broken(findings: Iterable[Figures]) -> set[tuple[str, str]]:
     """Layer and case of all that is promised and does not hold."""
     return {(each.layer, each.case) for each in findings if not each.holds}
 
@@ -533,9 +531,9 @@ def test_conclusions_follow_from_findings(of_mujoco: Figures) -> None:
     """Another engine would get other sentences."""
     engine = of_mujoco.audited[0]
 
-    def without_warm_start(each: AuditFinding) -> AuditFinding:
+    def without_warm_start(each: Figures) -> Figures:
         if each.case == "warmstart":
-            return dataclasses.replace(each, gap=FutureGap(each.gap.steps, None, 0.0, 0.0))
+            return Figures(**vars(each) | {"gap": FutureGap(each.gap.steps, None, 0.0, 0.0)})
         return each
 
     changed = [without_warm_start(each) for each in engine.findings]

@@ -17,7 +17,8 @@ from statemachine import cli as command_line
 from statemachine.errors import BadInputError, EngineError
 from statemachine.grading.mutants import MUTANTS, Mutant, run
 from statemachine.grading.mutants.faults import FAULTS
-from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
+from statemachine.grading.mutants.run import examination_of, examine, trial_of
+from statemachine.page import Figures
 from statemachine.report.grading import mutants_page
 
 from .conftest import (
@@ -298,7 +299,10 @@ def test_a_test_starts_no_process(write: Write) -> None:
     text = "import os\ndef test_a(): assert os.fork() >= 0\ndef test_b(): assert False, 'no'\n"
     found = examine(write(text), only=["xyzw"])
     refused = "line 2: PermissionError: it starts another process: not here"
-    assert found.failures == (Failure("test_a", refused), Failure("test_b", "line 3: no"))
+    assert found.failures == (
+        Figures(test="test_a", why=refused),
+        Figures(test="test_b", why="line 3: no"),
+    )
 
 
 @pytest.mark.slow
@@ -336,11 +340,11 @@ def test_another_pytests_settings_do_not_disturb(
 
 def test_the_page_keeps_to_its_columns() -> None:
     name = "test_" + "a_name_that_goes_on_and_on_" * 4
-    one = Failure(name, "why")
+    one = Figures(test=name, why="why")
     trials = tuple(
-        MutantTrial(mutant, (one,) * (k % 3 * 6)) for k, mutant in enumerate(MUTANTS.values())
+        trial_of(mutant, (one,) * (k % 3 * 6)) for k, mutant in enumerate(MUTANTS.values())
     )
-    page = mutants_page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
+    page = mutants_page(examination_of("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
     assert not page.holds
     text = shown(page)
     assert max(map(cell_len, text.splitlines())) <= 80

@@ -28,8 +28,8 @@ from ..interface import (
 )
 from ..interface.options import unsupported
 from ..measures.quantities import readings
+from ..page import Figures
 from ..probes.audit.interface_driver import InterfaceDriver
-from ..probes.audit.trials import AuditFinding
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
@@ -97,7 +97,7 @@ class Lab(ExitStack):
         require(len(data.contacts) > 0, "the held box touches nothing")
         return data
 
-    def keeps(self, *questions: Callable[[Driver, ReferenceRun], Iterator[AuditFinding]]) -> None:
+    def keeps(self, *questions: Callable[[Driver, ReferenceRun], Iterator[Figures]]) -> None:
         """Ask the interface questions of the audit: what is promised holds, to the bit.
 
         The run is that of the held box under a command that moves the arm: mid-contact.

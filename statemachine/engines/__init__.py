@@ -27,6 +27,7 @@ from ..installed import raise_if_interrupted
 if TYPE_CHECKING:
     from ..drawing.scene import Camera, Drawer
     from ..interface import Array, Data, Model
+    from ..page import Figures
     from .auditing import Driver
     from .call_watch import CallWatch
     from .description.records import Robot
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
         Counterparts,
         Dials,
         Edit,
-        LeftAlone,
         ModelDifference,
         Term,
         WayBack,
@@ -115,11 +115,23 @@ class RawEngine:
         """What the engine calls the things of the interface."""
         return ()
 
-    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
+    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[Figures, ...]:
         """A joint that nobody commands, after some time [s], on four freshly loaded models.
 
         As it comes; with the model's gravity; without the engine's own motors too; and
         without the damping of joints.
+
+        Returns:
+            label: What was done to the engine before.
+            time: Simulated time [s].
+            position: Of the joint then [rad; of a slide, m].
+            motor: What the engine's own motor exerts on it [N·m or N].
+            explicit: Largest h·D/M of the joint damping that the engine applies explicitly;
+                above 2 a joint gains speed from being damped.
+            gravity: Length of the gravity of a fresh world [m/s²].
+            widest: How far any joint of the robot is from zero then [rad or m].
+            turns: In how many steps the joint's velocity changed its sign.
+            steps: Of how many.
         """
         return ()
 

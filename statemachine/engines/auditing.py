@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import DivergedError
 from ..interface import Array, Model
 from ..measures import JointPlaces
+from ..page import Figures
 from .measured import FutureGap, gap, worst
 
 Layer = Literal["engine", "interface"]
@@ -156,27 +157,6 @@ class ReferenceRun:
         return len(self.future) - 1
 
 
-@dataclass(frozen=True)
-class Measured:
-    """What a save point is like.
-
-    Attributes:
-        point: Its name.
-        how: How one gets there.
-        time: Simulated time since the start [s].
-        contacts: How many contacts there are.
-        limits: How many joints are at a limit; None where that is not told.
-        speed: The largest velocity [rad/s or m/s].
-    """
-
-    point: str
-    how: str
-    time: float
-    contacts: int
-    limits: int | None
-    speed: float
-
-
 class Driver(ABC):
     """One of those that are audited: an engine itself, or the interface to it.
 
@@ -186,7 +166,7 @@ class Driver(ABC):
         legend: What the names of its ways to save mean.
         several: Whether one call takes several steps.
         resets: Whether a machine can be reset.
-        measure: Gives what a save point is like (`Measured`), looked at once.
+        measure: Gives what a save point is like (see `_measure`), looked at once.
     """
 
     layer: Layer
@@ -243,16 +223,27 @@ class Driver(ABC):
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         """What should perturb nothing."""
 
-    def _measure(self, point: SavePoint) -> Measured:
-        """What a save point is like."""
+    def _measure(self, point: SavePoint) -> Figures:
+        """What a save point is like.
+
+        Returns:
+            point: Its name.
+            how: How one gets there.
+            time: Simulated time since the start [s].
+            contacts: How many contacts there are.
+            limits: How many joints are at a limit; None where that is not told.
+            speed: The largest velocity [rad/s or m/s].
+        """
         with self.at(point) as machine:
             speeds = self.read(machine)[self.coordinates.width :]
-            return Measured(
-                point.name,
-                point.how,
-                float(machine.time),
-                *self.touching(machine),
-                float(np.abs(speeds).max(initial=0.0)),
+            time, (contacts, limits) = float(machine.time), self.touching(machine)
+            return Figures(
+                point=point.name,
+                how=point.how,
+                time=time,
+                contacts=contacts,
+                limits=limits,
+                speed=float(np.abs(speeds).max(initial=0.0)),
             )
 
     def reset(self, machine: Machine) -> None:

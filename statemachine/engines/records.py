@@ -21,34 +21,6 @@ class Term:
 
 
 @dataclass(frozen=True)
-class LeftAlone:
-    """A joint that nobody commands, on an engine as it comes.
-
-    Attributes:
-        label: What was done to the engine before.
-        time: Simulated time [s].
-        position: Of the joint then [rad; of a slide, m].
-        motor: What the engine's own motor exerts on it [N·m or N].
-        explicit: Largest h·D/M of the joint damping that the engine applies explicitly;
-            above 2 a joint gains speed from being damped.
-        gravity: Length of the gravity of a fresh world [m/s²].
-        widest: How far any joint of the robot is from zero then [rad or m].
-        turns: In how many steps the joint's velocity changed its sign.
-        steps: Of how many.
-    """
-
-    label: str
-    time: float
-    position: float
-    motor: float
-    explicit: float
-    gravity: float
-    widest: float
-    turns: int
-    steps: int
-
-
-@dataclass(frozen=True)
 class WayBack:
     """A way to go back to an earlier state, and how far the second future is from the first.
 

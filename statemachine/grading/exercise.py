@@ -25,6 +25,7 @@ from .. import __version__, errors
 from ..backends import backend_engine
 from ..errors import BadInputError, EngineError, refuse
 from ..installed import DEFAULT, engine_version
+from ..page import Figures
 from ..processes.parallel import in_parallel, unwinding
 from ..releases import is_release
 from .judges import JUDGES, Judgement, judge_of, judged
@@ -52,34 +53,41 @@ _HINTS = {
 }
 
 
-@dataclass(frozen=True)
-class Grade:
+def grade_of(
+    file: str,
+    sha256: str,
+    backend: str,
+    versions: dict[str, str],
+    functions: tuple[Judgement, ...],
+    cpu_limit: float = TIME_LIMIT,
+    wall_limit: float = WALL_LIMIT,
+) -> Figures:
     """A file, judged.
 
-    Attributes:
+    Args:
         file: Its name; sha256: the digest of its content.
+        sha256: See file.
         backend: The backend that it ran on; versions: of what it ran with.
+        versions: See backend.
         functions: One after the other, in the exercise's order.
         cpu_limit: What each function might compute [s]; wall_limit: and take on the clock [s].
+        wall_limit: See cpu_limit.
+
+    Returns:
+        The same; right: how many functions do what they should; passed: whether all do.
     """
-
-    file: str
-    sha256: str
-    backend: str
-    versions: dict[str, str]
-    functions: tuple[Judgement, ...]
-    cpu_limit: float = TIME_LIMIT
-    wall_limit: float = WALL_LIMIT
-
-    @property
-    def right(self) -> int:
-        """How many functions do what they should."""
-        return sum(judgement.passed for judgement in self.functions)
-
-    @property
-    def passed(self) -> bool:
-        """Whether all do."""
-        return self.right == len(self.functions)
+    right = sum(judgement.passed for judgement in functions)
+    return Figures(
+        file=file,
+        sha256=sha256,
+        backend=backend,
+        versions=versions,
+        functions=functions,
+        cpu_limit=cpu_limit,
+        wall_limit=wall_limit,
+        right=right,
+        passed=right == len(functions),
+    )
 
 
 def run(
@@ -89,7 +97,7 @@ def run(
     progress: Callable[[float], None] = lambda _: None,
     wall_limit: float = WALL_LIMIT,
     folder: Path | None = None,
-) -> Grade:
+) -> Figures:
     """Judge each function of a student's file.
 
     Args:
@@ -159,7 +167,7 @@ class ExerciseJudge(ExitStack):
         file: str | os.PathLike[str],
         progress: Callable[[float], None] = lambda _: None,
         own: Mapping[str, Path] | None = None,
-    ) -> Grade:
+    ) -> Figures:
         """Judge each function of a student's file.
 
         Args:
@@ -177,7 +185,7 @@ class ExerciseJudge(ExitStack):
         judgements = self._all(copy, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)
         limits = self.limits
-        return Grade(
+        return grade_of(
             path.name,
             digest({path.name: path}),
             self.backend,

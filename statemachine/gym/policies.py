@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..interface import Array
 from ..kinematics import Kinematics
+from ..page import Figures
 from .tasks import TIP, HeldBox, Task
 from .vector import ArmVectorEnv
 
@@ -17,25 +17,6 @@ Policy = Callable[[Array], NDArray[np.float32]]  # actions (n, nu) for observati
 
 _DAMPING = 0.05  # m; of the least squares: near a singular pose the step stays small
 _REST = 0.02  # how much of the way back to the middle pose, where the target leaves a choice
-
-
-@dataclass(frozen=True, eq=False)
-class Episodes:
-    """One episode in each of n worlds.
-
-    Attributes:
-        returned: (n,) the sum of the rewards.
-        distance: (n,) to the target at the end [m].
-        success: (n,) whether that is a success.
-        steps: (n,) control steps.
-        diverged: (n,) whether the simulation broke down.
-    """
-
-    returned: Array
-    distance: Array
-    success: NDArray[np.bool_]
-    steps: NDArray[np.int64]
-    diverged: NDArray[np.bool_]
 
 
 def random_policy(task: Task, seed: int | None = None) -> Policy:
@@ -78,13 +59,20 @@ def scripted_policy(task: Task) -> Policy:
     return policy
 
 
-def play(envs: ArmVectorEnv, policy: Policy, seed: int) -> Episodes:
+def play(envs: ArmVectorEnv, policy: Policy, seed: int) -> Figures:
     """Play one episode in each world, world i with seed + i.
 
     Args:
         envs: With an end to its episodes.
         policy: From observations to actions.
         seed: Of the first world.
+
+    Returns:
+        returned: (n,) the sum of the rewards.
+        distance: (n,) to the target at the end [m].
+        success: (n,) whether that is a success.
+        steps: (n,) control steps.
+        diverged: (n,) whether the simulation broke down.
     """
     n = envs.num_envs
     seen, infos = envs.reset(seed=seed)
@@ -106,4 +94,6 @@ def play(envs: ArmVectorEnv, policy: Policy, seed: int) -> Episodes:
             if final is not infos:
                 np.copyto(array, final[name], where=going & final[f"_{name}"])
         going &= ~(terminated | truncated)
-    return Episodes(returned, distance, success, steps, diverged)
+    return Figures(
+        returned=returned, distance=distance, success=success, steps=steps, diverged=diverged
+    )

@@ -19,7 +19,6 @@ from ..probes.audit.trials import (
     RESTORE,
     STEPS,
     WITHOUT,
-    AuditFinding,
 )
 from . import template
 from .template import if_true, versions_of
@@ -95,7 +94,7 @@ def _of_driver(driver: Figures) -> list[Block]:
     )
 
 
-def _by_point(driver: Figures, candidates: Mapping[str, Sequence[AuditFinding]]) -> Table:
+def _by_point(driver: Figures, candidates: Mapping[str, Sequence[Figures]]) -> Table:
     points = [seen.point for seen in driver.points]
     rows = [
         (
@@ -110,7 +109,7 @@ def _by_point(driver: Figures, candidates: Mapping[str, Sequence[AuditFinding]])
     return Table(("what is restored", *points), rows, f"{driver.name}: restored, against going on")
 
 
-def _by_target(driver: Figures, candidates: Mapping[str, Sequence[AuditFinding]]) -> Table:
+def _by_target(driver: Figures, candidates: Mapping[str, Sequence[Figures]]) -> Table:
     targets = {
         "run itself": "the run itself",
         "fresh": "a fresh one",
@@ -215,7 +214,7 @@ def _promises(driver: Figures) -> dict[str, Any]:
 _PROMISED = {(True, True): "yes", (True, False): "yes, broken", (False, True): "no"}
 
 
-def _worst(findings: Iterable[AuditFinding]) -> str:
+def _worst(findings: Iterable[Figures]) -> str:
     gaps = [finding.gap for finding in findings]
     return cell(worst(gaps)) if gaps else NONE
 

@@ -6,16 +6,14 @@ import json
 from collections.abc import Callable, Sequence
 
 from ..grading.class_table import NOTHING, ClassEntry, verdict_word
-from ..grading.exercise import Grade
 from ..grading.judges import JUDGES
-from ..grading.mutants.run import Examination, MutantTrial
 from ..measures.text import count
-from ..page import Page, Table, Text, Verdict
+from ..page import Figures, Page, Table, Text, Verdict
 from . import template
 from .template import if_true, versions_of
 
 
-def grade_page(grade: Grade) -> Page:
+def grade_page(grade: Figures) -> Page:
     """What each function does, and how many do what they should."""
     remarks = {judgement.remarks for judgement in grade.functions}
     if len(remarks) == 1 and grade.right == 0 and len(grade.functions) > 1:
@@ -80,7 +78,7 @@ def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Pa
 _WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
 
 
-def mutants_page(examination: Examination) -> Page:
+def mutants_page(examination: Figures) -> Page:
     """The examination as a page."""
     trials = Table.of(
         examination.trials,
@@ -112,7 +110,7 @@ def mutants_page(examination: Examination) -> Page:
     )
 
 
-def _catchers(trial: MutantTrial) -> str:
+def _catchers(trial: Figures) -> str:
     """The first test that caught it, and how many others did."""
     if not trial.caught:
         return "nothing"
@@ -125,7 +123,7 @@ def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else text[: most - 1] + "…"
 
 
-def gradescope_results(grade: Grade | None, refusal: str = "", points: float = 1.0) -> str:
+def gradescope_results(grade: Figures | None, refusal: str = "", points: float = 1.0) -> str:
     """A judgement in the form that Gradescope reads, the text of its `results.json`.
 
     The form is described in Gradescope's documentation, "Autograder Specifications".

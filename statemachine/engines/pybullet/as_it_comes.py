@@ -19,8 +19,9 @@ from ...backends._bullet_plan import Plan
 from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
+from ...page import Figures
 from ..auditing import Save, SavePoint
-from ..records import LeftAlone, Term, WayBack
+from ..records import Term, WayBack
 from .audit import Client, PybulletDriver, put_back
 from .world import fresh_world, gravity_of, limp, saved_in_memory
 
@@ -108,7 +109,7 @@ def _figures(values: Array) -> str:
     return " ".join(f"{value + 0.0:.4g}" for value in np.round(values, 12))
 
 
-def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
+def left_alone(model: Model, seconds: float, joint: int) -> tuple[Figures, ...]:
     """A joint of a freshly loaded arm that nobody commands, and what its motor exerts.
 
     Args:
@@ -141,7 +142,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
             state = pb.getJointState(tree.body, index, world.client)
             places = [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
             runs.append(
-                LeftAlone(
+                Figures(
                     label=label,
                     time=steps * ENGINE_TIMESTEP,
                     position=float(state[0]),

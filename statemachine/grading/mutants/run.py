@@ -29,6 +29,7 @@ from ...errors import (
     unknown_name,
 )
 from ...installed import DEFAULT, engine_version, require
+from ...page import Figures
 from ...processes import checked_jobs, sandbox
 from ...processes.parallel import in_parallel, unwinding
 from ..recording import content
@@ -48,66 +49,48 @@ _CHAINED = re.compile(r"^(?:The above exception was|During handling of the above
 _OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
 
-@dataclass(frozen=True)
-class Failure:
-    """A test that did not pass, and what it said in one line."""
-
-    test: str
-    why: str
+def trial_of(mutant: Mutant, caught_by: tuple[Figures, ...]) -> Figures:
+    """A mutant, the tests that caught it with what each said, and whether any did."""
+    return Figures(mutant=mutant, caught_by=caught_by, caught=bool(caught_by))
 
 
-@dataclass(frozen=True)
-class MutantTrial:
-    """A mutant, and the tests that caught it."""
-
-    mutant: Mutant
-    caught_by: tuple[Failure, ...]
-
-    @property
-    def caught(self) -> bool:
-        """Whether any test did."""
-        return bool(self.caught_by)
-
-
-@dataclass(frozen=True)
-class Examination:
+def examination_of(
+    file: str,
+    backend: str,
+    engine_version: str,
+    tests: tuple[str, ...],
+    failures: tuple[Figures, ...],
+    trials: tuple[Figures, ...],
+) -> Figures:
     """What a test file is worth.
 
-    Attributes:
+    Args:
         file: Its name.
-        backend, engine_version: What it ran on.
+        backend: What it ran on.
+        engine_version: Of its engine.
         tests: Those that are not skipped.
-        failures: Those that failed on the healthy arm; then there are no trials.
+        failures: Those that failed on the healthy arm, each test and in a line why; then there are
+            no trials.
         trials: One for each mutant.
+
+    Returns:
+        The same; caught: how many mutants were caught; survivors: those that no test caught; idle:
+        tests that caught none; holds: whether the tests pass on the healthy arm and catch all.
     """
-
-    file: str
-    backend: str
-    engine_version: str
-    tests: tuple[str, ...]
-    failures: tuple[Failure, ...]
-    trials: tuple[MutantTrial, ...]
-
-    @property
-    def caught(self) -> int:
-        """How many mutants were caught."""
-        return sum(trial.caught for trial in self.trials)
-
-    @property
-    def survivors(self) -> tuple[Mutant, ...]:
-        """The mutants that no test caught."""
-        return tuple(trial.mutant for trial in self.trials if not trial.caught)
-
-    @property
-    def idle(self) -> tuple[str, ...]:
-        """Tests that caught no mutant."""
-        busy = {failure.test for trial in self.trials for failure in trial.caught_by}
-        return tuple(test for test in self.tests if test not in busy)
-
-    @property
-    def holds(self) -> bool:
-        """Whether the tests pass on the healthy arm and catch all mutants."""
-        return not self.failures and not self.survivors
+    survivors = tuple(trial.mutant for trial in trials if not trial.caught)
+    busy = {failure.test for trial in trials for failure in trial.caught_by}
+    return Figures(
+        file=file,
+        backend=backend,
+        engine_version=engine_version,
+        tests=tests,
+        failures=failures,
+        trials=trials,
+        caught=len(trials) - len(survivors),
+        survivors=survivors,
+        idle=tuple(test for test in tests if test not in busy),
+        holds=not failures and not survivors,
+    )
 
 
 def examine(
@@ -117,7 +100,7 @@ def examine(
     seconds: float = _SECONDS,
     clock: float = _CLOCK,
     progress: Callable[[float], None] = lambda _fraction: None,
-) -> Examination:
+) -> Figures:
     """Run a student's tests on the healthy arm and on every mutant.
 
     Args:
@@ -127,6 +110,9 @@ def examine(
         seconds: What the tests may compute on the healthy arm [s].
         clock: What they may take there on the clock, from when the arm is ready [s].
         progress: Told the fraction that is done.
+
+    Returns:
+        As `examination_of`.
 
     Raises:
         ModelFileError: There is no such file.
@@ -158,13 +144,13 @@ def examine(
                 stop.set,
                 lambda left: progress((total - left) / total),
             )
-    return Examination(
+    return examination_of(
         file=path.name,
         backend=backend,
         engine_version=version,
         tests=healthy.tests,
         failures=_failures_of(healthy),
-        trials=tuple(MutantTrial(m, _failures_of(records[m.name])) for m in mutants if records),
+        trials=tuple(trial_of(m, _failures_of(records[m.name])) for m in mutants if records),
     )
 
 
@@ -205,8 +191,8 @@ class _Record:
     failures: dict[str, str]
 
 
-def _failures_of(record: _Record) -> tuple[Failure, ...]:
-    return tuple(Failure(test, why) for test, why in record.failures.items())
+def _failures_of(record: _Record) -> tuple[Figures, ...]:
+    return tuple(Figures(test=test, why=why) for test, why in record.failures.items())
 
 
 def _run(

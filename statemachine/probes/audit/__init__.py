@@ -23,7 +23,7 @@ from ...runs.drive import Progress, silent
 from ...runs.header import provenance
 from . import trials
 from .interface_driver import InterfaceDriver, findings_elsewhere, points, run_elsewhere
-from .trials import EACH_OTHER, FORGETS, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT, AuditFinding
+from .trials import EACH_OTHER, FORGETS, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
 
 STEPS = 60  # of each future
 
@@ -41,7 +41,7 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
         steps: How many each future has.
         audited: The engine itself, where there is a driver for it; then the interface. Of each:
             the layer, "engine" or "interface"; its name; a legend of its ways to save; the save
-            points, as measured; the findings, an AuditFinding of every trial; the conclusion.
+            points, as measured; the findings, of every trial, see `finding_of`; the conclusion.
         without: Save points that this model does not have, and why.
         holds: Whether every promise is kept.
 
@@ -61,7 +61,7 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
     if not states:
         raise BadInputError(f"nothing can be saved in {model.path.name}: {'; '.join(diverged)}")
     kinds = tuple(map(type, drivers))
-    findings: dict[Driver, list[AuditFinding]] = {driver: [] for driver in drivers}
+    findings: dict[Driver, list[Figures]] = {driver: [] for driver in drivers}
     with ThreadPoolExecutor(1) as pool:
         child = pool.submit(run_elsewhere, model, seed, nstep, states, kinds)
         work = [(driver, run) for driver in drivers for run in runs[driver]]
@@ -99,7 +99,7 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
 
 
 # A question to a driver about one save point, given the run from there that nothing disturbed.
-_OF_A_RUN: tuple[Callable[[Driver, ReferenceRun], Iterator[AuditFinding]], ...] = (
+_OF_A_RUN: tuple[Callable[[Driver, ReferenceRun], Iterator[Figures]], ...] = (
     trials.again,
     trials.after_reset,
     trials.pieces,
@@ -143,7 +143,7 @@ def _runs(
 _NEARLY = 1e-6  # of a difference: what is left of it is rounding
 
 
-def conclude(findings: Sequence[AuditFinding]) -> Figures:
+def conclude(findings: Sequence[Figures]) -> Figures:
     """Draw the conclusion of one driver's findings.
 
     Returns:
@@ -163,7 +163,7 @@ def conclude(findings: Sequence[AuditFinding]) -> Figures:
             and where.
     """
 
-    def by_case(experiment: str, among: bool = False) -> dict[str, list[AuditFinding]]:
+    def by_case(experiment: str, among: bool = False) -> dict[str, list[Figures]]:
         return grouped(
             (finding.case, finding)
             for finding in findings
@@ -212,10 +212,10 @@ def conclude(findings: Sequence[AuditFinding]) -> Figures:
     )
 
 
-def _differing(findings: Iterable[AuditFinding]) -> tuple[str, ...]:
+def _differing(findings: Iterable[Figures]) -> tuple[str, ...]:
     """The save points at which a future differs."""
     return tuple(dict.fromkeys(finding.point for finding in findings if not finding.gap.exact))
 
 
-def _worst(findings: Sequence[AuditFinding]) -> FutureGap:
+def _worst(findings: Sequence[Figures]) -> FutureGap:
     return worst([finding.gap for finding in findings])

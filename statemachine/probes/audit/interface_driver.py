@@ -40,8 +40,9 @@ from ...interface import (
     step,
 )
 from ...measures.quantities import readings
+from ...page import Figures
 from ...processes import fresh_python, last_line
-from .trials import AuditFinding, against_run, finding_of
+from .trials import against_run, finding_of
 
 # The moments at which a run is saved: at rest, in motion, mid-contact, at a limit.
 #
@@ -281,7 +282,7 @@ def run_elsewhere(
 
 def findings_elsewhere(
     answer: Answer, driver: Driver, runs: Sequence[ReferenceRun], states: Mapping[str, State]
-) -> Iterator[AuditFinding]:
+) -> Iterator[Figures]:
     """The other process's runs, and the futures of States that were pickled to it, against ours."""
     traces, futures = answer
     for run in runs:

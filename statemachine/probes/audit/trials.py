@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
-from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from ...backends import load
 from ...engines.auditing import (
     FRESH,
     Driver,
-    Layer,
     Machine,
     ReferenceRun,
     Save,
@@ -28,6 +26,7 @@ from ...engines.auditing import (
 )
 from ...engines.measured import FutureGap, gap, worst
 from ...interface import Array, Model
+from ...page import Figures
 
 AGAIN, RESET, PIECES, LOOK = "again", "reset", "step(n)", "look"
 BESIDE, THREADS, POOLS = "two at once", "threads", "pools"
@@ -39,40 +38,6 @@ _THREADS = 4
 _RUNS = 2  # of each point
 
 
-@dataclass(frozen=True)
-class AuditFinding:
-    """One experiment and what came of it.
-
-    Attributes:
-        experiment: One of the words above, or of `findings_elsewhere`.
-        layer: Who was asked: the engine itself, or our interface to it.
-        point: The save point.
-        case: What was tried: a candidate for the state, a call, a way to run.
-        into: What the state was put into, or what else the future was compared with.
-        promised: Whether somebody promises that the futures are the same, so that a
-            difference is a fault and not a fact.
-        gap: How far the future is from the one that it was compared with.
-    """
-
-    experiment: str
-    layer: Layer
-    point: str
-    case: str
-    into: str
-    promised: bool
-    gap: FutureGap
-
-    @property
-    def verdict(self) -> str:
-        """Whether the bytes are the same."""
-        return "exact" if self.gap.exact else "differs"
-
-    @property
-    def holds(self) -> bool:
-        """Whether nothing that is promised is broken by this."""
-        return self.gap.exact or not self.promised
-
-
 def finding_of(
     driver: Driver,
     experiment: str,
@@ -81,9 +46,32 @@ def finding_of(
     into: str,
     gap: FutureGap,
     promised: bool = True,
-) -> AuditFinding:
-    """What came of an experiment on a driver; see `AuditFinding`."""
-    return AuditFinding(experiment, driver.layer, run.point.name, case, into, promised, gap)
+) -> Figures:
+    """What came of an experiment on a driver.
+
+    Returns:
+        experiment: One of the words above, or of `findings_elsewhere`.
+        layer: Who was asked: the engine itself, or our interface to it.
+        point: The save point.
+        case: What was tried: a candidate for the state, a call, a way to run.
+        into: What the state was put into, or what else the future was compared with.
+        promised: Whether somebody promises that the futures are the same, so that a
+            difference is a fault and not a fact.
+        gap: How far the future is from the one that it was compared with.
+        verdict: Whether the bytes are the same: "exact" or "differs".
+        holds: Whether nothing that is promised is broken by this.
+    """
+    return Figures(
+        experiment=experiment,
+        layer=driver.layer,
+        point=run.point.name,
+        case=case,
+        into=into,
+        promised=promised,
+        gap=gap,
+        verdict="exact" if gap.exact else "differs",
+        holds=gap.exact or not promised,
+    )
 
 
 def against_run(
@@ -94,7 +82,7 @@ def against_run(
     into: str,
     *futures: Array,
     promised: bool = True,
-) -> AuditFinding:
+) -> Figures:
     """What came of an experiment whose futures should be that of the run."""
     return finding_of(driver, experiment, run, case, into, driver.gap(run, *futures), promised)
 
@@ -102,13 +90,13 @@ def against_run(
 # The same start and the same commands: from a new machine, a reset one, in other pieces.
 
 
-def again(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
+def again(driver: Driver, run: ReferenceRun) -> Iterator[Figures]:
     """From another new machine."""
     future = driver.run(run.point, run.steps).future
     yield against_run(driver, AGAIN, run, "in a new one", "the first run", future)
 
 
-def after_reset(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
+def after_reset(driver: Driver, run: ReferenceRun) -> Iterator[Figures]:
     """From one that has another past, and was reset."""
     if not driver.resets:
         return
@@ -119,7 +107,7 @@ def after_reset(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     yield against_run(driver, RESET, run, "a used one, reset", "a new one", future)
 
 
-def pieces(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
+def pieces(driver: Driver, run: ReferenceRun) -> Iterator[Figures]:
     """Several steps by one call, against as many calls of one step."""
     if not driver.several or run.point.swings:  # its controller writes before each step
         return
@@ -138,7 +126,7 @@ def pieces(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
 # What is done between two steps, or beside them, and should leave no trace.
 
 
-def look(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
+def look(driver: Driver, run: ReferenceRun) -> Iterator[Figures]:
     """Each call before each step (forward, a read, a save), against the run without."""
     for act in driver.disturbances(run.point):
         with driver.at(run.point) as machine:
@@ -148,7 +136,7 @@ def look(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
         )
 
 
-def beside(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
+def beside(driver: Driver, run: ReferenceRun) -> Iterator[Figures]:
     """Stepped turn by turn with another one of the same Model, which has another past."""
     with driver.at(run.point) as machine, driver.used(run.point) as other:
         trace = [driver.read(machine)]
@@ -158,7 +146,7 @@ def beside(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     yield against_run(driver, BESIDE, run, "turn by turn with another", "alone", np.array(trace))
 
 
-def threads(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFinding]:
+def threads(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[Figures]:
     """All points at once, twice each, on a pool of threads; one machine a run."""
     case = f"a pool of {_THREADS} threads"
     with ThreadPoolExecutor(_THREADS) as pool:
@@ -170,7 +158,7 @@ def threads(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFindi
             yield against_run(driver, THREADS, run, case, "alone", *futures)
 
 
-def pools(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
+def pools(driver: Driver, run: ReferenceRun) -> Iterator[Figures]:
     """The engine's own ways to run several at once, where it has any."""
     if run.point.swings:  # they take no controller
         return
@@ -182,15 +170,15 @@ def pools(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
 # Save, go on, restore, go on: is it the same future? Which state vector suffices?
 
 
-def restored(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
+def restored(driver: Driver, run: ReferenceRun) -> Iterator[Figures]:
     """Each way to save, restored into the run itself, a fresh machine and a used one."""
     for way in driver.save_methods(run.point):
         yield from tried(driver, run, way)
 
 
 def smallest(
-    driver: Driver, runs: Sequence[ReferenceRun], findings: Sequence[AuditFinding]
-) -> Iterator[AuditFinding]:
+    driver: Driver, runs: Sequence[ReferenceRun], findings: Sequence[Figures]
+) -> Iterator[Figures]:
     """Only the components without which something differed, tried at each point."""
     needed = [f.case for f in findings if f.experiment == WITHOUT and not f.gap.exact]
     way = driver.only(tuple(dict.fromkeys(needed)))
@@ -199,7 +187,7 @@ def smallest(
             yield from tried(driver, run, way)
 
 
-def tried(driver: Driver, run: ReferenceRun, way: SaveMethod) -> Iterator[AuditFinding]:
+def tried(driver: Driver, run: ReferenceRun, way: SaveMethod) -> Iterator[Figures]:
     """One way to save, against the future of the run that was saved, and against itself."""
     experiment, case = (WITHOUT, way.left_out) if way.left_out else (RESTORE, way.name)
     futures = driver.futures(run.point, run.steps, way)
@@ -209,7 +197,7 @@ def tried(driver: Driver, run: ReferenceRun, way: SaveMethod) -> Iterator[AuditF
     yield finding_of(driver, experiment, run, case, EACH_OTHER, among, way.agree)
 
 
-def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFinding]:
+def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[Figures]:
     """What is changed after a save, and is still changed after the restore.
 
     Against the same without the change, so that nothing else can make the difference; and, to
@@ -236,7 +224,7 @@ def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFindi
             yield finding_of(driver, FORGETS, run, what, name, off, promised=False)
 
 
-def contacts_off(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
+def contacts_off(driver: Driver, run: ReferenceRun) -> Iterator[Figures]:
     """How far off the best that can be written is where nothing touches any more."""
     hidden = driver.hidden_state(run.point)
     if hidden is None:
@@ -263,7 +251,7 @@ _BOX = '<body pos="0 0 {}"><freejoint/><geom type="box" size=".05 .05 .05" mass=
 _ASIDE, _TILTED = 0.03, 0.4  # at most, at the start [m], [rad]
 
 
-def falls(driver: Driver) -> Iterator[AuditFinding]:
+def falls(driver: Driver) -> Iterator[Figures]:
     """Each look of an engine before each step of a few falls, against the run without.
 
     Args:
