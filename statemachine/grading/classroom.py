@@ -14,8 +14,9 @@ from ..errors import BadInputError, StateMachineError
 from ..processes import checked_jobs
 from ..processes.parallel import in_parallel
 from ..runs.whole import replace_csv
+from . import score
 from .calls import reason
-from .class_table import NOTHING, ClassEntry, read, rows_of, score
+from .class_table import NOTHING, ClassEntry, read, rows_of
 from .exercise import TIME_LIMIT, ExerciseJudge
 from .mutants.run import examine
 from .recording import code_of, digest, has_functions, in_folder, likeness, shape_of

@@ -16,6 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from .. import __version__
+from ..grading import KIND, answers_in
 from ..page import LETTERS, Question
 from ..runs.whole import replace_text
 
@@ -132,8 +133,6 @@ class RecordedReader(Reader):
         Raises:
             BadInputError: The file is there and is no record of predictions.
         """
-        from ..grading.class_table import answers_in  # its room loads all judges
-
         super().__init__(lesson)
         self._file = file
         self._answers = answers_in(file) if file.exists() else {}
@@ -166,8 +165,6 @@ class RecordedReader(Reader):
         return f"{self._file.name}: {right} of {len(self._answers)} predictions right"
 
     def _write(self) -> None:
-        from ..grading.class_table import KIND
-
         answers = list(self._answers.values())
         record = {
             "kind": KIND,
