@@ -16,6 +16,7 @@ from ..errors import (
     ReadOnlyError,
     UnsupportedError,
     check_name,
+    refuse,
     shown,
     unknown_name,
 )
@@ -280,10 +281,14 @@ def _gain(of: Any, name: str, value: Any) -> Array:
             f"position servo: it wants NaN there, as actuator_{name} has"
         )
     as_vector(given[servo], (int(servo.sum()),), name)  # finite
-    wrong = given[servo] <= 0 if name == "kp" else given[servo] < 0
-    if wrong.any():
-        wanted = {"kp": "be above 0; actuation=False turns servos off", "kv": "not be negative"}
-        raise BadInputError(f"{name} must {wanted[name]}; got {shown(value)}")
+    least, got = given[servo].min(), f"got {shown(value)}"
+    refuse(
+        (
+            name == "kp" and least <= 0,
+            f"kp must be above 0; actuation=False turns servos off; {got}",
+        ),
+        (least < 0, f"{name} must not be negative; {got}"),
+    )
     return given
 
 
@@ -291,15 +296,12 @@ def _numbers(of: Any, name: str, value: Any) -> Array:
     """The value of an option of `_LENGTHS`, one number or one for each, as a new array."""
     length, numbers = getattr(of, _LENGTHS[name]), as_numbers(value, name)
     given = as_vector(numbers, (length,) if numbers.ndim else (), name)
-    wanted = ""
-    if name == "max_qvel":
-        wanted = "must be above 0" if (given <= 0).any() else ""
-    elif (given < 0).any():
-        wanted = "must not be negative"
-    elif name == "latency" and (given > LONGEST).any():
-        wanted = f"is at most {LONGEST:g} s"
-    if wanted:
-        raise BadInputError(f"{name} {wanted}; got {shown(value)}")
+    got = f"; got {shown(value)}"
+    refuse(
+        (name == "max_qvel" and (given <= 0).any(), f"{name} must be above 0{got}"),
+        ((given < 0).any(), f"{name} must not be negative{got}"),
+        (name == "latency" and (given > LONGEST).any(), f"{name} is at most {LONGEST:g} s{got}"),
+    )
     values = np.array(np.broadcast_to(given, (length,)))
     if name in PER_DOF and not given.ndim:
         # One number is meant for the joints of the robot, not for a free body.

@@ -259,14 +259,13 @@ def _most(raw: Any, i: int, drive: Actuator) -> float:
 def _actuator(raw: Any, i: int) -> Actuator:
     gain, bias = raw.actuator_gainprm[i], raw.actuator_biasprm[i]
     form = int(raw.actuator_biastype[i])  # mjtBias: none, affine, …
-    kind = "general"
-    if not raw.actuator_dyntype[i] and not raw.actuator_gaintype[i]:
-        if form == 0:
-            kind = "motor"
-        elif form == 1 and not bias[0] and bias[1] == -gain[0]:
-            kind = "position"
-        elif form == 1 and not bias[:2].any() and bias[2] == -gain[0]:
-            kind = "velocity"
+    kinds = {
+        "general": raw.actuator_dyntype[i] or raw.actuator_gaintype[i],
+        "motor": form == 0,
+        "position": form == 1 and not bias[0] and bias[1] == -gain[0],
+        "velocity": form == 1 and not bias[:2].any() and bias[2] == -gain[0],
+    }
+    kind = next((kind for kind, holds in kinds.items() if holds), "general")
     on_joint, position = raw.actuator_trntype[i] in (0, 1), kind == "position"
     control = raw.actuator_ctrladr[i]  # the first of several
     return Actuator(
