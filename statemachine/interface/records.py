@@ -107,15 +107,16 @@ class Capabilities:
         }
         shared = "share the compiled model" if self.shared_model else "share its description only"
         held = self.data_per_process
-        lines = [
-            f"options of replace: {', '.join(self.options)}",
-            *(f"not {', '.join(names)}: {reason}" for reason, names in refused.items()),
-            f"integrators: {', '.join(self.integrators) or 'as in the file'}",
-            f"several Data of a Model {shared}",
-            *([] if held is None else [f"Data that one process can hold: {held}"]),
-            *(f"{name}: {kept.support}; {kept.note}" for name, kept in self.behaviours.items()),
-        ]
-        return "\n".join(lines)
+        return "\n".join(
+            [
+                f"options of replace: {', '.join(self.options)}",
+                *(f"not {', '.join(names)}: {reason}" for reason, names in refused.items()),
+                f"integrators: {', '.join(self.integrators) or 'as in the file'}",
+                f"several Data of a Model {shared}",
+                *([] if held is None else [f"Data that one process can hold: {held}"]),
+                *(f"{name}: {kept.support}; {kept.note}" for name, kept in self.behaviours.items()),
+            ]
+        )
 
 
 @dataclass(frozen=True, eq=False)
