@@ -168,9 +168,10 @@ def test_a_page_that_is_the_same_is_left_alone(
     monkeypatch.setattr(
         "statemachine.report.site.LESSONS", {name: LESSONS[name] for name in ("state", "write")}
     )
-    first = make_path(tmp_path, ["mujoco"], say=lambda _: None)
+    first = make_path(tmp_path, say=lambda _: None)
+    assert all("pybullet" in path.read_text("utf-8") for path in first)  # every engine here
     times = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    assert make_path(tmp_path, ["mujoco"], say=lambda _: None) == first
+    assert make_path(tmp_path, say=lambda _: None) == first
     assert {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == times
 
 

@@ -299,7 +299,15 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     def row(name: str, share: float) -> Figures:
         values, parts = ((name, "kp 998.2", "its motors"),), dict.fromkeys(("alone", "last"), share)
         return Figures(
-            name=name, values=values, unit="", share=share, error=0.0, note="", place=None, **parts
+            name=name,
+            values=values,
+            unit="",
+            share=share,
+            error=0.0,
+            note="",
+            place=None,
+            chosen=None,
+            **parts,
         )
 
     fields: dict[str, Any] = {
@@ -346,6 +354,12 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
             hold, shares=[with_figures(row, share=share) for row, share in rows]
         )
         assert answer(masked).startswith("No single difference causes the 2.58°"), shares
+    worse = explanation_of(hold, explained=-0.26, located=1.26)  # all brought over widens the gap
+    assert answer(worse).startswith("No single difference causes the 2.58°")
+    assert not worse.is_explained
+    switch = {"name": "contact", "values": (("contact", True, False),), "share": 0.1}
+    one_side = explanation_of(hold, shares=(with_figures(worse.shares[0], **switch),))
+    assert answer(one_side) == "50.0 % of the 2.58° comes from contact (left: on, right: off)"
     # Two values that read the same are shown with all their digits.
     close = ("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
     rounded = with_figures(explanation_of(hold).shares[0], values=(close,), unit="rad")

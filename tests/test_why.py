@@ -58,6 +58,18 @@ def shares(result: Explanation) -> dict[str, float]:
     return {row.name: row.share for row in result.shares if row.share}
 
 
+def test_an_integrator_is_chosen_on_the_side_that_has_several(tmp_path: Path) -> None:
+    pendulum = """<mujoco><option integrator="RK4" timestep="0.02"/><worldbody><body><joint axis="1 0 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0.3 0" size="0.02"/></body></worldbody></mujoco>"""
+    file = written(tmp_path / "pendulum.xml", pendulum)
+    with pytest.warns(EngineWarning, match="RK4 acts as Euler"):
+        result = explain(sm.load(file), sm.load(file, backend="pybullet"), FALL, seconds=1.0)
+    (row,) = result.shares
+    assert (row.values[0][1:], row.chosen) == (("rk4", "its own"), ("left", "euler"))
+    assert result.is_explained
+    assert "The left can choose another integrator: integrator=euler." in shown(report.page(result))
+
+
 def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
     """Of another engine with a heavier arm: what stills the arm closes the gap, and is no cause."""
     with registered("hidden", "tests.hidden_world:load"):

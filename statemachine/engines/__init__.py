@@ -259,6 +259,11 @@ class RawEngine:
 
     @_needed
     @abstractmethod
+    def integrator(self, raw: Any) -> str:
+        """The name of the integrator of a compiled model: "euler", "rk4", …"""
+
+    @_needed
+    @abstractmethod
     def edited(self, raw: Any, edits: Iterable[Edit]) -> Any:
         """A copy of a compiled model with these edits, and all that follows from them."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compare.labels import lacking
-from ..measures.text import NONE, capital, percent, quantity, sentence, short_time, significant
+from ..measures.text import NONE, capital, few, percent, quantity, sentence, short_time, significant
 from ..page import Block, Figures, Items, Page, Section, Table, TableCell, Text
 from . import template
 from .template import if_true
@@ -43,6 +43,7 @@ ANSWERS = {
     "bare": "{cause}: {part} of the {gap}",
     "masked": "No single difference causes the {gap}: the differences hide one another",
     "located": "{part} of the {gap} comes from {cause}: no setting that differs makes it",
+    "switched": "{part} of the {gap} comes from {cause} (left: {left}, right: {right})",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
 }
 TOUCH = (
@@ -66,6 +67,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     stays = not (result.is_rounding or result.is_explained)
     refused = [row.name for row in result.shares if row.note]
     engines = {side.backend for side in result.provenance}
+    files = {side.model_sha256 for side in result.provenance}
     return template.page(
         "why",
         title=title,
@@ -82,6 +84,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         refused=", ".join(refused[:4]) if stays and refused else None,
         engines=if_true(stays and not refused and len(engines) > 1),
         files=if_true(stays and not refused and len(engines) == 1),
+        both=if_true(min(len(engines), len(files)) > 1),
         parts=three_parts(result)[1:],
         holds=not refused if result.is_rounding else result.is_explained,
         answer=answer(result),
@@ -113,8 +116,13 @@ def answer(result: Explanation) -> str:
     }
     kind = max(parts, key=parts.__getitem__)
     part, cause, left, right = percent(parts[kind]), "", NONE, NONE
-    if kind == "located":
+    if result.is_masked:
+        kind = "masked"
+    elif kind == "located":
         cause = f"the {places[0].name}" if places[0].values else places[0].name
+        # What only one side has is a setting, and closes the gap only where both are without it.
+        switches = [_values(row) for row in result.shares if row.name == places[0].name]
+        kind, (left, right) = ("switched", switches[0]) if switches else (kind, (left, right))
     elif kind == "cause":
         cause, (left, right) = capital(causes[0].name), _values(causes[0])
         # A share below zero hides others; one far above the whole gap does only what they hide.
@@ -191,16 +199,26 @@ def causes(result: Explanation) -> list[Block]:
 
 
 def steps(result: Explanation) -> list[Block]:
-    """What to change on the right, and where, so that the sides agree."""
-    lines = []
-    for row in result.shares:
-        if (row.share or 0.0) >= _NO_PART and not row.note:
+    """What to change, where, and what is left of the gap with everything changed."""
+    lines, least = [], max(_NO_PART, result.floor / result.gap if result.gap else 0.0)
+    changed = [row for row in result.shares if not (row.note or row.chosen)]
+    for row in changed:
+        if (row.share or 0.0) >= least and row.share > -(row.last or 0.0):
             left, right = _values(row)
             place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
             change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
             lines.append(f"{place}{row.name}: {change.format(left=left, right=right)}")
-    hidden = result.is_rounding or not lines
-    return [] if hidden else [Text("What to change on the right:"), Items(lines)]
+    if result.is_rounding:
+        return []
+    side, integrator = next((row.chosen for row in result.shares if row.chosen), (None, None))
+    return template.blocks(
+        "why_changes",
+        any=if_true(lines),
+        changes=Items(lines),
+        side=side,
+        integrator=integrator,
+        left=_amount(result, result.brought) if changed and result.brought is not None else None,
+    )
 
 
 def parts(result: Explanation) -> str:

@@ -77,11 +77,17 @@ class Explanation(Figures):
     def is_explained(self) -> bool:
         """Whether no more than a twentieth of the gap stays unexplained.
 
+        Nothing is explained where the gap grows when the differences are brought to the same.
         Where something differs that cannot be brought to the same, what is only located may come
         from that, and counts as unexplained.
         """
         stays = 1.0 - self.explained if any(row.note for row in self.shares) else self.unexplained
-        return self.is_rounding or abs(stays) <= UNEXPLAINED
+        return self.is_rounding or (abs(stays) <= UNEXPLAINED and not self.is_masked)
+
+    @property
+    def is_masked(self) -> bool:
+        """Whether the gap grows when all differences are brought to the same: they hide it."""
+        return self.explained < -UNEXPLAINED
 
 
 def explain(
@@ -301,6 +307,7 @@ def _shares(
         alone: The part that it takes away as the only one; last: after all others.
         note: Why there is no share, or what else is to be said.
         place: Where the right's file says it; None where that was not found.
+        chosen: Of an integrator the side that can choose, and the one to choose; else None.
     """
     places = {} if nothing else places_of(right.path, listed)
     rows = [
@@ -315,6 +322,7 @@ def _shares(
             last=divided.last.get(cause.name),
             note=cause.refused or _NOT_RUN * (divided.share.get(cause.name, 0.0) is None),
             place=places.get(cause.name),
+            chosen=None,
         )
         for cause in listed
     ]
@@ -330,6 +338,7 @@ def _shares(
             last=part.share,
             note="",
             place=None,
+            chosen=(part.side, part.without),
         )
         for part in rest
         if part.is_setting

@@ -284,14 +284,14 @@ def locate(
         A part of the gap each, and where it comes from:
         name: What was left out, or chosen.
         without: What a run without it is, in words; of an integrator, the one that was chosen.
-        values: The integrators of the two sides as they come, or, of a setting, those that ran;
-            None of what was left out.
+        values: The integrators of the two sides as they come; None of what was left out.
         share: The part of the gap that went.
         gap: What was left of it, in the unit of the gap.
         moved: How far the left's own motion is then from its motion as it comes; above zero
             the gap is that of another motion.
         is_still: Whether nothing moves any more, so that there can be no gap.
         is_setting: Whether it is a setting of one side, chosen while nothing was left out.
+        side: That side, "left" or "right"; "" of the others.
     """
     rows: list[Figures] = []
     without, integrator = frozenset[str](), ""
@@ -313,13 +313,7 @@ def locate(
             continue
         without, integrator = more, best
         setting = len(trials.selects) == 1 and not feature and not without
-        values = None
-        if not feature:
-            on_left, on_right = (
-                best if setting and side in trials.selects else trials.integrator_of(side)
-                for side in (0, 1)
-            )
-            values = on_left, on_right
+        values = None if feature else (trials.integrator_of(0), trials.integrator_of(1))
         rows.append(
             Figures(
                 name=feature.name if feature else "integrator",
@@ -330,6 +324,7 @@ def locate(
                 moved=trials.moved(quantity, without, integrator),
                 is_still=trials.extent(quantity, without) < _STILL * trials.extent(quantity),
                 is_setting=setting,
+                side=("left", "right")[trials.selects[0]] if setting else "",
             )
         )
         left = rest

@@ -235,15 +235,10 @@ class Trials:
         return sorted(set[str].intersection(*choices)) if choices else []
 
     def integrator_of(self, side: int) -> str:
-        """What a side integrates with as it comes; "of the file" if that cannot be chosen."""
-        model: Any = self._models[side]
-        own = None if model.compiled is None else model.compiled.opt.integrator
-        names = {
-            model.replace(integrator=name).compiled.opt.integrator: name
-            for name in model.capabilities.integrators
-            if own is not None
-        }
-        return names.get(own, "of the file" if names else "its own")
+        """What a side integrates with as it comes."""
+        model = self._models[side]
+        chosen = side in self.selects and model.compiled is not None
+        return room(DEFAULT).integrator(model.compiled) if chosen else "its own"
 
     def can_be_without(self, feature: Feature) -> bool:
         """Whether a feature can be left out on both sides, and is not what the experiment sets."""

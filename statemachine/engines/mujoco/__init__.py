@@ -37,6 +37,7 @@ class MujocoEngine(RawEngine):
     differences = function_of(".mujoco.differences:differences")
     sensors = function_of(".mujoco.differences:sensors")
     entries = function_of(".mujoco.differences:entries")
+    integrator = function_of(".mujoco.differences:integrator")
     edited = function_of(".mujoco.differences:edited")
     counts = function_of(".mujoco:counts")
     with_parts = function_of(".mujoco:with_parts")

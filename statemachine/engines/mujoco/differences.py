@@ -25,7 +25,7 @@ from ._geoms import Geoms
 from ._parts import places, weights
 from ._sides import Sides, plain, same
 
-__all__ = ["differences", "edited", "entries", "sensors", "settings_of"]
+__all__ = ["differences", "edited", "entries", "integrator", "sensors", "settings_of"]
 
 # After these the boxes around the geoms of a body are no longer where they were.
 _MOVES = {
@@ -150,6 +150,11 @@ def settings_of(raw: Any) -> dict[str, Any]:
         raised = bool(getattr(raw.opt, field) & bit)
         settings[f"flag {word}"] = "on" if raised == (field == "enableflags") else "off"
     return settings
+
+
+def integrator(raw: Any) -> str:
+    """The name of the integrator of a compiled model."""
+    return settings_of(raw)["integrator"]
 
 
 def _flag_bits() -> Iterator[tuple[str, str, int]]:
