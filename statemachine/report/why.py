@@ -167,6 +167,7 @@ def causes(result: Explanation) -> list[Block]:
         chaos=floor if result.is_rounding and not small else None,
         same=if_true(not result.shares and not result.found_in),
         table=_table(result, able),
+        more=few([row.name for row in _hardly(result, able)], 6) or None,
         located=[
             block
             for place in result.found_in  # left out on both sides, or an integrator
@@ -234,13 +235,7 @@ def three_parts(result: Explanation) -> list[Block]:
 
 def _table(result: Explanation, able: Sequence[Figures]) -> list[Block]:
     """The differences, the largest share first; those without an effect folded away."""
-    small = [
-        row
-        for row in able
-        if not result.is_rounding
-        and max(abs(part or 0.0) for part in (row.share, row.alone, row.last)) < _NO_PART
-    ]
-    small = small if len(small) > 1 else []
+    small = _hardly(result, able)
     rows = [_row(result, row) for row in able if row not in small]
     for place in result.found_in:  # what a feature takes away when it is left out on both sides
         explains = TableCell(f"{percent(place.share)}*", share=place.share)
@@ -264,6 +259,17 @@ def _table(result: Explanation, able: Sequence[Figures]) -> list[Block]:
     more = Table(_HEADS, rows[most:], heading, words=words)
     folded = [Section("", heading, [more], folded=True)] if more.rows else []
     return [Table(_HEADS, rows[:most], title, words=words), *folded] if rows else []
+
+
+def _hardly(result: Explanation, able: Sequence[Figures]) -> list[Figures]:
+    """The differences without an effect, if there are several."""
+    small = [
+        row
+        for row in able
+        if not result.is_rounding
+        and max(abs(part or 0.0) for part in (row.share, row.alone, row.last)) < _NO_PART
+    ]
+    return small if len(small) > 1 else []
 
 
 def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
