@@ -159,12 +159,12 @@ def add_table(parser: Any, *rows: Row) -> None:
         *rows: The options.
     """
     for flags, metavar, says, *more in rows:
-        told: dict[str, Any] = {"help": says, "metavar": metavar, "type": _TYPES.get(metavar)}
+        settings: dict[str, Any] = {"help": says, "metavar": metavar, "type": _TYPES.get(metavar)}
         if metavar == "":
-            told = {"help": says, "action": "store_true"}
-        for each in more:
-            told |= each
-        parser.add_argument(*flags.split(), **told)
+            settings = {"help": says, "action": "store_true"}
+        for further in more:
+            settings |= further
+        parser.add_argument(*flags.split(), **settings)
 
 
 # What several commands have.
@@ -250,13 +250,13 @@ def say_missing(errors: Sequence[StateMachineError], others: Collection[Any]) ->
 
 def pairs_of(given: list[str], option: str) -> dict[str, str]:
     """Names of the left and what the right calls them, from words A=B."""
-    found: dict[str, str] = {}
+    names: dict[str, str] = {}
     for text in given:
-        one, sign, two = text.partition("=")
-        if not (one and sign and two):
+        left, sign, right = text.partition("=")
+        if not (left and sign and right):
             raise BadInputError(f"{option} wants A=B, a name of A's and one of B's; got {text!r}")
-        found[one] = two
-    return found
+        names[left] = right
+    return names
 
 
 def show(page: Any, result: Any, as_json: bool, footer: str = "", reader: Any = None) -> int:

@@ -144,7 +144,7 @@ def write_pictures(
             from ..compare.alike import with_bodies_of
 
             traces = [with_bodies_of(*side) for side in zip(traces, models, strict=True)]
-        with progress("film") as told:
+        with progress("film") as bar:
             film = films.write_film(
                 options.film,
                 traces,
@@ -154,7 +154,7 @@ def write_pictures(
                 size=options.size,
                 fps=options.fps,
                 slow=options.slow,
-                progress=told,
+                progress=bar,
             )
         complain(
             f"{film.path}: a film of {film.seconds:.3g} s, {film.pictures} pictures, "

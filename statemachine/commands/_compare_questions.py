@@ -72,8 +72,8 @@ def _one_step(options: argparse.Namespace, request: Any) -> int:
     from ..report.terminal import progress
 
     (left, right), _, _ = prepare_sides(request)
-    with progress("one step") as told:
-        result = one_step(left, right.model, names=request.names, progress=told)
+    with progress("one step") as bar:
+        result = one_step(left, right.model, names=request.names, progress=bar)
     labels = numbered(tuple(side.label for side in request.sides) or request.backends)
     return show(steps.one_step(result, labels, Path(request.what[0]).name), result, options.json)
 
@@ -95,8 +95,8 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
         both = with_more(request.options, 1, times)
         return run_sides(replace(request, options=both, sides=sides)).traces
 
-    with progress("converge") as told:
-        result = convergence(run, progress=told)
+    with progress("converge") as bar:
+        result = convergence(run, progress=bar)
     return show(steps.convergence(result, Path(request.what[0]).name), result, options.json)
 
 
@@ -159,8 +159,8 @@ def run_why(options: argparse.Namespace, request: Any) -> int:
     from ..report import why
     from ..report.terminal import progress
 
-    with progress("why") as told:
-        result = explain(options, request, told)
+    with progress("why") as bar:
+        result = explain(options, request, bar)
     said = (*request.taken, *([why.PLAYED] if request.is_traces else []))
     return show(why.page(result, said), result, options.json)
 
@@ -289,8 +289,8 @@ def for_page(
     from ..report.terminal import progress
 
     try:
-        with progress("why") as told:
-            return {**more, "explanation": explain(options, request, told)}
+        with progress("why") as bar:
+            return {**more, "explanation": explain(options, request, bar)}
     except StateMachineError as error:
         return {**more, "why_not": f"What causes it could not be found: {error}."}
 

@@ -50,8 +50,8 @@ def run(options: argparse.Namespace) -> int:
         options,
         "audit",
         options.model,
-        lambda model, _backend, told: audit.run(
-            model, steps=options.steps, seed=options.seed, progress=told
+        lambda model, _backend, bar: audit.run(
+            model, steps=options.steps, seed=options.seed, progress=bar
         ),
     )
     return show(report.page(results), results, options.json)

@@ -302,8 +302,8 @@ def _run_compare(
         refuse_given(
             options, ["backends"], "{} is of a run, and two traces are runs that were made"
         )
-    with progress("compare") as told:
-        run = run_sides(request, told)
+    with progress("compare") as bar:
+        run = run_sides(request, bar)
     comparison = compare(*run.traces, tolerances=tolerances)
     played = compare(run.left, run.played, tolerances=tolerances) if run.is_apart else None
     parts = {
@@ -360,5 +360,5 @@ def _floor(options: argparse.Namespace, comparison: Any, rerun: Any, uncertain: 
     from ..compare import chaos_floor
     from ..report.terminal import progress
 
-    with progress("chaos floor") as told:
-        return chaos_floor(comparison, rerun, seed=options.seed, uncertain=uncertain, progress=told)
+    with progress("chaos floor") as bar:
+        return chaos_floor(comparison, rerun, seed=options.seed, uncertain=uncertain, progress=bar)

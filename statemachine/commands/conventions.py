@@ -42,11 +42,11 @@ def run(options: argparse.Namespace) -> int:
     conventions.check_questions(options.question)
     engines = _engines(options.backend)
     if options.calls:
-        with progress("calls") as told:
-            table = conventions.run_phrases(engines, told)
+        with progress("calls") as bar:
+            table = conventions.run_phrases(engines, bar)
         return show(report.calls_page(table), table, options.json)
-    with progress("conventions") as told:
-        result = conventions.probe(engines, options.question or conventions.QUESTIONS, told)
+    with progress("conventions") as bar:
+        result = conventions.probe(engines, options.question or conventions.QUESTIONS, bar)
     footer = f"Which call does what on each engine: {PROGRAM} conventions --calls"
     return show(report.page(result), result, options.json, footer)
 
@@ -59,13 +59,13 @@ def _engines(asked: str) -> list[str]:
     if asked != "all":
         check_engine(asked)
         return [asked]
-    found, missing = available()
+    engines, missing = available()
     for name in [name for name in room_names() if name not in ENGINES]:
         try:
             check_engine(name)
         except MissingEngineError as error:
             missing.append(error)
         else:
-            found.append(name)
-    say_missing(missing, found)
-    return found
+            engines.append(name)
+    say_missing(missing, engines)
+    return engines

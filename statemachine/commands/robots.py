@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
         check_suffix(options.out)
         check_place(options.out)
     models = find(options.paths)
-    with resumable(options.out, "examined"), progress(f"{len(models)} models") as told:
+    with resumable(options.out, "examined"), progress(f"{len(models)} models") as bar:
         survey = examine_all(
             models,
             quick=options.quick,
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
             jobs=options.jobs,
             seed=options.seed,
             table=options.out,
-            progress=told,
+            progress=bar,
         )
     show(words.page(survey), survey, options.json)
     return SAYS_NO if survey.wrong else 0

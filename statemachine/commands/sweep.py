@@ -140,8 +140,8 @@ def run(options: argparse.Namespace) -> int:
     """Run what is missing, and say what there is, or what it says of two engines."""
     _check(options)
     if options.report not in (None, True):
-        found, page = _report(options, options.report)
-        return show(page, found, options.json)
+        answer, page = _report(options, options.report)
+        return show(page, answer, options.json)
     from ..report import sweep_report as words
     from ..report.terminal import progress
     from ..sweep import prepared, run_sweep
@@ -151,7 +151,7 @@ def run(options: argparse.Namespace) -> int:
         complain(line, 0)
     out = Path(options.out)
     but = ", without --retry-failed," * options.retry_failed
-    with resumable(out, "done", but), progress(f"{len(ready)} cells") as told:
+    with resumable(out, "done", but), progress(f"{len(ready)} cells") as bar:
         summary = run_sweep(
             ready,
             out,
@@ -159,14 +159,14 @@ def run(options: argparse.Namespace) -> int:
             scheduler=options.scheduler,
             extend=options.extend,
             retry_failed=options.retry_failed,
-            progress=told,
+            progress=bar,
         )
     if not (options.report and options.json):
         show(words.summary_page(ready, summary), summary, options.json)
     code = 0
     if options.report:
-        found, answer = _report(options, out)
-        code = show(answer, {"summary": summary, "report": found}, options.json)
+        answer, page = _report(options, out)
+        code = show(page, {"summary": summary, "report": answer}, options.json)
     return SAYS_NO if summary.failed else code
 
 
@@ -231,8 +231,8 @@ def _report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
     from ..report.terminal import progress
     from ..sweep.analysis import FLOOR_CELLS, sweep_report
 
-    with progress("report") as told:
-        found = sweep_report(
+    with progress("report") as bar:
+        answer = sweep_report(
             folder,
             backends=[name for name in options.backend or () if name != "all"],
             quantity=options.quantity,
@@ -243,9 +243,9 @@ def _report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
             run=not options.no_runs,
             menagerie=options.menagerie,
             jobs=options.jobs,
-            progress=told,
+            progress=bar,
         )
-    page = words.page(found)
+    page = words.page(answer)
     if options.html is not None:
         from ..report.html import report as as_html
         from ..report.html import write_report
@@ -257,9 +257,9 @@ def _report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
         from ..report.figures import write_pictures
         from ..report.sweep_pictures import pictures
 
-        if drawn := pictures(found):
+        if drawn := pictures(answer):
             size = write_pictures(drawn, options.plot)
             print(f"wrote {options.plot} ({size / 1e3:.0f} kB)", file=sys.stderr)
         else:
             complain("nothing is varied: there is no picture", 0)
-    return found, page
+    return answer, page

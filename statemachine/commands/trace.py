@@ -126,7 +126,7 @@ def run_record(options: argparse.Namespace) -> int:
         defaults=options.defaults,
         menagerie=options.menagerie,
     )
-    with progress(f"record {name} on {options.backend}") as told:
+    with progress(f"record {name} on {options.backend}") as bar:
         trace = record_scenario(
             asked,
             model,
@@ -135,7 +135,7 @@ def run_record(options: argparse.Namespace) -> int:
             command=_typed(options, "record", *_named(options)),
             defaults=options.defaults,
             options={} if options.timestep is None else {"timestep": options.timestep},
-            progress=told,
+            progress=bar,
         )
     return _written(trace, target)
 
@@ -167,14 +167,14 @@ def run_play(options: argparse.Namespace) -> int:
         )
     if trace.header.options:
         model = model.replace(**trace.header.options)
-    with progress(f"play on {options.backend}") as told:
+    with progress(f"play on {options.backend}") as bar:
         played = play(
             trace,
             model,
             command=_typed(options, "play", Path(options.file).name),
             defaults=options.defaults,
             options=trace.header.options,
-            progress=told,
+            progress=bar,
         )
     return _written(played, target)
 
