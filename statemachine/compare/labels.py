@@ -68,11 +68,10 @@ def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterato
 
 def files_apart(one: Sequence[str], two: Sequence[str]) -> Two:
     """The shortest ends of two paths, given by their parts, that are not the same."""
-    for count in range(1, max(len(one), len(two)) + 1):
-        ends = "/".join(one[-count:]), "/".join(two[-count:])
-        if ends[0] != ends[1]:
-            return ends
-    return "/".join(one[-1:]), "/".join(two[-1:])
+    counts = range(1, max(len(one), len(two)) + 1)
+    differing = (count for count in counts if one[-count:] != two[-count:])
+    count = next(differing, 1)
+    return "/".join(one[-count:]), "/".join(two[-count:])
 
 
 def options_apart(one: Mapping[str, Any], two: Mapping[str, Any]) -> Two:

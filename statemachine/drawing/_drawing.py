@@ -20,7 +20,9 @@ from ..interface import Model
 
 AROUND = 32  # corners of a circle
 _CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-_BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+_BOX = np.array(
+    [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +46,7 @@ class Surface:
 
 def box(size: Sequence[float]) -> Surface:
     """A box; `size` are half of its edges."""
-    faces = [triangle for a, b, c, d in _BOX for triangle in ((a, b, c), (a, c, d))]
-    return Surface(_CORNERS * np.asarray(size)[:3], np.array(faces))
+    return Surface(_CORNERS * np.asarray(size)[:3], _BOX[:, [(0, 1, 2), (0, 2, 3)]].reshape(-1, 3))
 
 
 def rectangle(half_x: float, half_y: float) -> Surface:
@@ -236,13 +237,12 @@ def drawing_of(model: Model) -> Drawing:
             )
         )
     x, y, z = raw.stat.center.tolist()
-    at = raw.vis.global_
     return Drawing(
         parts=tuple(parts),
         center=(x, y, z),
         extent=float(raw.stat.extent),
-        azimuth=float(at.azimuth),
-        elevation=float(at.elevation),
+        azimuth=float(raw.vis.global_.azimuth),
+        elevation=float(raw.vis.global_.elevation),
         file=model.path,
         left_out=tuple(left_out),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..backends import on_default
-from ..interface import Array, Model, forward, make_data
+from ..interface import Array, Data, Model, forward, make_data
 from ..rotations import matrix_from_quat
 from ._drawing import Drawing
 
@@ -121,15 +121,20 @@ class Motion:
         return np.concatenate(corners) if parts else xpos.reshape(-1, 3)
 
 
+def posed(model: Model, qpos: Array) -> Iterator[Data]:
+    """A Data in each pose of some (n, nq), after `forward`; it is the same one each time."""
+    with make_data(model) as data:
+        for row in qpos:
+            data.qpos = row
+            forward(model, data)
+            yield data
+
+
 def poses_through(model: Model, qpos: Array) -> tuple[Array, Array]:
     """Xpos (n, nbody, 3) and xquat (n, nbody, 4) of qpos (n, nq), by MuJoCo's kinematics."""
-    reader = on_default(model)
-    xpos, xquat = np.empty((len(qpos), model.nbody, 3)), np.empty((len(qpos), model.nbody, 4))
-    with make_data(reader) as data:
-        for k, row in enumerate(qpos):
-            data.qpos[:] = row
-            forward(reader, data)
-            xpos[k], xquat[k] = data.xpos, data.xquat
+    xpos, xquat = (np.empty((len(qpos), model.nbody, size)) for size in (3, 4))
+    for k, data in enumerate(posed(on_default(model), qpos)):
+        xpos[k], xquat[k] = data.xpos, data.xquat
     return xpos, xquat
 
 

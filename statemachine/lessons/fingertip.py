@@ -13,9 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..drawing.scene import posed
 from ..errors import BadInputError, ModelError, UnknownNameError, refuse
 from ..installed import WITNESS
-from ..interface import Array, JointType, Model, forward, make_data
+from ..interface import Array, JointType, Model, make_data
 from ..interface.options import as_count
 from ..kinematics import Kind, Kinematics, shared_joints
 from ..measures import largest_or_inf
@@ -236,16 +237,13 @@ def _engine_poses(
     mat = np.empty((len(configurations), len(tips), 3, 3))
     if "contacts" in model.capabilities.options:
         model = model.replace(contacts=False)  # places do not depend on them, and they cost
-    with make_data(model) as data:
-        for k, qpos in enumerate(configurations):
-            data.qpos = qpos
-            forward(model, data)
-            pos[k, sites] = data.site_xpos[site_ids]
-            mat[k, sites] = data.site_xmat[site_ids].reshape(-1, 3, 3)
-            pos[k, bodies] = data.xpos[body_ids]
-            mat[k, bodies] = matrix_from_quat(data.xquat[body_ids])
-            if k % 100 == 0:
-                progress(k / len(configurations))
+    for k, data in enumerate(posed(model, configurations)):
+        pos[k, sites] = data.site_xpos[site_ids]
+        mat[k, sites] = data.site_xmat[site_ids].reshape(-1, 3, 3)
+        pos[k, bodies] = data.xpos[body_ids]
+        mat[k, bodies] = matrix_from_quat(data.xquat[body_ids])
+        if k % 100 == 0:
+            progress(k / len(configurations))
     return Placement(pos, mat)
 
 

@@ -49,9 +49,9 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     at = coordinate(model, options["joint"])
     seconds = steps_in(model, options["seconds"]) * model.timestep  # refuses what is no time
     loop, nstep = stepping_loop(model, milestones(seconds), options["seconds"])
-    shown, numpy = "np.degrees(data.qpos[slot]).round(3)", "import numpy as np\n"
-    if at.slide:
-        shown, numpy = "(1000 * data.qpos[slot]).round(2)", ""  # millimetres
+    in_degrees = "np.degrees(data.qpos[slot]).round(3)", "import numpy as np\n"
+    in_millimetres = "(1000 * data.qpos[slot]).round(2)", ""
+    shown, numpy = in_millimetres if at.slide else in_degrees
     off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
     start = start_line(model, "variant")
     return f"""\

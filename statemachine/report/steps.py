@@ -88,9 +88,9 @@ def _of_the_limit(result: Figures, touch: str) -> Headline:
         verdicts = {limit.verdict for limit in result.whole}
         return Headline(LEADS["vanishes" if verdicts - {"rounding"} else "rounding"])
     stay = [limit for limit in result.whole if limit.verdict in ("stays", "in part")]
-    same = [limit for limit in stay if limit.unit == stay[0].unit]
     lead = LEADS["neither"]
-    if same:
+    if stay:
+        same = (limit for limit in stay if limit.unit == stay[0].unit)
         most = max(same, key=lambda limit: limit.gaps[2])
         coarse, fine = (quantity(most.gaps[k], most.unit) for k in (0, 2))
         lead = LEADS["stays"].format(name=name_of(most.name), coarse=coarse, fine=fine)

@@ -96,8 +96,8 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
                 predicted = [judged(block, choice)]
             elif block.always:
                 right = "none of the above" if block.right is None else block.choices[block.right]
-                asked = [] if reader else [Text(block.text)]
-                _write(tell, [*asked, Text(f"Answer: {right}. {block.because}")])
+                answer = Text(f"Answer: {right}. {block.because}")
+                _write(tell, [answer] if reader else [Text(block.text), answer])
             continue
         if isinstance(block, Heading):
             headings.append(block)
@@ -209,8 +209,8 @@ def _drawn(block: Page | Block, plain: bool, width: int) -> list[RenderableType]
             printed: list[RenderableType] = []
             for names, text in together(by_engine):
                 printed += ["", RichText(f"Printed by {', '.join(names)}:", "dim")]
-                lines = text.splitlines() or ["(nothing)"]
-                printed += [f"    {_shown(line, plain)}" for line in lines]
+                for line in text.splitlines() or ["(nothing)"]:
+                    printed.append(f"    {_shown(line, plain)}")
             return printed
         case Table():
             title = [RichText(_shown(block.title, plain), "italic")] if block.title else []

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...drawing.scene import posed
 from ...errors import BadInputError, DivergedError, TraceError
-from ...interface import Array, JointType, Model, forward, make_data, usual_site
+from ...interface import Array, JointType, Model, usual_site
 from ...measures import (
     QUANTITIES,
     SAME,
@@ -120,13 +121,10 @@ class Ruler:
     def _poses(self, qpos: Array, model: Model, side: int) -> Curves:
         """Where the tip and the free bodies are, and these in the axes of the tip."""
         tip, rows = self._tips[side], []
-        with make_data(model) as data:
-            for row in qpos:
-                data.qpos = row
-                forward(model, data)
-                site = () if tip is None else (data.site_xpos[tip], data.site_xmat[tip])
-                parts = (data.xpos[self._bodies[side]], *site)
-                rows.append(np.concatenate([part.ravel() for part in parts]))
+        for data in posed(model, qpos):
+            site = () if tip is None else (data.site_xpos[tip], data.site_xmat[tip])
+            parts = (data.xpos[self._bodies[side]], *site)
+            rows.append(np.concatenate([part.ravel() for part in parts]))
         count = len(self._names)
         values = np.array(rows)
         where = values[:, : 3 * count].reshape(len(rows), count, 3)

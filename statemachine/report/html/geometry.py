@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import itertools
 from typing import Any
 
 import numpy as np
@@ -34,26 +35,29 @@ def mesh_of(drawing: Drawing, most: int = 24_000) -> Figures:
     while sum(len(faces) for _, faces in shapes) > most:
         shapes = [_snapped(part, cell) for part in parts]
         cell *= 1.4
-    vertices: list[Any] = [np.empty((0, 3))]
-    faces: list[Any] = [np.empty((0, 3))]
-    placed, corner, index = [], 0, 0
-    for part, (points, triangles) in zip(parts, shapes, strict=True):
-        vertices.append(points)
-        faces.append(triangles + corner)
-        placed.append((part.body, index, triangles.size, *(round(c, 3) for c in part.rgba[:3])))
-        corner, index = corner + len(points), index + triangles.size
+    corners = itertools.accumulate((len(points) for points, _ in shapes), initial=0)
+    indices = itertools.accumulate((faces.size for _, faces in shapes), initial=0)
+    moved = (faces + corner for (_, faces), corner in zip(shapes, corners, strict=False))
+    none = np.empty((0, 3))
     return Figures(
-        vertices=np.concatenate(vertices).astype(np.float32),
-        faces=np.concatenate(faces).astype(np.int64),
-        parts=placed,
+        vertices=np.concatenate([none, *(points for points, _ in shapes)]).astype(np.float32),
+        faces=np.concatenate([none, *moved]).astype(np.int64),
+        parts=[
+            (part.body, index, faces.size, *(round(c, 3) for c in part.rgba[:3]))
+            for part, (_, faces), index in zip(parts, shapes, indices, strict=False)
+        ],
         simplified=before if before > most else 0,
     )
 
 
 def _snapped(part: Part, cell: float) -> tuple[Any, Any]:
     """Points of one cell of a grid become their mean; faces of no area go."""
-    cells = np.round(part.vertices / cell).astype(np.int64)
-    _, number, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    _, number, count = np.unique(
+        np.round(part.vertices / cell).astype(np.int64),
+        axis=0,
+        return_inverse=True,
+        return_counts=True,
+    )
     number = number.reshape(-1)
     means = np.zeros((len(count), 3))
     np.add.at(means, number, part.vertices)
