@@ -358,9 +358,11 @@ assert worlds.time.all()
     runs_in_silence(code, ROOT)
 
 
-@pytest.mark.parametrize("substeps", [1, 2])
-def test_what_a_file_may_have(tmp_path: Path, substeps: int) -> None:
-    model = model_of(tmp_path, RICH, substeps=substeps)
+@pytest.mark.parametrize(("flag", "substeps"), [("", 1), ("", 2), ('sleep="enable"', 1)])
+def test_what_a_file_may_have(tmp_path: Path, flag: str, substeps: int) -> None:
+    option = f'<option timestep="0.002"><flag {flag}/></option>'
+    text = RICH.replace('<option timestep="0.002"/>', option)
+    model = model_of(tmp_path, text, substeps=substeps)
     with worlds_of(model, 5, workers=3) as worlds:
         live(worlds, [model] * 5, 28)
         with started(model) as data:
@@ -398,13 +400,6 @@ def test_where_the_engine_resets_by_itself() -> None:
         with pytest.warns(DivergedWarning):
             many.step(worlds, 20)
         assert str(worlds.diverged[1]).split(".")[0] == str(wanted).split(".")[0]
-
-
-def test_sleep_is_run_or_refused(tmp_path: Path) -> None:
-    flag = '<option timestep="0.002"><flag sleep="enable"/></option>'
-    model = model_of(tmp_path, RICH.replace('<option timestep="0.002"/>', flag))
-    with worlds_of(model, 3) as worlds:
-        live(worlds, [model] * 3, 28)
 
 
 def test_a_python_callback_is_refused() -> None:

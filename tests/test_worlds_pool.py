@@ -163,12 +163,6 @@ def test_a_process_that_is_killed_takes_its_worlds_with_it(worlds: Worlds) -> No
     assert not running(numbers)
 
 
-def test_all_processes_that_are_killed_are_told(worlds: Worlds) -> None:
-    for pid in pids(worlds):
-        os.kill(pid, signal.SIGKILL)
-    refused((EngineError, "2 worlds", lambda: step(worlds)))
-
-
 def interrupted_after(seconds: float, call: Callable[[], Any]) -> float:
     """Ctrl-C while something is called; how long the call then still took [s]."""
     pressed = []
