@@ -543,18 +543,12 @@ def test_a_stale_read_raises_and_says_what_to_do(box: Model) -> None:
 
 
 def test_a_watch_names_the_lines_that_read(box: Model) -> None:
-    class Controller:
-        """Keeps the Data in an object: every name for it is watched."""
-
-        def __init__(self, data: Data) -> None:
-            self.data = data
-
-        def __call__(self) -> None:
-            _ = self.data.site_xpos
-
     with sm.make_data(box) as data:
-        controller = Controller(data)
-        line = Controller.__call__.__code__.co_firstlineno + 1
+
+        def controller() -> None:
+            _ = data.site_xpos
+
+        line = controller.__code__.co_firstlineno + 1
         data.ctrl[:6] = TARGET
         with sm.watch_freshness(box, data) as watch:
             for _ in range(5):
