@@ -29,7 +29,7 @@ class PybulletEngine(RawEngine):
     terms = function_of(".pybullet.as_it_comes:terms")
     left_alone = function_of(".pybullet.as_it_comes:left_alone")
     ways_back = function_of(".pybullet.as_it_comes:ways_back")
-    phrases = function_of(".pybullet.phrasebook:phrases")
+    phrases = function_of(".pybullet.conventions:phrases")
     driver = function_of(".pybullet.audit:PybulletDriver")
     call_watch = function_of(".pybullet.calls:PybulletWatch")
     read = function_of(".pybullet.reading:read")
