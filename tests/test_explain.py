@@ -261,7 +261,7 @@ SHARED = [
 def test_a_pair_that_is_taken_away_is_as_its_geoms_are_then(other, tmp_path):
     """Its geoms have another margin, or do not touch by themselves, until that is brought over."""
     right = changed(ARM, ALONE["pair"], ALONE[other])
-    found = explained(tmp_path, ARM, right, scenario=HOME, quantity="ball")
+    found = explained(tmp_path, ARM, right, scenario=HOME, quantity="ball position")
     assert_has(found, brought=0.0, method="all sets")
     alone = {row.name: row.alone for row in found.shares}
     # Without its pair the ball falls through the floor, from which it is excluded.

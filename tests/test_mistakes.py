@@ -222,6 +222,7 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("compare arm.xml heavy.xml", "statemachine compare hold arm.xml heavy.xml runs"),
         ("compare arm.xml heavy.xml", "statemachine compare --models arm.xml heavy.xml lists"),
         ("compare so101 so101/scene", "two sides need something to do first"),
+        ("compare so101", "compare hold so101 so101@pybullet runs"),
         ("compare hold so101 so101 --model so101", "--model goes without sides"),
         ("compare hold so101 so101 --backends mujoco mujoco", "FILE@ENGINE"),
         ("compare hold so101 so101 --defaults engine", "FILE@ENGINE:engine"),

@@ -352,6 +352,8 @@ def split_words(
     if traces or any(word in SCENARIOS for word in rest) or not (runs or is_side):
         return tuple(words), ()  # two traces, or nothing that can be compared
     if is_side:
+        alone = tuple(parse_sides(words, menagerie))
+        words = [*words, *([_another(alone)] if len(alone) == 1 else [])]
         typed = " ".join(f"'{word}'" if " " in word else word for word in words)
         named = " ".join(word for word in words if "=" not in word)
         raise BadInputError(

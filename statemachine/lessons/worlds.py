@@ -206,7 +206,7 @@ def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
         ),
         "costs": [
             Table(
-                ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
+                ("worlds", "workers", "to make them", "a step of one", "speed, one Data = 1"),
                 [
                     (
                         f"{cost.n:,}",

@@ -7,6 +7,8 @@ import shlex
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
+from ..installed import ENGINES
+
 K = TypeVar("K")
 V = TypeVar("V")
 NONE = "–"  # where there is no number
@@ -177,8 +179,10 @@ def on(label: str) -> str:
 
 
 def capital(text: str) -> str:
-    """A text that begins with a capital."""
-    return text[:1].upper() + text[1:]
+    """A text that begins with a capital; the name of an engine or a file is left as it is."""
+    first = text.partition(" ")[0].rstrip(",:")
+    is_name = first in ENGINES or not first.replace("-", "").isalpha()
+    return text if is_name else text[:1].upper() + text[1:]
 
 
 def sentence(text: str) -> str:

@@ -253,12 +253,14 @@ def _table(result: Explanation, able: Sequence[Figures]) -> list[Block]:
             measure=_MEASURES[result.measure],
         )
     )
-    words = frozenset({0, 1, 2})
+    if all(row[4:] == (NONE, NONE) for row in rows):  # nothing was brought over by itself
+        rows = [row[:4] for row in rows]
+    heads, words = _HEADS[: len(rows[0])] if rows else (), frozenset({0, 1, 2})
     most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
     heading = f"{len(rows) - most} more differences, with smaller parts"
-    more = Table(_HEADS, rows[most:], heading, words=words)
+    more = Table(heads, rows[most:], heading, words=words)
     folded = [Section("", heading, [more], folded=True)] if more.rows else []
-    return [Table(_HEADS, rows[:most], title, words=words), *folded] if rows else []
+    return [Table(heads, rows[:most], title, words=words), *folded] if rows else []
 
 
 def _hardly(result: Explanation, able: Sequence[Figures]) -> list[Figures]:

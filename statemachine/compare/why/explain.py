@@ -156,6 +156,7 @@ def explain(
     length = scenario.seconds if seconds is None else seconds
     trials = Trials((one, two), matched, scenario, recordings, length, seed, ran, jobs)
     units = trials.ruler.units
+    quantity = trials.ruler.named(quantity) if quantity else None
     if quantity is not None and quantity not in units:
         raise unknown_name("quantity", quantity, units)
     listed = trials.causes(finer)

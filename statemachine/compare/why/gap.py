@@ -66,6 +66,8 @@ class Ruler:
             m.jnt_bodyid[j[m.jnt_type[j] == int(JointType.FREE)]]
             for m, j in zip(models, joints, strict=True)
         ]
+        free = joints[0][model.jnt_type[joints[0]] == int(JointType.FREE)]
+        self._joints = [one.header.joint_labels[joint] for joint in free]
         self._names = [model.body_names[b] or f"body {b}" for b in self._bodies[0]]
         tip = self._tips[0]
         self._tip = "" if tip is None else model.site_names[tip] or f"site {tip}"
@@ -91,6 +93,14 @@ class Ruler:
                 f"nothing can be measured in {model.path.name}: it has no joint that the other "
                 "has, too"
             )
+
+    def named(self, words: str) -> str:
+        """The quantity that a table calls so: "torso rotation", or by its joint "root position"."""
+        names = {name: name for name in self.units} | {f"{self._tip}, position": self._tip}
+        for joint, body in zip(self._joints, self._names, strict=True):
+            names |= {f"{joint}, position": body, f"{joint}, rotation": f"{body}, rotation"}
+        known = {name.replace(",", ""): quantity for name, quantity in names.items()}
+        return known.get(words.replace(",", ""), words)
 
     def curves(self, trace: Trace, model: Model | None = None, side: int = 0) -> Curves | None:
         """A run at the moments of the ruler; None if it ended before the last of them.
