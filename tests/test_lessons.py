@@ -432,10 +432,6 @@ def test_forward_computes_what_it_shows(asked: tuple[str, ...], backend: str) ->
     assert page.holds
 
 
-def test_what_a_lesson_shows_when_it_is_asked_for_all() -> None:
-    assert (LESSONS["forward"].more, LESSONS["time"].more) == (("arrays", "lag"), ())
-
-
 def test_of_which_moment_a_step_leaves_what(backend: str) -> None:
     """Against the course's figure: of the state before, 9.95 mm behind at worst."""
     page, taken = _take("forward", backend, seconds=2.0)
