@@ -368,6 +368,14 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     noisy = explanation_of(hold, floor=0.2 * located.gap)
     (table,) = [block for block in causes(noisy) if isinstance(block, Table)]
     assert [row[3] for row in table.rows] == ["60.0 %", "< 20.0 %", "50.0 %*"]
+    rows, no_part = explanation_of(hold).shares, dict.fromkeys(("share", "alone", "last"), 2e-4)
+    tiny = [with_figures(row, **no_part) for row in rows]
+    (table,) = [
+        block
+        for block in causes(explanation_of(hold, shares=(rows[0], *tiny)))
+        if isinstance(block, Table)
+    ]
+    assert [row[0] for row in table.rows] == ["Servo law", "Contact", "2 more, none above 0.1 %"]
     chaos = explanation_of(hold, floor=0.04)
     assert answer(chaos).startswith("Nothing can be concluded: the gap is 2.58°, and the chaos")
     assert chaos.is_rounding
