@@ -167,6 +167,6 @@ def controller_for_right(controller: Controller, matched: Matched, start: Array)
 
     def translate(time: float, data: Data) -> Any:
         ctrl = controller(time, data)
-        return None if ctrl is None else matched.ctrl(np.asarray(ctrl, np.float64), start)
+        return None if ctrl is None else matched.moved("ctrl", np.asarray(ctrl, np.float64), start)
 
     return translate

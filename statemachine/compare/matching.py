@@ -21,7 +21,7 @@ from ..engines.description.tree import GroupTree
 from ..engines.records import BodyPair, Counterparts, Pairs
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
-from ..interface import Array, Model, State
+from ..interface import INPUTS, Array, Model, State
 from ..rotations import HERE
 from ..runs import SideStart
 
@@ -55,9 +55,7 @@ class Matched(Counterparts):
     def start(self, one: SideStart, two: SideStart) -> SideStart:
         """The start of the first Model in the second's terms; the rest is that of `two`."""
         return SideStart(
-            self.qpos(one.qpos, two.qpos),
-            self.qvel(one.qvel, two.qvel),
-            self.ctrl(one.ctrl, two.ctrl),
+            **{part: self.moved(part, getattr(one, part), getattr(two, part)) for part in INPUTS}
         )
 
     def state(self, one: State, two: State) -> State:
@@ -66,28 +64,21 @@ class Matched(Counterparts):
         Beside the time these are the arrays in `places` that both have.
         """
         given = {
-            name: _moved(one[name], two[name], *ends)
-            for name, ends in self.places.items()
+            name: self.moved(name, one[name], two[name])
+            for name in self.places
             if name in dict(one.layout) and name in dict(two.layout)
         }
         return two.with_parts(time=one["time"], **given)
 
-    def qpos(self, values: Array, start: Array) -> Array:
-        """Positions of the second Model, from those of the first.
+    def moved(self, part: str, values: Array, start: Array) -> Array:
+        """An array of the second Model, from that of the first.
 
         Args:
-            values: (nq,) or (n, nq) of the first.
-            start: (nq,) of the second, for the joints that have no counterpart.
+            part: Its name in `places`.
+            values: (m,) or (n, m) of the first.
+            start: (k,) of the second, for what has no counterpart.
         """
-        return _moved(values, start, *self.places["qpos"])
-
-    def qvel(self, values: Array, start: Array) -> Array:
-        """Velocities of the second Model (nv,) or (n, nv), as `qpos`."""
-        return _moved(values, start, *self.places["qvel"])
-
-    def ctrl(self, values: Array, start: Array) -> Array:
-        """Commands to the second Model (nu,) or (n, nu), as `qpos`."""
-        return _moved(values, start, *self.places["ctrl"])
+        return _moved(values, start, *self.places[part])
 
     @cached_property
     def places(self) -> Mapping[str, list[list[int]]]:

@@ -165,9 +165,9 @@ def _enter_keyframes(book: Ledger, matched: Matched) -> None:
             continue
         book.enter("further", where, "time", [a.time, b.time], "s", share=0.5)
         for figure, ours, theirs in (
-            ("qpos", matched.qpos(a.qpos, b.qpos), b.qpos),
-            ("qvel", matched.qvel(a.qvel, b.qvel), b.qvel),
-            ("ctrl", matched.ctrl(a.ctrl, b.ctrl), b.ctrl),
+            ("qpos", matched.moved("qpos", a.qpos, b.qpos), b.qpos),
+            ("qvel", matched.moved("qvel", a.qvel, b.qvel), b.qvel),
+            ("ctrl", matched.moved("ctrl", a.ctrl, b.ctrl), b.ctrl),
         ):
             off = float(np.abs(ours - theirs).max(initial=0.0))
             if off > 1e-9:

@@ -169,8 +169,8 @@ def of_the_run(
     """
     one, two = starts
     off = max(
-        float(farthest(matched.qpos(one.qpos, two.qpos), two.qpos)),
-        float(farthest(matched.qvel(one.qvel, two.qvel), two.qvel)),
+        float(farthest(matched.moved("qpos", one.qpos, two.qpos), two.qpos)),
+        float(farthest(matched.moved("qvel", one.qvel, two.qvel), two.qvel)),
     )
     if off > _SAME:
         yield ModelDifference(START, "run", "", (("farthest coordinate", 0.0, off),))

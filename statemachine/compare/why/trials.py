@@ -341,8 +341,8 @@ class Trials:
         qpos, qvel = start.qpos, start.qvel
         if START in brought:
             first = self._starts[0]
-            qpos = self._matched.qpos(first.qpos, qpos)
-            qvel = self._matched.qvel(first.qvel, qvel)
+            qpos = self._matched.moved("qpos", first.qpos, qpos)
+            qvel = self._matched.moved("qvel", first.qvel, qvel)
         return Rerun(
             model,
             lambda model: self._controller(run.side, model, brought),
