@@ -27,9 +27,9 @@ _BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE
 _CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 _PRIMITIVES = {_BOX: "box", _SPHERE: "sphere", _CAPSULE: "capsule", _CYLINDER: "cylinder"}
 _MESH, _PLANE = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_PLANE)
-# [kg] mass, and a thousandth of it [kg m²] inertia, of what only carries a tree; less where the
-# tree has less than a kilogram.
-LIGHT = 1e-9
+# [kg] mass, and a thousandth of it [kg m²] inertia, of what only carries a tree; and the largest
+# part of the tree's own.
+LIGHT, LIGHTEST = 1e-9, 1e-8
 UNLIMITED = 1e9  # a range or a force where there is none: PyBullet wants a number
 _LONGEST = 200  # PyBullet cuts names at 1,023 bytes
 
@@ -110,7 +110,7 @@ def write(
     robot = Element("robot", name=raw.names[: raw.names.index(b"\0")].decode() or "robot")
     on_world = bool(axes(raw, root)) or dialect.anchored
     if on_world:
-        light = LIGHT * floats(raw, root) * min(1.0, float(raw.body_subtreemass[root]))
+        light = floats(raw, root) * min(LIGHT, LIGHTEST * float(raw.body_subtreemass[root]))
         robot.append(_bare_link("world", light, 1e-3 * light * np.eye(3)))
     for body in tree(raw, root):
         robot.append(_link(raw, body, dialect, names))
