@@ -146,6 +146,7 @@ class World:
             self._inward[b] = wxyz_from_xyzw(np.array(axes)) * INVERSE
         # Of their bases: what of T is constant, see `_base_axes`, and the body's axes in the frame.
         self._changes: dict[int, tuple[Array, Array]] = {}
+        self._known_base: Any = (None, None, None)
         for body, (centre, axes) in self._frames.items():
             inward = matrix_from_quat(wxyz_from_xyzw(np.array(axes))).T.copy()
             # Times w: w × centre.
@@ -462,20 +463,24 @@ class World:
         # Faster than np.array.
         mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
         if tree.free:
-            axes = self._base_axes(tree, q)
+            axes, _ = self._base_axes(tree, q)
             mass[:, :6] = dense.product(mass[:, :6].copy(), axes)
             mass[:6] = dense.product(axes.T.copy(), mass[:6].copy())
         return mass
 
-    def _base_axes(self, tree: Tree, q: Sequence[float]) -> Array:
-        """T (6, 6), by which the engine's velocities of the base of a tree that floats are T·qvel.
+    def _base_axes(self, tree: Tree, q: Sequence[float]) -> tuple[Array, Array]:
+        """Of the base of a tree that floats, at its positions q, two matrices.
 
-        The base turns, then moves, in its own axes.
+        T (6, 6), by which the engine's velocities of it are T·qvel: it turns, then moves, in its
+        own axes. And where the body's axes (3, 3) point.
         """
-        change, inward = self._changes[tree.body]
-        change = change.copy()
-        change[3:, :3] = dense.product(inward, matrix_from_quat(np.array(q[3:7])).T.copy())
-        return change
+        known, at = self._known_base, (tree.body, *q[3:7])
+        if known[0] != at:  # all bodies of a tree ask
+            change, inward = self._changes[tree.body]
+            change, turn = change.copy(), matrix_from_quat(np.array(q[3:7]))
+            change[3:, :3] = dense.product(inward, turn.T.copy())
+            self._known_base = known = at, change, turn
+        return known[1:]
 
     def body_poses(self, tree: Tree, bodies: Sequence[int]) -> tuple[Array, Array]:
         """The xpos (n, 3) and xquat (n, 4) of bodies that are not the engine's base."""
@@ -521,7 +526,7 @@ class World:
             rows, origin = (np.eye(6)[3:], np.eye(6)[:3]), np.array(q[:3])
         moving, turning = (np.array(part) for part in rows)
         if tree.free:
-            axes, turn = self._base_axes(tree, q), matrix_from_quat(np.array(q[3:7]))
+            axes, turn = self._base_axes(tree, q)
             for rows in (moving, turning):
                 rows[:, :6] = dense.product(rows[:, :6].copy(), axes)
             moving, turning = dense.product(turn, moving), dense.product(turn, turning)
