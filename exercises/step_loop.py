@@ -30,7 +30,7 @@ A Data belongs to the Model that made it. An array that you read from `data` may
 simulator's own memory: `.copy()` keeps what it says now. On MuJoCo, `model.raw` and `data.raw`
 are the engine's own MjModel and MjData, and what you do with them counts just as well.
 
-When all four pass, break one on purpose, and see how far two runs get apart:
+When all four pass, see how far one late command takes two runs apart:
 
     statemachine lesson replay --break late-ctrl
     statemachine lesson replay --break extra-step

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -19,15 +18,7 @@ _HEAD = (
     "alike", "details", "sha256", "made_with",
 )  # fmt: skip
 NOTHING = "handed in nothing"
-# What stands before the reason in a remark (where it was, and figures), and what after it.
-_BEFORE = re.compile(
-    r"^(?:(?:on a scene|with|reading \d,) .*?: )+"
-    r"|you return \S+( at \d+ s)? where .*? is expected: "
-    r"|time after the reset.*?, you return [^:]*: |is up to \S+ away from .*?: "
-    r"|nothing could be judged: |\S+/(?=\S+\.py)"
-)
-_AFTER = re.compile(r"^(.{16,}?)(?:[,;.?] | \().*")
-_FEW = 64  # characters
+_FEW = 120  # characters of a remark
 _WORDS = {"right", "wrong", "not written", "not judged"}
 
 
@@ -93,9 +84,9 @@ class ClassEntry:
 
 
 def few_words(judgement: Judgement) -> str:
-    """Why a function is not right, without figures and where it showed."""
-    text = _BEFORE.sub("", judgement.remarks[0]) if judgement.written else verdict_word(judgement)
-    return textwrap.shorten(_AFTER.sub(r"\1", text), _FEW, placeholder=" …")
+    """Why a function is not right: its first remark, as far as there is room for it."""
+    text = judgement.remarks[0] if judgement.written else verdict_word(judgement)
+    return textwrap.shorten(text, _FEW, placeholder=" …")
 
 
 def rows_of(entries: Iterable[ClassEntry]) -> Iterator[tuple[object, ...]]:
