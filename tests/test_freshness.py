@@ -96,30 +96,6 @@ def test_a_fresh_data_was_never_computed(box: Model) -> None:
             sm.forward(box, data)
 
 
-def test_after_a_write_everything_is_of_before(model: Model) -> None:
-    """The write of the lesson: 0.8 rad at the shoulder, and the fingertip 270 mm elsewhere."""
-    with sm.make_data(model) as data:
-        sm.forward(model, data)
-        before = data.site_xpos[model.site_id("gripperframe")].copy()
-        data.qpos[model.joint_id("shoulder_lift")] = 0.8
-        found = sm.freshness(model, data)
-        sm.forward(model, data)
-        after = data.site_xpos[model.site_id("gripperframe")]
-        (gap,) = found["site_xpos"].gaps
-        assert_has(
-            gap, unit="m", where="gripperframe", size=np.linalg.norm(after - before, axis=-1)
-        )
-        assert gap.size == pytest.approx(0.270, abs=0.001)
-        assert sizes(found["xquat"].gaps)["rad"] == pytest.approx(0.8)
-        assert sizes(found["site_xmat"].gaps)["rad"] == pytest.approx(0.8)
-        # Nobody counted, and no step leads here: that is all that can be said.
-        assert (found["xpos"].of, found["xpos"].steps, found["xpos"].writes) == (
-            "an earlier state",
-            None,
-            None,
-        )
-
-
 def test_each_array_has_its_own_inputs(model: Model) -> None:
     """Found by value: poses do not hear of qvel and ctrl, nor the bias of ctrl."""
     with opened(model, qpos=TARGET, ctrl=TARGET, derived=True) as (_, data):
