@@ -72,8 +72,9 @@ def figure(value: float) -> str:
 
 
 def significant(value: float, digits: int = 4) -> str:
-    """A number to some significant digits; zero has no sign."""
-    return f"{value:z.{digits}g}"
+    """A number to some significant digits, without a power of ten below a million."""
+    text = f"{value:z.{digits}g}"
+    return f"{float(text):.0f}" if "e+0" in text and abs(value) < 1e6 else text
 
 
 def fixed(value: float, decimals: int) -> str:
