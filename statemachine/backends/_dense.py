@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from ..interface import Array
 
@@ -46,15 +45,6 @@ def solved(factor: Array, right: Array) -> Array:
     """The solution (n,) for a right-hand side (n,), which it takes the place of."""
     mujoco.mju_cholSolve(right, factor, right)
     return right
-
-
-def inverse_rows(factor: Array, rows: NDArray[np.intp]) -> Array:
-    """Rows (k,) of the inverse, (k, n), of the matrix that was factored."""
-    inverse = np.zeros((len(rows), len(factor)))
-    inverse[np.arange(len(rows)), rows] = 1.0
-    for row in inverse:
-        solved(factor, row)
-    return inverse
 
 
 def pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Array) -> Array:
