@@ -148,7 +148,9 @@ def _sorted(runs: BothRuns) -> list[Block]:
     beyond: list[Block] = [chart for chart in ranked if chart.agreement.verdict != "agrees"]
     within: list[Block] = [*ranked[len(beyond) :]]
     if beyond and within:
-        within = [Section("", f"Those that agree: {len(within)}", within, folded=True)]
+        within = [
+            Section("", f"Charts of quantities that agree: {len(within)}", within, folded=True)
+        ]
     text = f"Quantities without a chart, nearer to agreement or not finite: {more}."
     return [*beyond, *within, *([Text(text)] if more else [])]
 

@@ -204,7 +204,7 @@ def _notes(raw: Any, links: list[Link], actuators: tuple[Actuator, ...]) -> list
         "further equality constraints": raw.neq - linear,
         "tendons": raw.ntendon,
         "contact pairs of its own": raw.npair,
-        "pairs without contact": raw.nexclude,
+        "pairs of bodies that never touch (exclude)": raw.nexclude,
         "bodies freed of weight (gravcomp)": np.count_nonzero(raw.body_gravcomp),
     }
     said = [f"{count} {what}" for what, count in counted.items() if count]

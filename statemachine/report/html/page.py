@@ -210,7 +210,7 @@ def _lanes(runs: BothRuns) -> Html:
         _lane(name, [bar("beyond", *span) for span in spans], "quantity") for name, spans in beyond
     ]
     within = len(runs.charts) - len(beyond)
-    said = f"Bars: beyond tolerance. Quantities that never are: {within} of {len(runs.charts)}."
+    said = f"Bars: beyond tolerance. Charts without a bar: {within} of {len(runs.charts)}."
     *ticks, last = np.linspace(0.0, until, _TICKS).tolist()
     times = [tag("span", f"{t:.3g}", style=f"left:{100 * t / until:.2f}%") for t in ticks]
     times.append(tag("span", f"{last:.3g}", tag("small", "s"), style="left:100%"))
