@@ -703,9 +703,9 @@ def test_cells_that_failed_are_run_again_if_asked(
     assert Counter(dict(counted(tmp_path / "out")).values())["BadInputError"] == 6
     # Killed when the rows of the failed cells are gone: these cells are missing, the rest is there.
     code = (
-        "import os, signal, sys; from statemachine.sweep import drive\n"
+        "import os, signal, sys; from statemachine import sweep\n"
         "from statemachine.cli import main\n"
-        "drive._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "sweep._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "main(sys.argv[1:])"
     )
     driver = start("--retry-failed", program=["-c", code, *words])
