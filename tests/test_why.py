@@ -117,7 +117,8 @@ def test_another_quantity(arm: Model) -> None:
     result = explain(arm, two, HOLD, quantity="gripperframe", uncertain=None)
     assert_has(result, quantity="gripperframe", unit="m", gap=result.first["gripperframe"].worst)
     refused(
-        (UnknownNameError, "gripperframe", lambda: explain(arm, two, HOLD, quantity="gripperfram"))
+        (UnknownNameError, "gripperframe", lambda: explain(arm, two, HOLD, quantity="gripperfram")),
+        (UnknownNameError, "known: joints", lambda: explain(arm, two, HOLD, quantity="")),
     )
 
 

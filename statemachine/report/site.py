@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..backends import load
+from ..backends import backend_names, load
 from ..compare import Request, compare, run_sides, witness
 from ..compare.why import explain
 from ..errors import MissingEngineError
-from ..installed import WITNESS, available
+from ..installed import available
 from ..lessons import LESSONS
 from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
@@ -40,7 +40,7 @@ def make_path(
         MissingEngineError: A backend that was asked for, or matplotlib, is not installed.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    names = backends or [name for name in available()[0] if name != WITNESS]
+    names = backends or [name for name in available()[0] if name in backend_names()]
     written = []
     for number, lesson in enumerate(LESSONS.values(), start=1):
         say(f"running the lesson {lesson.name} ...")

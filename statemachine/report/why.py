@@ -148,6 +148,7 @@ def causes(result: Explanation) -> list[Block]:
     refused = [f"{capital(row.name)}: {row.note}." for row in result.shares if row.note]
     small, floor = result.gap <= result.negligible, _amount(result, result.floor)
     noisy = not result.is_rounding and result.floor > _SMALL * result.gap
+    hardly = _hardly(result, able)
     gap, method = result.first[result.quantity], result.method
     others = [
         f"{name} {quantity(other.worst, other.unit)}"
@@ -166,8 +167,8 @@ def causes(result: Explanation) -> list[Block]:
         negligible=_amount(result, result.negligible) if result.is_rounding and small else None,
         chaos=floor if result.is_rounding and not small else None,
         same=if_true(not result.shares and not result.found_in),
-        table=_table(result, able),
-        more=few([row.name for row in _hardly(result, able)], 6) or None,
+        table=_table(result, able, hardly),
+        more=few([row.name for row in hardly], 6) or None,
         located=[
             block
             for place in result.found_in  # left out on both sides, or an integrator
@@ -201,7 +202,9 @@ def causes(result: Explanation) -> list[Block]:
 
 def steps(result: Explanation) -> list[Block]:
     """What to change, where, and what is left of the gap with everything changed."""
-    lines, least = [], max(_NO_PART, result.floor / result.gap if result.gap else 0.0)
+    if result.is_rounding:
+        return []
+    lines, least = [], max(_NO_PART, result.floor / result.gap)
     changed = [row for row in result.shares if not (row.note or row.chosen)]
     for row in changed:
         if (row.share or 0.0) >= least and row.share > -(row.last or 0.0):
@@ -209,8 +212,6 @@ def steps(result: Explanation) -> list[Block]:
             place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
             change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
             lines.append(f"{place}{row.name}: {change.format(left=left, right=right)}")
-    if result.is_rounding:
-        return []
     side, integrator = next((row.chosen for row in result.shares if row.chosen), (None, None))
     return template.blocks(
         "why_changes",
@@ -233,9 +234,8 @@ def three_parts(result: Explanation) -> list[Block]:
     return [] if result.is_rounding else template.blocks("why_parts", parts=parts(result))
 
 
-def _table(result: Explanation, able: Sequence[Figures]) -> list[Block]:
-    """The differences, the largest share first; those without an effect folded away."""
-    small = _hardly(result, able)
+def _table(result: Explanation, able: Sequence[Figures], small: Sequence[Figures]) -> list[Block]:
+    """The differences, the largest share first; the small ones, without an effect, are one row."""
     rows = [_row(result, row) for row in able if row not in small]
     for place in result.found_in:  # what a feature takes away when it is left out on both sides
         explains = TableCell(f"{percent(place.share)}*", share=place.share)

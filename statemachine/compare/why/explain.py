@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...errors import BadInputError, EndedEarlyError, unknown_name
+from ...errors import BadInputError, EndedEarlyError, check_name
 from ...interface import JointType, Model
 from ...measures import Deviation
 from ...page import Figures
@@ -156,9 +156,9 @@ def explain(
     length = scenario.seconds if seconds is None else seconds
     trials = Trials((one, two), matched, scenario, recordings, length, seed, ran, jobs)
     units = trials.ruler.units
-    quantity = trials.ruler.named(quantity) if quantity else None
-    if quantity is not None and quantity not in units:
-        raise unknown_name("quantity", quantity, units)
+    if quantity is not None:
+        quantity = trials.ruler.named(quantity)
+        check_name("quantity", quantity, units)
     listed = trials.causes(finer)
     able = [cause.name for cause in listed if not cause.refused]
     first = trials.gaps(frozenset())
