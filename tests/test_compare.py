@@ -172,11 +172,11 @@ def test_a_touch_that_is_late_and_one_that_never_comes(hold: Trace) -> None:
 
 def test_what_becomes_of_a_contact(box: Trace, hold: Trace) -> None:
     found = {touch.pair: touch for touch in touches(box, box)}
-    grip = found["gripper on box"].one
+    grip = found["gripper on box"].left
     assert_has(grip, first=0.0, share=1.0, ends=True, last=pytest.approx(0.5))
     # Two jaws press the box against each other: the same force, and that of the servo.
-    assert grip.force == pytest.approx(found["moving_jaw_so101_v1 on box"].one.force, rel=0.05)
-    assert touches(hold, box)[0].two.first is None
+    assert grip.force == pytest.approx(found["moving_jaw_so101_v1 on box"].left.force, rel=0.05)
+    assert touches(hold, box)[0].right.first is None
 
 
 def test_the_whole_force_of_a_contact_is_the_engines(box: Trace, mujoco_box: sm.Model) -> None:
@@ -204,7 +204,7 @@ def test_the_whole_force_of_a_contact_is_the_engines(box: Trace, mujoco_box: sm.
     # Both press alike, and together they carry the box: 96 g of friction.
     assert one.mean() == pytest.approx(two.mean(), rel=0.05)
     assert all(abs(given[pair] - normal[pair]).max() > 1e-3 for pair in given)
-    assert touches(box, box)[0].one.total == pytest.approx(one[-len(box) // 10 :].mean(), rel=0.01)
+    assert touches(box, box)[0].left.total == pytest.approx(one[-len(box) // 10 :].mean(), rel=0.01)
 
 
 @pytest.mark.usefixtures("bullet")
@@ -217,9 +217,9 @@ def test_how_the_engines_part_in_the_hold() -> None:
     assert total_forces(one)["gripper on floor"].max() == pytest.approx(383, abs=1)
     # It ends pressed on one engine, and free on the other.
     touch: Any = touches(one, two)[0]
-    assert (touch.one.ends, touch.two.ends) == (True, False)
-    assert touch.one.force > 10
-    assert touch.two.last < 0.5
+    assert (touch.left.ends, touch.right.ends) == (True, False)
+    assert touch.left.force > 10
+    assert touch.right.last < 0.5
     # They part when the finger meets the floor.
     assert found["gripper on floor, first touch"].verdict == "agrees"
     began = found["gripper on floor, first touch"].at
@@ -343,8 +343,8 @@ def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace, tmp_path: Pa
         tip = trace.header.sites.index("gripperframe")
         position = added(trace["site_xpos"], (30, tip, 0), 0.001)
         found = witness(trace, changed(trace, site_xpos=position))
-        assert found.one < 1e-12
-        assert_has(found, two=pytest.approx(0.001, rel=1e-9), rows=2 * len(trace))
+        assert found.left < 1e-12
+        assert_has(found, right=pytest.approx(0.001, rel=1e-9), rows=2 * len(trace))
     binary = tmp_path / "hold.mjb"  # which Pinocchio does not read, and nobody as XML
     binary.write_bytes(b"\x00binary")
     assert witness(hold, hold, binary) is None
@@ -375,7 +375,7 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
     assert "recorded run that comes with the package" in run.said[0]
     found = compare(one, two)
     assert any("single precision" in note for note in found.notes)
-    assert ", recorded" in found.two.label
+    assert ", recorded" in found.right.label
     if defaults == "model":
         assert found.agrees == (name in ("droop", "fall", "waves"))
     assert report.page(found, said=run.said).blocks

@@ -175,7 +175,7 @@ def test_identical_sides_differ_by_nothing_at_all(files: Path) -> None:
         run, found = ran("hold", side, side)
         assert largest(found) == 0
         assert (run.commands, run.is_apart, run.unmatched) == ("the same", False, ())
-        assert (found.one.short, found.two.short) == (f"{engine} (first)", f"{engine} (second)")
+        assert (found.left.short, found.right.short) == (f"{engine} (first)", f"{engine} (second)")
 
 
 @pytest.mark.parametrize(
@@ -209,7 +209,7 @@ def test_one_file_on_two_engines(files: Path) -> None:
     arm = str(files / "arm.xml")
     _, found = ran("hold", Side(arm), Side(arm, "pybullet"))
     assert found.agrees
-    assert (found.one.short, found.two.short) == ("mujoco", "pybullet")
+    assert (found.left.short, found.right.short) == ("mujoco", "pybullet")
     as_it_comes = Side(arm, "pybullet", "engine")
     run, found = ran("hold", Side(arm, options={"timestep": 1 / 240}), as_it_comes)
     assert not found.agrees
@@ -446,7 +446,7 @@ def test_the_command_shows_both_loops(files: Path, here: Cli) -> None:
     assert [side["file"] for side in result["sides"]] == ["arm.xml", "heavy.xml"]
     assert result["commands"] == "its own"
     assert result["open_loop"]["agreements"] != result["comparison"]["agreements"]
-    assert result["comparison"]["one"]["short"] == "arm.xml"
+    assert result["comparison"]["left"]["short"] == "arm.xml"
 
 
 # A robot as a URDF of it is: no floor and no motors; and a damping that somebody changed.

@@ -149,8 +149,8 @@ def test_a_comparison_in_which_a_side_diverges_says_that(
     monkeypatch.setattr(pybullet_backend, "fastest", lambda raw: np.ones(raw.nv))
     assert main(["compare", "hold", "--why", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)["comparison"]
-    assert not found["one"]["run"]["ended"]
-    assert found["two"]["run"]["ended"].startswith("qvel[1] (shoulder_lift) = -1.04 went beyond")
+    assert not found["left"]["run"]["ended"]
+    assert found["right"]["run"]["ended"].startswith("qvel[1] (shoulder_lift) = -1.04 went beyond")
     assert {each["verdict"] for each in found["agreements"]} == {"agrees"}
 
 
@@ -166,7 +166,7 @@ def test_both_sides_may_diverge(tmp_path: Path) -> None:
     )
     one, two = run_sides(Request(("droop",), model=str(path))).traces
     found = compare_traces(one, two)
-    assert found.one.trace.header.ended
-    assert found.two.trace.header.ended
+    assert found.left.trace.header.ended
+    assert found.right.trace.header.ended
     headline = report.page(found).headline
     assert "ended early" in headline.text

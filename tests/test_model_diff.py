@@ -105,7 +105,7 @@ def test_a_shifted_zero_is_told_from_a_turned_frame(pair: Pair) -> None:
     """0.3 rad of the frame are about the joint's own axis: 0.25 more are its zero."""
     (found,) = _differ(compare(*pair({"upper_rpy": "0 0 0.55"})))
     assert_has(
-        found, subject="places", where="shoulder", figure="zero position", two=pytest.approx(0.25)
+        found, subject="places", where="shoulder", figure="zero position", right=pytest.approx(0.25)
     )
     # The tool is 0.32 m away from the axis of the shoulder, and turns with it.
     assert re.fullmatch(r"moves what it carries by up to \d+(\.\d+)? mm", found.effect)
@@ -127,8 +127,8 @@ def test_what_a_urdf_cannot_say_is_not_zero(pair: Pair) -> None:
             )
         )
     )
-    assert all(each.one is None for each in found)
-    said = {(d.subject, d.figure): d.two for d in found}
+    assert all(each.left is None for each in found)
+    said = {(d.subject, d.figure): d.right for d in found}
     assert said == {
         ("armature", ""): 0.028,
         ("drive", "drive"): "position",
@@ -160,13 +160,13 @@ def test_the_public_pair(pair: Pair) -> None:
     found = compare(one, two)
     by = {(d.subject, d.where, d.figure): d for d in found.differences}
     limit, effort = by["limits", "wrist_roll", "upper"], by["effort", "wrist_roll", ""]
-    assert (limit.one, limit.two, limit.effect) == (2.841, 2.744, "the left goes 5.56° further")
-    assert (effort.one, effort.two, effort.effect) == (10, 2.94, "3.4 times")
+    assert (limit.left, limit.right, limit.effect) == (2.841, 2.744, "the left goes 5.56° further")
+    assert (effort.left, effort.right, effort.effect) == (10, 2.94, "3.4 times")
     frame = "gripper_frame_link, gripperframe"
     assert {part: by["tool frame", frame, part].size for part in ("origin", "axes")} == {
         "origin": pytest.approx(0.0199), "axes": pytest.approx(math.pi / 2)
     }  # fmt: skip
-    assert (by["damping", "elbow", ""].one, by["armature", "elbow", ""].two) == (None, 0.028)
+    assert (by["damping", "elbow", ""].left, by["armature", "elbow", ""].right) == (None, 0.028)
     assert found.posed.distance < 1e-12  # where the joints are, they agree
 
 
@@ -179,7 +179,7 @@ def test_our_own_urdf_holds_all_that_a_urdf_can() -> None:
     whole = {raw.joint(i).name: raw.dof_M0[i] for i in range(6)}
     assert len(armature) == 6
     for each in armature:
-        assert_has(each, two=0.028, share=pytest.approx(0.028 / whole[each.where], rel=1e-9))
+        assert_has(each, right=0.028, share=pytest.approx(0.028 / whole[each.where], rel=1e-9))
     assert armature[0].where == "gripper"  # the lightest: it weighs most
     assert result.posed.distance < 1e-12
     assert result.mass[0] == pytest.approx(float(raw.body_mass.sum()), rel=1e-15)
@@ -334,14 +334,14 @@ def test_joints_that_may_be_one_are_suggested(pair: Pair) -> None:
 def test_the_order_of_the_two_is_only_an_order(pair: Pair) -> None:
     one, two = pair({"roll_high": 2.841, "effort": 10.0}, {"armature": 0.028, "kp": 50.0})
     there, back = _differ(compare(one, two)), _differ(compare(two, one))
-    assert sorted((d.subject, d.where, d.figure, str(d.one), str(d.two)) for d in there) == sorted(
-        (d.subject, d.where, d.figure, str(d.two), str(d.one)) for d in back
-    )
+    assert sorted(
+        (d.subject, d.where, d.figure, str(d.left), str(d.right)) for d in there
+    ) == sorted((d.subject, d.where, d.figure, str(d.right), str(d.left)) for d in back)
 
 
 def test_parts_of_one_only(tmp_path: Path) -> None:
     result = compare("so101/scene_box", "so101")
-    said = {(d.subject, d.where): (d.one, d.two) for d in _differ(result)}
+    said = {(d.subject, d.where): (d.left, d.right) for d in _differ(result)}
     assert said["shapes", "world: floor"] == ("plane", "nothing")
     ((_, box),) = [(k, v) for k, v in said.items() if k[0] == "structure"]
     assert box[1] == "nothing"
@@ -398,11 +398,11 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
     texts |= {f"{name}.urdf": text.format(name) for name in ("cube", "big", "gone")}
     written_all(tmp_path, texts)
     found = {d.figure: d for d in _differ(compare(tmp_path / "cube.urdf", tmp_path / "big.urdf"))}
-    assert_has(found["volume"], one=pytest.approx(1e-3), two=pytest.approx(1.331e-3))
+    assert_has(found["volume"], left=pytest.approx(1e-3), right=pytest.approx(1.331e-3))
     assert found["ends at +x"].size == pytest.approx(0.005)
     assert compare(tmp_path / "cube.urdf", tmp_path / "cube.urdf").equal
     gone = compare(tmp_path / "cube.urdf", tmp_path / "gone.urdf")
-    assert any("gone.stl' of link 'a' is not there" in note for note in gone.two.notes)
+    assert any("gone.stl' of link 'a' is not there" in note for note in gone.right.notes)
 
 
 @pytest.mark.parametrize(
@@ -473,8 +473,8 @@ def test_an_mjcf_goes_on_without_its_meshes(pair: Pair) -> None:
     two.write_text(text)
     result = compare(one, two)
     (found,) = _differ(result)
-    assert (found.where, found.one, found.two) == ("hand: mesh", "nothing", "mesh")
-    assert any("gone.stl are not there" in note for note in result.two.notes)
+    assert (found.where, found.left, found.right) == ("hand: mesh", "nothing", "mesh")
+    assert any("gone.stl are not there" in note for note in result.right.notes)
     two.write_text(text.replace("<worldbody>", "<worldbody><nonsense/>"))
     refused((ModelError, "nonsense", lambda: compare(one, two)))
 
@@ -499,7 +499,7 @@ def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
 def test_what_the_engines_make_of_a_urdf() -> None:
     path = models_dir() / "so101" / "so101.urdf"
     found = _differ(compare(path, path, engines=("mujoco", "pybullet")))
-    said = {(d.subject, d.figure): (d.one, d.two) for d in found}
+    said = {(d.subject, d.figure): (d.left, d.right) for d in found}
     assert said["structure", "base"] == ("stands", "floats")
     assert said["settings", "gravity"] == ((0.0, 0.0, -9.81), (0.0, 0.0, 0.0))
     assert said["settings", "timestep"] == (0.002, pytest.approx(1 / 240))
@@ -564,7 +564,7 @@ def _pendula(folder: Path, **changes: str) -> list[Figures]:
 
 
 @pytest.mark.parametrize(
-    ("change", "subject", "figure", "one", "two", "size"),
+    ("change", "subject", "figure", "left", "right", "size"),
     [
         ({"option": 'timestep="0.004"'}, "settings", "timestep", 0.002, 0.004, 0.002),
         ({"option": 'cone="elliptic"'}, "settings", "cone", "pyramidal", "elliptic", None),
@@ -586,15 +586,19 @@ def test_each_difference_between_two_mjcf(
     change: dict[str, str],
     subject: str,
     figure: str,
-    one: object,
-    two: object,
+    left: object,
+    right: object,
     size: float | None,
 ) -> None:
     (found,) = _pendula(tmp_path, **change)
     assert (found.subject, found.figure) == (subject, figure)
-    assert found.one == pytest.approx(one) if not isinstance(one, str) else found.one == one
-    if two is not None:
-        assert found.two == pytest.approx(two) if not isinstance(two, str) else found.two == two
+    assert found.left == pytest.approx(left) if not isinstance(left, str) else found.left == left
+    if right is not None:
+        assert (
+            found.right == pytest.approx(right)
+            if not isinstance(right, str)
+            else found.right == right
+        )
     assert found.size == (None if size is None else pytest.approx(size))
 
 
@@ -630,7 +634,7 @@ def test_what_a_difference_does_is_a_closed_form(
 def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
     limited = 'kp="50" kv="1" forcerange="-4 4" gear="2"'
     found = {d.figure: d for d in _pendula(tmp_path, gains=limited)}
-    assert_has(found["forcerange"], two=(-4.0, 4.0), effect="at most unlimited / at most 8 N·m")
+    assert_has(found["forcerange"], right=(-4.0, 4.0), effect="at most unlimited / at most 8 N·m")
     assert found["gear"].size == 1.0
 
 

@@ -79,7 +79,7 @@ def test_a_file_that_does_not_compile_has_its_description(tmp_path):
     right = changed(ARM, ALONE["damping"]).replace("<worldbody>", gone)
     right = right.replace('<site name="tip"', '<geom type="mesh" mesh="gone"/><site name="tip"')
     rows = {row.subject: row for row in _listed(tmp_path, right)}
-    assert_has(rows["damping"], causes=(), one=0.1, two=0.2)
+    assert_has(rows["damping"], causes=(), left=0.1, right=0.2)
 
 
 _CYLINDER = '<geom name="lower_shape" type="capsule" size="0.02"'
@@ -111,8 +111,8 @@ _ELBOW_DRIVE = '<position name="elbow" joint="elbow" kp="20" kv="1"/>'
 )
 def test_a_row_names_what_differs_and_never_two_equal_values(left, right, figure, values, tmp_path):
     rows = _listed(tmp_path, ARM.replace(*right), ARM.replace(*left))
-    assert (figure, values) in [(row.figure, (row.one, row.two)) for row in rows]
-    assert all(row.one != row.two for row in rows)
+    assert (figure, values) in [(row.figure, (row.left, row.right)) for row in rows]
+    assert all(row.left != row.right for row in rows)
 
 
 def test_what_is_carried_by_another_part_cannot_be_brought_over(tmp_path):
@@ -124,8 +124,8 @@ def test_what_is_carried_by_another_part_cannot_be_brought_over(tmp_path):
     (row,) = [row for row in _listed(tmp_path, right, left) if row.figure == "hangs on"]
     assert_has(
         row,
-        one="world",
-        two="lower",
+        left="world",
+        right="lower",
         causes=("parent of ball",),
         refused="it hangs on another part",
     )

@@ -370,7 +370,7 @@ class TestReleases:
         versions = ("--versions", "3.3.7," + SAME.partition("==")[2], "--model", "so101")
         assert main(["compare", "hold", *versions, "--json"]) == SAYS_NO
         (found,) = json.loads(capsys.readouterr().out)
-        assert [side["run"]["backend"] for side in (found["one"], found["two"])] == [
+        assert [side["run"]["backend"] for side in (found["left"], found["right"])] == [
             OLD,
             "mujoco",
         ]
@@ -398,7 +398,7 @@ class TestReleases:
         asked = ("--versions", "3.3.7", "--bisect", "--model", "so101", "--json")
         assert main(["compare", "hold", *asked]) == SAYS_NO
         pairs = [
-            (pair["one"]["run"]["backend"], pair["two"]["run"]["backend"], pair["agrees"])
+            (pair["left"]["run"]["backend"], pair["right"]["run"]["backend"], pair["agrees"])
             for pair in json.loads(capsys.readouterr().out)
         ]
         assert pairs == [(OLD, OLD, True), (OLD, SAME, False), (SAME, "mujoco", True)]

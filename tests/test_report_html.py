@@ -416,15 +416,15 @@ def test_who_presses_on_what(hold: Made) -> None:
     late = one["contact_row"] >= 360  # the last tenth of 401 rows
     mean = float(one["contact_force"][late, 0].sum()) / 41
     assert touch.pair == "gripper on floor"
-    assert_has(touch.one, force=pytest.approx(mean), deepest=-float(one["contact_dist"].min()))
+    assert_has(touch.left, force=pytest.approx(mean), deepest=-float(one["contact_dist"].min()))
     whole = total_forces(one)["gripper on floor"][360:]
-    assert touch.one.total == pytest.approx(whole.mean())
+    assert touch.left.total == pytest.approx(whole.mean())
     assert whole.mean() > mean
     # A side that never touches.
     bare = edited(
         two, None, **{n: a[:0] for n, a in two.columns.items() if n.startswith("contact")}
     )
-    assert touches(one, bare)[0].two.first is None
+    assert touches(one, bare)[0].right.first is None
     assert "never touches" in page_of(of_look(one, bare, hold[3]))
 
 

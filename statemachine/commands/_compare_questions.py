@@ -184,15 +184,15 @@ def explain(options: argparse.Namespace, request: Any, progress: Any) -> Any:
     else:
         asked, traces = request.scenario(), ()
         sides = request.sides or request.on_backends(asked.model)
-    left, right = (side.label for side in sides)
+    left_label, right_label = (side.label for side in sides)
     sides, given = with_options(sides, {**asked.options, **request.options})
-    one, two = (side.load() for side in sides)
+    left, right = (side.load() for side in sides)
     return why.explain(
-        one,
-        two,
+        left,
+        right,
         replace(asked, options=given),
         recordings=[
-            for_left(t, model, request) for t, model in zip(traces, (one, two), strict=False)
+            for_left(t, model, request) for t, model in zip(traces, (left, right), strict=False)
         ],
         seconds=request.seconds,
         seed=request.seed,
@@ -201,7 +201,7 @@ def explain(options: argparse.Namespace, request: Any, progress: Any) -> Any:
         measure=options.measure or "worst",
         finer=options.finer,
         budget=200 if options.budget is None else options.budget,
-        labels=None if left == right else (left, right),
+        labels=None if left_label == right_label else (left_label, right_label),
         uncertain=None if options.no_chaos else parse_uncertainty(options.uncertainty),
         jobs=options.jobs,
         progress=progress,

@@ -193,7 +193,6 @@ def request_of(options: argparse.Namespace) -> Any:
     """What was asked for, as a Request."""
     from ..compare import Request, split_words
 
-    one, two = options.backends or PAIR
     what, sides = split_words(options.what, options.menagerie)
     _check_sides(options, what, sides)
     names = pairs_of(options.map, "--map")
@@ -204,7 +203,7 @@ def request_of(options: argparse.Namespace) -> Any:
         sides = left.taking(taken[1], right, back), right.taking(taken[0], left, names)
     return Request(
         what=what,
-        backends=(one, two),
+        backends=options.backends or PAIR,
         defaults=options.defaults,
         model=options.model,
         menagerie=options.menagerie,

@@ -114,7 +114,7 @@ class Comparison:
     """Two traces, compared.
 
     Attributes:
-        one, two: The sides; every difference is between them, none is the truth.
+        left, right: The sides; every difference is between them, none is the truth.
         tip: The site that was compared; "" for none.
         moments: How many moments were compared; until: the last of them [s].
         agreements: One for each quantity.
@@ -123,8 +123,8 @@ class Comparison:
         curves: The quantities over time; first touches have none.
     """
 
-    one: SideRun
-    two: SideRun
+    left: SideRun
+    right: SideRun
     tip: str
     moments: int
     until: float
@@ -143,7 +143,7 @@ class Comparison:
     @property
     def ended(self) -> bool:
         """Whether a side ended before its time: nobody knows what it would have done."""
-        return bool(self.one.trace.header.ended or self.two.trace.header.ended)
+        return bool(self.left.trace.header.ended or self.right.trace.header.ended)
 
     @property
     def worst(self) -> Agreement | None:
@@ -152,8 +152,8 @@ class Comparison:
 
 
 def compare(
-    one: Trace,
-    two: Trace,
+    left: Trace,
+    right: Trace,
     *,
     tolerances: Mapping[str, float] | None = None,
     tip: str | None = None,
@@ -161,42 +161,42 @@ def compare(
     """Compare two traces of models with the same names.
 
     Args:
-        one: A trace.
-        two: Another, of any engine; timesteps may differ.
+        left: A trace.
+        right: Another, of any engine; timesteps may differ.
         tolerances: By kind of quantity [SI], instead of ours.
         tip: The site to compare; by default gripperframe, else the last one.
 
     Raises:
         TraceError: They share no joint, or too few moments.
     """
-    site = default_tip(one.header, two.header) if tip is None else tip
-    curves, pairs = series(one, two, site), touches(one, two)
+    site = default_tip(left.header, right.header) if tip is None else tip
+    curves, pairs = series(left, right, site), touches(left, right)
     if not any(QUANTITIES[curve.kind].own for curve in curves):
         raise TraceError("the traces have no joint in common: nothing can be compared")
-    longest = max(one.timestep, two.timestep)
+    longest = max(left.timestep, right.timestep)
     agreements = []
     for curve in curves:
-        reach = max(_reach(one, curve), _reach(two, curve)) if curve.kind == "tip" else 0.0
-        allowed = tolerance_of(curve.kind, curve.one, curve.two, reach, longest, tolerances)
+        reach = max(_reach(left, curve), _reach(right, curve)) if curve.kind == "tip" else 0.0
+        allowed = tolerance_of(curve.kind, curve.left, curve.right, reach, longest, tolerances)
         agreements.append(_agreement(curve.name, curve.kind, curve.difference, curve.time,
                                 _settled(curve), allowed))  # fmt: skip
-    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
-    labels = labels_of(one.header, two.header)
+    common = common_moments(left.time, right.time, (left.timestep, right.timestep))
+    labels = labels_of(left.header, right.header)
     allowed = tolerance_of("contact", common.time, common.time, 0.0, longest, tolerances)
-    agreements += _first_touches(one, two, pairs, float(common.time[-1]), allowed, labels.short)
+    agreements += _first_touches(left, right, pairs, float(common.time[-1]), allowed, labels.short)
     strange = [
         f"{agreement.name}: {agreement.note}, so it cannot agree"
         for agreement in agreements
         if agreement.note.startswith("no number")
     ]
     return Comparison(
-        one=SideRun(labels.long[0], labels.short[0], one),
-        two=SideRun(labels.long[1], labels.short[1], two),
+        left=SideRun(labels.long[0], labels.short[0], left),
+        right=SideRun(labels.long[1], labels.short[1], right),
         tip=site,
         moments=len(curves[0].time),
         until=float(curves[0].time[-1]),
         agreements=tuple(agreements),
-        notes=tuple(notes_on(one, two, common, strange)),
+        notes=tuple(notes_on(left, right, common, strange)),
         touches=pairs,
         curves=curves,
     )
@@ -207,7 +207,7 @@ def _settled(curve: Series) -> float:
     tail = at_the_end(curve.time)
     # Of a force the mean counts: stiff contacts ring from step to step.
     if curve.kind == "force":
-        return abs(float(curve.one[tail].mean()) - float(curve.two[tail].mean()))
+        return abs(float(curve.left[tail].mean()) - float(curve.right[tail].mean()))
     return float(curve.difference[tail].mean())
 
 
@@ -249,17 +249,19 @@ def _agreement(
 
 
 def _first_touches(
-    one: Trace, two: Trace, pairs: Sequence[Figures], until: float, allowed: Tolerance,
+    left: Trace, right: Trace, pairs: Sequence[Figures], until: float, allowed: Tolerance,
     labels: tuple[str, str],
 ) -> list[Agreement]:  # fmt: skip
     """When each pair of bodies first touches, on either side."""
     agreements = []
     for touch in pairs:
-        first, note = [touch.one.first, touch.two.first], ""
+        first, note = [touch.left.first, touch.right.first], ""
         known = [time for time in first if time is not None]
         if len(known) == 1:  # as late as can be: it had not touched when the comparison ended
             side = first.index(None)
-            known_pairs = same_pairs({touch.pair: None}, dict.fromkeys((one, two)[side].touches()))
+            known_pairs = same_pairs(
+                {touch.pair: None}, dict.fromkeys((left, right)[side].touches())
+            )
             note = f"{'later' if touch.pair in known_pairs else 'never'} {on(labels[side])}"
             known.append(until)
         gap = abs(known[0] - known[1])
@@ -268,18 +270,18 @@ def _first_touches(
     return agreements
 
 
-def witness(one: Trace, two: Trace, path: Path | None = None) -> Figures | None:
+def witness(left: Trace, right: Trace, path: Path | None = None) -> Figures | None:
     """Pinocchio's forward kinematics of each trace's qpos, against the recorded site.
 
     Args:
-        one: A trace.
-        two: Another, of the same model.
+        left: A trace.
+        right: Another, of the same model.
         path: The model's file; by default the one that the headers name.
 
     Returns:
         by: The witness and its version.
         site: Which site.
-        one: Largest distance at any row of the first trace [m]; two: of the second.
+        left: Largest distance at any row of the first trace [m]; right: of the second.
         rows: How many poses were compared.
         grade: "own reading" if the witness read the model's file with its own parser, "same
             reading" if it computed from the numbers that the file was compiled to.
@@ -287,18 +289,18 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Figures | None:
         None where Pinocchio is missing, where neither it nor an engine that is here can read
         the model, and where the file that the traces were recorded with is not here.
     """
-    site = default_tip(one.header, two.header)
-    if not site or "site_xpos" not in one or "site_xpos" not in two:
+    site = default_tip(left.header, right.header)
+    if not site or "site_xpos" not in left or "site_xpos" not in right:
         return None
-    ours, theirs = (trace.header.provenance.model_sha256 for trace in (one, two))
+    ours, theirs = (trace.header.provenance.model_sha256 for trace in (left, right))
     if path is None and ours != theirs:
         return None  # one model cannot be the witness of two
     try:
-        file, same = (path, True) if path else model_file(one.header)
+        file, same = (path, True) if path else model_file(left.header)
         if not same:
             return None
-        kinematics = _readable(file, one.header, site)
-        first, second = (_gap(kinematics, trace, site) for trace in (one, two))
+        kinematics = _readable(file, left.header, site)
+        first, second = (_gap(kinematics, trace, site) for trace in (left, right))
         if not np.isfinite([first, second]).all():
             return None
     except StateMachineError:
@@ -306,9 +308,9 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Figures | None:
     return Figures(
         by=f"{WITNESS} {kinematics.version}",
         site=site,
-        one=first,
-        two=second,
-        rows=len(one) + len(two),
+        left=first,
+        right=second,
+        rows=len(left) + len(right),
         grade=kinematics.grade,
     )
 

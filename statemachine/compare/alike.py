@@ -25,22 +25,22 @@ def called(trace: Trace, file: str) -> Trace:
 
 
 def match_sides(
-    sides: Sequence[Side], one: Model, two: Model, names: Mapping[str, str]
+    sides: Sequence[Side], left: Model, right: Model, names: Mapping[str, str]
 ) -> Matched | None:
     """Which is which; None for one file, of which every engine has the same ids."""
-    left, right = sides
-    if left.path == right.path and not names and one.joint_names == two.joint_names:
+    left_side, right_side = sides
+    if left_side.path == right_side.path and not names and left.joint_names == right.joint_names:
         return None
-    matched = match_models(one, two, names)
-    if not matched.joints and one.njnt and two.njnt:
+    matched = match_models(left, right, names)
+    if not matched.joints and left.njnt and right.njnt:
         raise TraceError(
-            f"{left.label} and {right.label} have no joint in common, by name or by place: name "
-            "one with --map LEFT=RIGHT"
+            f"{left_side.label} and {right_side.label} have no joint in common, by name or by "
+            "place: name one with --map LEFT=RIGHT"
         )
     return matched
 
 
-def named_as_left(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
+def named_as_left(left: Trace, right: Trace, matched: Matched) -> tuple[Trace, Trace]:
     """Both runs with the names of the first; commands in its order where both have all of them.
 
     What a joint, body or site of the first is called, its counterpart is called too. One
@@ -48,11 +48,11 @@ def named_as_left(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trac
     energies, which are of all that can move, are left out.
 
     Args:
-        one: A run of the first Model.
-        two: A run of the second.
+        left: A run of the first Model.
+        right: A run of the second.
         matched: Which is which.
     """
-    a, b = one.header, two.header
+    a, b = left.header, right.header
     joints, bodies = a.joint_labels, a.body_labels
     renamed: dict[str, Any] = {
         "joints": _renamed(joints, b.joint_labels, matched.joints),
@@ -60,7 +60,7 @@ def named_as_left(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trac
         "sites": _renamed(a.sites, b.sites, matched.sites),
         "actuators": _renamed(a.actuators, b.actuators, matched.actuators),
     }
-    ours, columns = dict(one.columns), dict(two.columns)
+    ours, columns = dict(left.columns), dict(right.columns)
     if any(only.get("joint") for only in matched.only):
         for side in (ours, columns):
             side.pop("energy", None)
@@ -87,7 +87,7 @@ def translated(trace: Trace, matched: Matched, start: tuple[Array, Array, Array]
             counterpart of.
     """
     recorded = SideStart(trace.qpos, trace.qvel, trace.ctrl)
-    return replace_layout(trace, matched.two, *matched.start(recorded, SideStart(*start)))
+    return replace_layout(trace, matched.right, *matched.start(recorded, SideStart(*start)))
 
 
 def for_left(trace: Trace, model: Model, request: Request) -> Trace:
@@ -149,8 +149,8 @@ def _renamed(ours: Sequence[str], theirs: Sequence[str], pairs: Pairs) -> tuple[
     for k, name in enumerate(names):
         if name and name in ours:
             names[k] = f"{name} (right)"
-    for one, two in pairs:
-        names[two] = ours[one]
+    for left, right in pairs:
+        names[right] = ours[left]
     return tuple(names)
 
 

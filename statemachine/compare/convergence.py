@@ -69,19 +69,19 @@ def convergence(
                     f"with steps {finer} times finer, {trace.header.label} ended early: "
                     f"{trace.header.ended}"
                 )
-    one, two = runs[0]
-    tip = default_tip(one.header, two.header)
-    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
+    left, right = runs[0]
+    tip = default_tip(left.header, right.header)
+    common = common_moments(left.time, right.time, (left.timestep, right.timestep))
     time = common.time
     # Of the pairs of sides; then of each side's first runs and its finest.
     between = [_gaps(a, b, tip) for a, b in runs]
     own = [
         [_gaps(pair[side], runs[-1][side], tip, rows) for pair in runs[:-1]]
-        for side, rows in ((0, common.one), (1, common.two))
+        for side, rows in ((0, common.left), (1, common.right))
     ]
     curves = [
         curve
-        for curve in series(one, two, tip)
+        for curve in series(left, right, tip)
         if curve.kind != "force" and all(curve.name in gaps for gaps in between)
     ]
     firsts = [
@@ -97,10 +97,10 @@ def convergence(
         for chosen in (np.ones(len(time), dtype=bool), early)
     )
     return Figures(
-        labels=labels_of(one.header, two.header).long,
+        labels=labels_of(left.header, right.header).long,
         steps=(
-            one.header.timestep / one.header.substeps,
-            two.header.timestep / two.header.substeps,
+            left.header.timestep / left.header.substeps,
+            right.header.timestep / right.header.substeps,
         ),
         until=float(time[-1]),
         touch=touch,
@@ -110,8 +110,10 @@ def convergence(
     )
 
 
-def _gaps(one: Trace, two: Trace, tip: str, rows: Ints | slice = slice(None)) -> dict[str, Array]:
-    return {curve.name: curve.difference[rows] for curve in series(one, two, tip)}
+def _gaps(
+    left: Trace, right: Trace, tip: str, rows: Ints | slice = slice(None)
+) -> dict[str, Array]:
+    return {curve.name: curve.difference[rows] for curve in series(left, right, tip)}
 
 
 def _limit(
@@ -138,7 +140,7 @@ def _limit(
     left, right = (
         [float(run[name][chosen].max()) if name in run else np.nan for run in side] for side in own
     )
-    values = curve.one[chosen] if curve.one.size else np.ones(1)
+    values = curve.left[chosen] if curve.left.size else np.ones(1)
     rounding = _ROUNDING * max(1.0, float(np.abs(values).max()))
     limit = max(0.0, 2 * gaps[2] - gaps[1])
     return Figures(

@@ -38,15 +38,17 @@ class Labels(NamedTuple):
     short: Two
 
 
-def labels_of(one: Header, two: Header) -> Labels:
+def labels_of(left: Header, right: Header) -> Labels:
     """The names of two runs."""
-    engines = one.label, two.label
-    others = list(_apart(one, two))
-    backends = one.backend, two.backend
-    own = [", engine defaults" * (header.defaults == "engine") for header in (one, two)]
+    engines = left.label, right.label
+    others = list(_apart(left, right))
+    backends = left.backend, right.backend
+    own = [", engine defaults" * (header.defaults == "engine") for header in (left, right)]
     ways = backends[0] + own[0], backends[1] + own[1]
     # The first by which they differ.
-    short = next((two for two in (backends, ways, *others, engines) if two[0] != two[1]), ways)
+    short = next(
+        (right for right in (backends, ways, *others, engines) if right[0] != right[1]), ways
+    )
     parts = [*([engines] if engines[0] != engines[1] or not others else []), *others]
     long = ", ".join(part[0] for part in parts), ", ".join(part[1] for part in parts)
     return Labels(numbered(long), numbered(short))
@@ -66,27 +68,27 @@ def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterato
             yield f"only {label} has {'; '.join(parts)}: not compared"
 
 
-def files_apart(one: Sequence[str], two: Sequence[str]) -> Two:
+def files_apart(left: Sequence[str], right: Sequence[str]) -> Two:
     """The shortest ends of two paths, given by their parts, that are not the same."""
-    counts = range(1, max(len(one), len(two)) + 1)
-    differing = (count for count in counts if one[-count:] != two[-count:])
+    counts = range(1, max(len(left), len(right)) + 1)
+    differing = (count for count in counts if left[-count:] != right[-count:])
     count = next(differing, 1)
-    return "/".join(one[-count:]), "/".join(two[-count:])
+    return "/".join(left[-count:]), "/".join(right[-count:])
 
 
-def options_apart(one: Mapping[str, Any], two: Mapping[str, Any]) -> Two:
+def options_apart(left: Mapping[str, Any], right: Mapping[str, Any]) -> Two:
     """The options that differ, as they are typed; what a side does not say is of its file."""
     differing = [
         name
-        for name in dict.fromkeys([*one, *two])
-        if typed_option(name, one.get(name)) != typed_option(name, two.get(name))
+        for name in dict.fromkeys([*left, *right])
+        if typed_option(name, left.get(name)) != typed_option(name, right.get(name))
     ]
     texts = [
         ", ".join(
             typed_option(name, options[name]) if name in options else f"{name} of the file"
             for name in differing
         )
-        for options in (one, two)
+        for options in (left, right)
     ]
     return texts[0], texts[1]
 
@@ -101,22 +103,22 @@ def typed_option(name: str, value: Any) -> str:
     return f"{name}={','.join(f'{number:.15g}' for number in np.atleast_1d(value))}"
 
 
-def _apart(one: Header, two: Header) -> Iterator[Two]:
+def _apart(left: Header, right: Header) -> Iterator[Two]:
     """What differs besides the engine, the weightiest first."""
-    a, b = one.provenance, two.provenance
+    a, b = left.provenance, right.provenance
     if a.model_file != b.model_file:
         yield files_apart(a.model_file.split("/"), b.model_file.split("/"))
     elif a.model_sha256 != b.model_sha256:
         last = a.model_file.split("/")[-1]
         yield f"{last} ({a.model_sha256[:8]})", f"{last} ({b.model_sha256[:8]})"
-    options = options_apart(*(_with_known(*pair) for pair in ((one, two), (two, one))))
+    options = options_apart(*(_with_known(*pair) for pair in ((left, right), (right, left))))
     if options[0] != options[1]:
         yield options
-    if one.backend != two.backend or one.label != two.label:
+    if left.backend != right.backend or left.label != right.label:
         return
     for name, values in (
-        ("", (one.experiment, two.experiment)),
-        ("from ", (one.keyframe or "the default state", two.keyframe or "the default state")),
+        ("", (left.experiment, right.experiment)),
+        ("from ", (left.keyframe or "the default state", right.keyframe or "the default state")),
         ("seed ", (a.seed, b.seed)),
     ):
         if values[0] != values[1]:
@@ -143,25 +145,25 @@ def numbered(names: Two) -> Two:
 Note = tuple[object, str]
 
 
-def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str]) -> list[str]:
+def notes_on(left: Trace, right: Trace, common: Common, of_quantities: Iterable[str]) -> list[str]:
     """A line for each thing that a reader of the figures must know.
 
     Args:
-        one: A trace.
-        two: The other.
+        left: A trace.
+        right: The other.
         common: The moments that they share.
         of_quantities: What is to be said of single quantities.
     """
-    a, b = one.header, two.header
+    a, b = left.header, right.header
     labels = labels_of(a, b).long
     columns = dict.fromkeys(
         what
         for column, what in _COMPARED.items()
-        if not tell(one, two, column) and (column in one or column in two)
+        if not tell(left, right, column) and (column in left or column in right)
     )
     # The command of a last row is never carried out.
-    used = (common.one < len(one) - 1) & (common.two < len(two) - 1)
-    commands = one.ctrl[common.one[used]], two.ctrl[common.two[used]]
+    used = (common.left < len(left) - 1) & (common.right < len(right) - 1)
+    commands = left.ctrl[common.left[used]], right.ctrl[common.right[used]]
     same = a.actuators == b.actuators
     notes: list[Note] = [
         (
@@ -169,14 +171,14 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
             f"the two sides use different model files: {a.provenance.model_file} and "
             f"{b.provenance.model_file}",
         ),
-        *_of_joints(one, two, labels),
+        *_of_joints(left, right, labels),
         (columns, f"not compared, for one side does not tell it: {', '.join(columns)}"),
         *((True, line) for line in of_quantities),
         (
             a.experiment != b.experiment,
             f"the experiments are two: {a.experiment} and {b.experiment}",
         ),
-        *_of_time(one, two, common, labels),
+        *_of_time(left, right, common, labels),
         (
             not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12),
             f"gravity differs: {numbers(a.gravity)} and {numbers(b.gravity)} m/s²",
@@ -192,7 +194,7 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
             "the commands differ: the controllers saw different states, or are two",
         ),
     ]
-    for trace, label in zip((one, two), labels, strict=True):
+    for trace, label in zip((left, right), labels, strict=True):
         header, inside = trace.header, few(trace.overlaps)
         notes += [
             (inside, f"{label} starts with shapes inside each other: {inside}"),
@@ -210,8 +212,8 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
     return [line for said, line in notes if said]
 
 
-def _of_joints(one: Trace, two: Trace, labels: Two) -> list[Note]:
-    a, b = one.header, two.header
+def _of_joints(left: Trace, right: Trace, labels: Two) -> list[Note]:
+    a, b = left.header, right.header
     only = [
         f"{name} ({label})"
         for header, other, label in ((a, b, labels[0]), (b, a, labels[1]))
@@ -225,8 +227,8 @@ def _of_joints(one: Trace, two: Trace, labels: Two) -> list[Note]:
     }
     other = [name for name, (x, y) in shared.items() if x.kind is not y.kind]
     moved = any(
-        not np.array_equal(one.qpos[0, x.qpos], two.qpos[0, y.qpos])
-        or not np.array_equal(one.qvel[0, x.qvel], two.qvel[0, y.qvel])
+        not np.array_equal(left.qpos[0, x.qpos], right.qpos[0, y.qpos])
+        or not np.array_equal(left.qvel[0, x.qvel], right.qvel[0, y.qvel])
         for x, y in shared.values()
         if x.kind is y.kind
     )
@@ -237,10 +239,10 @@ def _of_joints(one: Trace, two: Trace, labels: Two) -> list[Note]:
     ]
 
 
-def _of_time(one: Trace, two: Trace, common: Common, labels: Two) -> list[Note]:
-    steps = [trace.header.timestep for trace in (one, two)]
+def _of_time(left: Trace, right: Trace, common: Common, labels: Two) -> list[Note]:
+    steps = [trace.header.timestep for trace in (left, right)]
     apart = float(common.time[-1]) / max(1, len(common.time) - 1)
-    ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
+    ends = [float(trace.time[-1] - trace.time[0]) for trace in (left, right)]
     return [
         (
             steps[0] != steps[1],

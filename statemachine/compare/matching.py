@@ -34,14 +34,14 @@ class Matched(Counterparts):
     """What of one Model is what of another.
 
     Attributes:
-        one, two: The Models.
+        left, right: The Models.
         bodies: Pairs of ids.
         only: For each Model what it alone has: names, by "joint", "site" and "actuator".
         notes: What a reader should know, in sentences.
     """
 
-    one: Model
-    two: Model
+    left: Model
+    right: Model
     bodies: Pairs
     only: tuple[Only, Only]
     notes: tuple[str, ...]
@@ -52,23 +52,23 @@ class Matched(Counterparts):
         places = [b for _, b in self.actuators]
         return places != sorted(places)
 
-    def start(self, one: SideStart, two: SideStart) -> SideStart:
-        """The start of the first Model in the second's terms; the rest is that of `two`."""
+    def start(self, left: SideStart, right: SideStart) -> SideStart:
+        """The start of the first Model in the second's terms; the rest is that of `right`."""
         return SideStart(
-            **{part: self.moved(part, getattr(one, part), getattr(two, part)) for part in INPUTS}
+            **{part: self.moved(part, getattr(left, part), getattr(right, part)) for part in INPUTS}
         )
 
-    def state(self, one: State, two: State) -> State:
-        """The second Model's State `two` with what a State of the first tells of it.
+    def state(self, left: State, right: State) -> State:
+        """The second Model's State `right` with what a State of the first tells of it.
 
         Beside the time these are the arrays in `places` that both have.
         """
         given = {
-            name: self.moved(name, one[name], two[name])
+            name: self.moved(name, left[name], right[name])
             for name in self.places
-            if name in dict(one.layout) and name in dict(two.layout)
+            if name in dict(left.layout) and name in dict(right.layout)
         }
-        return two.with_parts(time=one["time"], **given)
+        return right.with_parts(time=left["time"], **given)
 
     def moved(self, part: str, values: Array, start: Array) -> Array:
         """An array of the second Model, from that of the first.
@@ -86,18 +86,18 @@ class Matched(Counterparts):
 
         Activations are of actuators that have as many of them.
         """
-        compiled: tuple[Any, Any] = self.one.compiled, self.two.compiled
-        one, two = compiled
+        compiled: tuple[Any, Any] = self.left.compiled, self.right.compiled
+        left, right = compiled
         led = [
-            (int(one.body_mocapid[pair.left]), int(two.body_mocapid[pair.right]))
+            (int(left.body_mocapid[pair.left]), int(right.body_mocapid[pair.right]))
             for pair in self.solids
-            if one.body_mocapid[pair.left] >= 0 <= two.body_mocapid[pair.right]
+            if left.body_mocapid[pair.left] >= 0 <= right.body_mocapid[pair.right]
         ]
         return {
             "qpos": self._spans("jnt_qposadr", "nq"),
             "qvel": self._spans("jnt_dofadr", "nv"),
             "ctrl": _ends(self.actuators),
-            "act": _ends(_activations(self.actuators, one, two) if None not in compiled else ()),
+            "act": _ends(_activations(self.actuators, left, right) if None not in compiled else ()),
             "mocap_pos": _ends((3 * a + k, 3 * b + k) for a, b in led for k in range(3)),
             "mocap_quat": _ends((4 * a + k, 4 * b + k) for a, b in led for k in range(4)),
         }
@@ -105,7 +105,7 @@ class Matched(Counterparts):
     def _spans(self, start: str, end: str) -> list[list[int]]:
         """The places of the joints of both, in qpos or qvel."""
         places: list[list[int]] = [[], []]
-        for side, model in enumerate((self.one, self.two)):
+        for side, model in enumerate((self.left, self.right)):
             starts = [*getattr(model, start).tolist(), getattr(model, end)]
             for pair in self.joints:
                 places[side] += range(starts[pair[side]], starts[pair[side] + 1])
@@ -117,34 +117,34 @@ def _ends(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
     return [[a for a, _ in both], [b for _, b in both]]
 
 
-def _activations(actuators: Pairs, one: Any, two: Any) -> list[tuple[int, int]]:
+def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int]]:
     """Pairs of places in act."""
-    owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
+    owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (left, right)]
     pairs: set[tuple[int, int]] = set()
     for a, b in actuators:
         here, there = int(owner[0][a]), int(owner[1][b])
-        number = int(one.actuator_actnum[here])
-        if number == two.actuator_actnum[there]:
-            start = int(one.actuator_actadr[here]), int(two.actuator_actadr[there])
+        number = int(left.actuator_actnum[here])
+        if number == right.actuator_actnum[there]:
+            start = int(left.actuator_actadr[here]), int(right.actuator_actadr[there])
             pairs |= {(start[0] + k, start[1] + k) for k in range(number)}
     return sorted(pairs)
 
 
-def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None) -> Matched:
+def match_models(left: Model, right: Model, names: Mapping[str, str] | None = None) -> Matched:
     """Pair what two Models have.
 
     Args:
-        one: A Model.
-        two: Another, of any engine.
-        names: Joints, bodies, sites and actuators of `one` that go by other names in `two`.
+        left: A Model.
+        right: Another, of any engine.
+        names: Joints, bodies, sites and actuators of `left` that go by other names in `right`.
 
     Raises:
         UnknownNameError: A name that was given is not there.
         BadInputError: A backend tells nothing of the bodies of its Model.
     """
     given = dict(names or {})
-    robots = [_description(model) for model in (one, two)]
-    for side, model in enumerate((one, two)):
+    robots = [_description(model) for model in (left, right)]
+    for side, model in enumerate((left, right)):
         known = robots[side].names | {name for name in model.actuator_names if name}
         for pair in given.items():
             check_name(
@@ -159,34 +159,34 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
     joints = tuple(sorted((a.number, b.number) for a, b in moving if a.kind == b.kind))
     # A body with several joints is several parts of a description, of which the last has its mass.
     by_body = {solid.left: solid for solid in map(_solid, matching.pairs)}
-    solids = (*by_body.values(), *_led(one, two, given))
-    sites = _sites(one, two, given, matching, trees)
-    actuators = _actuators(one, two, joints, given)
+    solids = (*by_body.values(), *_led(left, right, given))
+    sites = _sites(left, right, given, matching, trees)
+    actuators = _actuators(left, right, joints, given)
     only = tuple(
         {
             "joint": _rest(model.joint_names, joints, k),
             "actuator": _rest(model.actuator_names, actuators, k),
             "site": _rest(model.site_names, sites, k),
         }
-        for k, model in enumerate((one, two))
+        for k, model in enumerate((left, right))
     )
     return Matched(
-        one=one,
-        two=two,
+        left=left,
+        right=right,
         joints=joints,
         bodies=_and_further(
             ((solid.left, solid.right) for solid in solids),
-            _by_name(one.body_names, two.body_names, given),
+            _by_name(left.body_names, right.body_names, given),
         ),
         sites=sites,
         actuators=actuators,
         solids=solids,
         only=(only[0], only[1]),
-        notes=(*matching.notes(), *_site_notes(one, two, sites, given)),
+        notes=(*matching.notes(), *_site_notes(left, right, sites, given)),
     )
 
 
-def match_alike(one: Model, two: Model) -> Matched:
+def match_alike(left: Model, right: Model) -> Matched:
     """Pair two Models of one file, of which a backend does not tell what the bodies are.
 
     Raises:
@@ -194,7 +194,7 @@ def match_alike(one: Model, two: Model) -> Matched:
     """
     pairs = {}
     for kind in ("joint", "body", "site", "actuator"):
-        names = getattr(one, f"{kind}_names"), getattr(two, f"{kind}_names")
+        names = getattr(left, f"{kind}_names"), getattr(right, f"{kind}_names")
         if names[0] != names[1]:
             raise BadInputError(
                 "a backend does not tell what the bodies of its models are, and they cannot be "
@@ -202,8 +202,8 @@ def match_alike(one: Model, two: Model) -> Matched:
             )
         pairs[kind] = tuple((k, k) for k in range(len(names[0])))
     return Matched(
-        one=one,
-        two=two,
+        left=left,
+        right=right,
         joints=pairs["joint"],
         bodies=pairs["body"],
         sites=pairs["site"],
@@ -228,14 +228,14 @@ def _solid(pair: Pair) -> BodyPair:
     return BodyPair(bodies[0], bodies[1], pair.align, pair.moved)
 
 
-def _led(one: Model, two: Model, given: Mapping[str, str]) -> list[BodyPair]:
+def _led(left: Model, right: Model, given: Mapping[str, str]) -> list[BodyPair]:
     """The mocap bodies: no joint moves them, but they are no part of the world; by name.
 
     Those without a name in both are one where as many others come before them.
     """
-    bodies = [np.flatnonzero(model.compiled.body_mocapid >= 0).tolist() for model in (one, two)]
+    bodies = [np.flatnonzero(model.compiled.body_mocapid >= 0).tolist() for model in (left, right)]
     ours, theirs = (
-        [m.body_names[b] for b in own] for m, own in zip((one, two), bodies, strict=True)
+        [m.body_names[b] for b in own] for m, own in zip((left, right), bodies, strict=True)
     )
     nameless = [(k, k) for k, names in enumerate(zip(ours, theirs, strict=False)) if not any(names)]
     pairs = sorted([*_by_name(ours, theirs, given), *nameless])
@@ -254,8 +254,8 @@ def _and_further(pairs: Iterable[tuple[int, int]], further: Iterable[tuple[int, 
 
 
 def _sites(
-    one: Model,
-    two: Model,
+    left: Model,
+    right: Model,
     given: Mapping[str, str],
     matching: Matching,
     trees: Sequence[GroupTree],
@@ -277,21 +277,21 @@ def _sites(
             return False
         return (pair.align @ place).distance(other) < _ONE_PLACE
 
-    places_of = product(range(one.nsite), range(two.nsite))
+    places_of = product(range(left.nsite), range(right.nsite))
     return _and_further(
-        _by_name(one.site_names, two.site_names, given), filter(in_one_place, places_of)
+        _by_name(left.site_names, right.site_names, given), filter(in_one_place, places_of)
     )
 
 
-def _actuators(one: Model, two: Model, joints: Pairs, given: Mapping[str, str]) -> Pairs:
+def _actuators(left: Model, right: Model, joints: Pairs, given: Mapping[str, str]) -> Pairs:
     """By name, then by the joint: the n-th of a joint is the n-th of its counterpart."""
     of_one_joint = (
         (a, b)
-        for a, joint in enumerate(one.actuator_jntid.tolist())
-        for b, other in enumerate(two.actuator_jntid.tolist())
+        for a, joint in enumerate(left.actuator_jntid.tolist())
+        for b, other in enumerate(right.actuator_jntid.tolist())
         if (joint, other) in joints
     )
-    return _and_further(_by_name(one.actuator_names, two.actuator_names, given), of_one_joint)
+    return _and_further(_by_name(left.actuator_names, right.actuator_names, given), of_one_joint)
 
 
 def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
@@ -299,9 +299,9 @@ def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
     return tuple(name or f"number {k}" for k, name in enumerate(names) if k not in taken)
 
 
-def _site_notes(one: Model, two: Model, sites: Pairs, given: Mapping[str, str]) -> Iterator[str]:
+def _site_notes(left: Model, right: Model, sites: Pairs, given: Mapping[str, str]) -> Iterator[str]:
     for a, b in sites:
-        name, other = one.site_names[a], two.site_names[b]
+        name, other = left.site_names[a], right.site_names[b]
         if name and name != other and given.get(name) != other:
             yield (
                 f"site {name!r} on the left is taken for {other!r} on the right: one place "
@@ -316,17 +316,17 @@ def _moved(values: Array, start: Array, here: Sequence[int], there: Sequence[int
     return rows
 
 
-def missing_parts(one: Model, two: Model) -> tuple[tuple[str, str], ...]:
+def missing_parts(left: Model, right: Model) -> tuple[tuple[str, str], ...]:
     """What one of two Models has nothing of, and the other has.
 
     Returns:
         Pairs: "left" or "right", who has none; and "actuators" or "floor".
     """
-    if one.compiled is None or two.compiled is None:
+    if left.compiled is None or right.compiled is None:
         return ()
-    left, right = (room(DEFAULT).counts(model.compiled) for model in (one, two))
+    left_counts, right_counts = (room(DEFAULT).counts(model.compiled) for model in (left, right))
     return tuple(
-        ("right" if left[part] else "left", part)
-        for part in left
-        if bool(left[part]) is not bool(right[part])
+        ("right" if left_counts[part] else "left", part)
+        for part in left_counts
+        if bool(left_counts[part]) is not bool(right_counts[part])
     )

@@ -78,13 +78,13 @@ def one_step(
     times: list[float] = []
     readings: list[tuple[StepReading, StepReading, StepReading]] = []
     with (
-        make_data(matched.one) as running,
-        make_data(matched.one) as left,
+        make_data(matched.left) as running,
+        make_data(matched.left) as left,
         make_data(right) as other,
     ):
         for k, state, before in _states(rerun, running, inputs, every):
             start = inputs["qpos"][k], inputs["qvel"][k]
-            set_state(matched.one, left, state)
+            set_state(matched.left, left, state)
             primed = _put(matched, reader, other, state, before) or primed
             try:
                 readings.append(
@@ -141,12 +141,12 @@ def _put(
     matched: Matched, reader: StageReader, data: Data, state: State, before: dict[str, Array]
 ) -> str:
     """Put the right side to a state of the left one; what of the step before it was given."""
-    reset(matched.two, data)
-    own = get_state(matched.two, data)
+    reset(matched.right, data)
+    own = get_state(matched.right, data)
     if (own.backend, own.fingerprint) == (state.backend, state.fingerprint):
-        set_state(matched.two, data, state)
+        set_state(matched.right, data, state)
         return "all that a State of the left side holds"
-    set_state(matched.two, data, matched.state(state, own))
+    set_state(matched.right, data, matched.state(state, own))
     return reader.prime(1, data, before)
 
 
@@ -257,15 +257,15 @@ def _spikes(
 
 
 def _notes(matched: Matched, failed: bool) -> tuple[str, ...]:
-    one, two = matched.one, matched.two
+    left, right = matched.left, matched.right
     names = ("position servo", "joint damping", "dry friction", "joint limits")
     by_us = [
         (m.backend, [n for n in names if m.capabilities.behaviours[n].support == "emulated"])
-        for m in (one, two)
+        for m in (left, right)
     ]
     notes = [
         (
-            (one.timestep, one.substeps) != (two.timestep, two.substeps),
+            (left.timestep, left.substeps) != (right.timestep, right.substeps),
             "the sides' steps are not equally long: accelerations are means over each side's own",
         ),
         *(

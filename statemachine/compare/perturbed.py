@@ -250,8 +250,8 @@ def chaos_floor(
     Raises:
         BadInputError: As `perturbed_runs`.
     """
-    one, two = comparison.one.trace, comparison.two.trace
-    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
+    left, right = comparison.left.trace, comparison.right.trace
+    common = common_moments(left.time, right.time, (left.timestep, right.timestep))
     gaps = {curve.name: curve.difference for curve in comparison.curves}
     gaps |= {a.name: np.array([a.max]) for a in comparison.agreements if a.kind == "contact"}
     widths = {name: np.zeros(len(gap)) for name, gap in gaps.items()}
@@ -260,7 +260,7 @@ def chaos_floor(
         rerun, runs=runs, seed=seed, uncertain=uncertain, progress=progress
     ):
         ended += bool(trace.header.ended)
-        far_apart = _distances(one, trace, comparison.tip, comparison.until, common.one)
+        far_apart = _distances(left, trace, comparison.tip, comparison.until, common.left)
         for name, far in far_apart.items():
             if name in widths:
                 widths[name] = np.maximum(widths[name], far)
@@ -285,23 +285,23 @@ def chaos_floor(
 
 
 def _distances(
-    one: Trace, perturbed: Trace, tip: str, until: float, rows: Ints
+    left: Trace, perturbed: Trace, tip: str, until: float, rows: Ints
 ) -> dict[str, Array]:
-    """How far a run is from `one` in some of its rows; infinite where it has ended.
+    """How far a run is from `left` in some of its rows; infinite where it has ended.
 
     Of a first touch it is one number [s]: a touch that does not come has no time.
     """
     distances: dict[str, Array] = {}
     try:
-        curves, count = series(one, perturbed, tip), len(perturbed)
-        for touch in touches(one, perturbed):
-            first, other = touch.one.first, touch.two.first
+        curves, count = series(left, perturbed, tip), len(perturbed)
+        for touch in touches(left, perturbed):
+            first, other = touch.left.first, touch.right.first
             gap = until if first is None or other is None else abs(first - other)
             distances[f"{touch.pair}, first touch"] = np.array([gap])
     except TraceError:  # it ended at once
-        curves, count = series(one, one, tip), 0
+        curves, count = series(left, left, tip), 0
     for curve in curves:
-        far = np.full(len(one), np.inf)
+        far = np.full(len(left), np.inf)
         far[:count] = np.nan_to_num(curve.difference[:count], nan=np.inf)
         distances[curve.name] = far[rows]
     return distances

@@ -28,7 +28,7 @@ class Series:
         name: As "elbow_flex" or "gripperframe, position".
         kind: What it is; says unit and tolerance.
         time: (n,) since the start [s].
-        one, two: (n,) or (n, k) its values, SI units; empty for a rotation, which has
+        left, right: (n,) or (n, k) its values, SI units; empty for a rotation, which has
             no curve of its own.
         difference: (n,) how far apart, never negative; of a vector its length.
     """
@@ -36,8 +36,8 @@ class Series:
     name: str
     kind: str
     time: Array
-    one: Array
-    two: Array
+    left: Array
+    right: Array
     difference: Array
 
     @property
@@ -67,31 +67,31 @@ def at_the_end(time: Array) -> NDArray[np.bool_]:
     return time >= time[-1] - SETTLED * (time[-1] - time[0])
 
 
-def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
+def series(left: Trace, right: Trace, tip: str | None = None) -> list[Series]:
     """All curves that both traces have: joints, fingertip, free bodies, energy, forces.
 
     Args:
-        one: A trace.
-        two: Another, of a model with the same names.
+        left: A trace.
+        right: Another, of a model with the same names.
         tip: The site to compare; by default `default_tip`.
     """
-    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
-    time, sides = common.time, ((one, common.one), (two, common.two))
+    common = common_moments(left.time, right.time, (left.timestep, right.timestep))
+    time, sides = common.time, ((left, common.left), (right, common.right))
     curves: list[Series] = []
-    theirs = two.header.joint_labels
-    for name in one.header.joint_labels:
+    theirs = right.header.joint_labels
+    for name in left.header.joint_labels:
         if name in theirs:
             curves += _joint(name, time, sides)
-    site = default_tip(one.header, two.header) if tip is None else tip
-    if site and tell(one, two, "site_xpos") and tell(one, two, "site_xmat"):
+    site = default_tip(left.header, right.header) if tip is None else tip
+    if site and tell(left, right, "site_xpos") and tell(left, right, "site_xmat"):
         (p, r), (q, s) = ([part[rows] for part in trace.site(site)] for trace, rows in sides)
         curves.append(_curve(f"{site}, position", "tip", time, p, q))
         curves.append(_turned(f"{site}, rotation", "tip rotation", time, r, s))
-    if tell(one, two, "energy"):
+    if tell(left, right, "energy"):
         totals = (trace["energy"].sum(axis=1)[rows] for trace, rows in sides)
         curves.append(_curve("energy", "energy", time, *totals))
-    if tell(one, two, "contact_force"):
-        forces = [normal_forces(one), normal_forces(two)]
+    if tell(left, right, "contact_force"):
+        forces = [normal_forces(left), normal_forces(right)]
         forces[1] = same_pairs(forces[0], forces[1])
         for pair in dict.fromkeys([*forces[0], *forces[1]]):
             values = (
@@ -102,15 +102,15 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
     return curves
 
 
-def _curve(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
+def _curve(name: str, kind: str, time: Array, left: Array, right: Array) -> Series:
     """Numbers (n,), or vectors (n, k)."""
-    apart = np.abs(one - two) if one.ndim == 1 else distances(one, two)
-    return Series(name, kind, time, one, two, apart)
+    apart = np.abs(left - right) if left.ndim == 1 else distances(left, right)
+    return Series(name, kind, time, left, right, apart)
 
 
-def _turned(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
+def _turned(name: str, kind: str, time: Array, left: Array, right: Array) -> Series:
     """Rotation matrices (n, 3, 3)."""
-    return Series(name, kind, time, np.empty(0), np.empty(0), angle_between(one, two))
+    return Series(name, kind, time, np.empty(0), np.empty(0), angle_between(left, right))
 
 
 def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
@@ -176,14 +176,14 @@ def world_forces(trace: Trace) -> Array:
     return np.where((bodies[:, 0] > bodies[:, 1])[:, None], -forces, forces)
 
 
-def tell(one: Trace, two: Trace, column: str) -> bool:
+def tell(left: Trace, right: Trace, column: str) -> bool:
     """Whether both traces tell a column: an engine that does not leaves it out, or NaN in it.
 
     Of contacts a run without any tells all that there is.
     """
     return all(
         column in trace and not (trace[column].size and np.isnan(trace[column]).all())
-        for trace in (one, two)
+        for trace in (left, right)
     )
 
 
@@ -192,20 +192,22 @@ _NEVER = Figures(
 )
 
 
-def touches(one: Trace, two: Trace) -> tuple[Figures, ...]:
+def touches(left: Trace, right: Trace) -> tuple[Figures, ...]:
     """Every pair of bodies that touches on either side; none if a trace does not tell.
 
     Returns:
-        The pair, and `one` and `two`, its contacts on each side; see `_contacts`.
+        The pair, and `left` and `right`, its contacts on each side; see `_contacts`.
     """
-    if "contact_row" not in one or "contact_row" not in two:
+    if "contact_row" not in left or "contact_row" not in right:
         return ()
-    until = float(common_moments(one.time, two.time, (one.timestep, two.timestep)).time[-1])
-    left = _contacts(one, until)
-    right = same_pairs(left, _contacts(two, until))
+    until = float(common_moments(left.time, right.time, (left.timestep, right.timestep)).time[-1])
+    left_contacts = _contacts(left, until)
+    right_contacts = same_pairs(left_contacts, _contacts(right, until))
     return tuple(
-        Figures(pair=pair, one=left.get(pair, _NEVER), two=right.get(pair, _NEVER))
-        for pair in left | right
+        Figures(
+            pair=pair, left=left_contacts.get(pair, _NEVER), right=right_contacts.get(pair, _NEVER)
+        )
+        for pair in left_contacts | right_contacts
     )
 
 

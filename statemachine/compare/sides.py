@@ -135,9 +135,13 @@ def with_options(
         sides: Two.
         options: Of what is run; those of a side win.
     """
-    one, two = ({**options, **side.options} for side in sides)
-    both = {name: one[name] for name in one if name in two and np.array_equal(one[name], two[name])}
-    own = [{name: o[name] for name in o if name not in both} for o in (one, two)]
+    left, right = ({**options, **side.options} for side in sides)
+    both = {
+        name: left[name]
+        for name in left
+        if name in right and np.array_equal(left[name], right[name])
+    }
+    own = [{name: o[name] for name in o if name not in both} for o in (left, right)]
     return [replace(side, options=o) for side, o in zip(sides, own, strict=True)], both
 
 

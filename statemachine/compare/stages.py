@@ -63,7 +63,7 @@ class StageReader:
 
     def __init__(self, matched: Matched) -> None:
         self._matched = matched
-        self._models = left, right = matched.one, matched.two
+        self._models = left, right = matched.left, matched.right
         here, names, turns = _dofs(left, [a for a, _ in matched.joints])
         self._dofs = here, _dofs(right, [b for _, b in matched.joints])[0]
         frames = [left.body_names[s.left] or f"body {s.left}" for s in matched.solids[1:]]
@@ -171,7 +171,7 @@ PairNames = tuple[Callable[[int, int], str], Sequence[int]]
 
 def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
     """By geoms, where both Models have the same; else by bodies, called as on the left."""
-    left, right = matched.one, matched.two
+    left, right = matched.left, matched.right
     if left.geom_names == right.geom_names and np.array_equal(left.geom_bodyid, right.geom_bodyid):
         same: PairNames = ContactNames.of(left).geoms, range(left.ngeom)
         return same, same
@@ -310,17 +310,17 @@ def _by_unit(
             )
 
 
-def _distances(one: Array, two: Array) -> Array:
+def _distances(left: Array, right: Array) -> Array:
     """How far apart elements (n, k, size) are (n, k); NaN where one is not told."""
-    if one.shape[2] == 9:
-        shape = *one.shape[:2], 3, 3
-        return angle_between(one.reshape(shape), two.reshape(shape))
-    return np.linalg.norm(one - two, axis=2)
+    if left.shape[2] == 9:
+        shape = *left.shape[:2], 3, 3
+        return angle_between(left.reshape(shape), right.reshape(shape))
+    return np.linalg.norm(left - right, axis=2)
 
 
-def _sizes(stage: str, one: Array, two: Array) -> Array:
+def _sizes(stage: str, left: Array, right: Array) -> Array:
     """The largest of all elements (n,); of places their reach, of rotations one radian."""
-    both = np.concatenate([one, two], axis=1)
+    both = np.concatenate([left, right], axis=1)
     if both.shape[2] == 9:
         return np.ones(len(both))
     if stage == KINEMATICS:

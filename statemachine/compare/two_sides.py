@@ -156,7 +156,7 @@ def prepare_sides(
             controller = controller_for_right(controller, matched, own_start.ctrl)
         return beginning_with(lambda _, ctrl=begin.ctrl: ctrl, controller) if begin else controller
 
-    one, two = (
+    left_rerun, right_rerun = (
         Rerun(
             model,
             own if model is left else theirs,
@@ -173,7 +173,7 @@ def prepare_sides(
         )
         for model, side, at in zip(models, sides, (start, begin), strict=True)
     )
-    return (one, two), matched, (*said, *request.taken)
+    return (left_rerun, right_rerun), matched, (*said, *request.taken)
 
 
 def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
@@ -207,7 +207,7 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
         if request != Request(request.what, request.backends, request.defaults):
             raise  # nothing like it was recorded
         return _with_recorded(request, progress)
-    one, two = (
+    left_run, right_run = (
         rerun.record(
             command="" if request.sides else _command(request, rerun.model.backend),
             progress=part_of(progress, 0.35 * k, 0.35),
@@ -215,20 +215,20 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
         for k, rerun in enumerate(reruns)
     )
     left, right = (rerun.model for rerun in reruns)
-    rights, commands = [two], _loop(request, one, two, matched)
+    rights, commands = [right_run], _loop(request, left_run, right_run, matched)
     if commands == "its own" and request.sides:
-        theirs = in_terms_of_right(one, two, matched)
+        theirs = in_terms_of_right(left_run, right_run, matched)
         in_open_loop = replayed(theirs, right, reruns[1].defaults, reruns[1].options)
         rights.append(in_open_loop.record(progress=part_of(progress, 0.7, 0.3)))
-    a, b = (run.header.provenance.model_file for run in (one, two))
+    a, b = (run.header.provenance.model_file for run in (left_run, right_run))
     if left.path != right.path and a == b:  # as much of the paths as tells them apart
         names = files_apart(left.path.parts, right.path.parts)
-        one, rights = called(one, names[0]), [called(run, names[1]) for run in rights]
+        left_run, rights = called(left_run, names[0]), [called(run, names[1]) for run in rights]
     if matched is not None:
-        both = [named_as_left(one, run, matched) for run in rights]
-        one, rights = both[0][0], [run for _, run in both]
+        both = [named_as_left(left_run, run, matched) for run in rights]
+        left_run, rights = both[0][0], [run for _, run in both]
     return SidesRun(
-        left=one,
+        left=left_run,
         right=rights[0],
         played=rights[-1],
         commands=commands,
@@ -240,13 +240,13 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
     )
 
 
-def _loop(request: Request, one: Trace, two: Trace, matched: Matched | None) -> Loop:
+def _loop(request: Request, left: Trace, right: Trace, matched: Matched | None) -> Loop:
     """What the two sides were told."""
     if request.is_traces:
         return "recorded"
-    if one.header.rewritten or two.header.rewritten:
+    if left.header.rewritten or right.header.rewritten:
         return "more than ctrl"
-    alike = same_commands(in_terms_of_right(one, two, matched), two)
+    alike = same_commands(in_terms_of_right(left, right, matched), right)
     return "the same" if alike else "its own"
 
 
@@ -315,9 +315,9 @@ def _command(request: Request, backend: str) -> str:
 def _check_moments(models: list[Model], seconds: float) -> None:
     """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
     steps = [model.timestep for model in models]
-    one, two = (np.arange(0.0, steps_in(m, seconds) + 1) * m.timestep for m in models)
+    left, right = (np.arange(0.0, steps_in(m, seconds) + 1) * m.timestep for m in models)
     try:
-        common_moments(one, two, (steps[0], steps[1]))
+        common_moments(left, right, (steps[0], steps[1]))
     except TraceError as error:
         raise TraceError(
             f"{error}; of a side: timestep={steps[0]:.15g} behind the right, or "

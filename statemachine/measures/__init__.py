@@ -161,7 +161,7 @@ class JointPlaces:
 
 def joint_gap(
     names: Sequence[str], types: Sequence[int] | Ints, addresses: Sequence[int] | Ints,
-    one: Array, two: Array,
+    left: Array, right: Array,
 ) -> Gap | None:  # fmt: skip
     """The hinge that differs most between two moments, or the slide where there is no hinge.
 
@@ -169,14 +169,14 @@ def joint_gap(
         names: Of the joints; types, addresses: their `JointType`s and places in qpos.
         types: See names.
         addresses: See names.
-        one: (nq,) one moment; two: the other.
-        two: See one.
+        left: (nq,) one moment; right: the other.
+        right: See left.
     """
     kinds, places = np.asarray(types), np.asarray(addresses)
     for kind, unit in ((JointType.HINGE, "rad"), (JointType.SLIDE, "m")):
         joints = np.flatnonzero(kinds == int(kind))
         if len(joints):
-            apart = np.abs(one[places[joints]] - two[places[joints]])
+            apart = np.abs(left[places[joints]] - right[places[joints]])
             return Gap.of(apart, unit, [names[joint] for joint in joints.tolist()])
     return None
 
@@ -192,22 +192,22 @@ def largest_or_inf(sizes: Array) -> float:
     return float(np.where(np.isnan(sizes), np.inf, sizes).max(initial=0.0))
 
 
-def distances(one: Array, two: Array) -> Array:
+def distances(left: Array, right: Array) -> Array:
     """Lengths (…) of the way from one vector (…, k) to another."""
-    return np.linalg.norm(one - two, axis=-1)
+    return np.linalg.norm(left - right, axis=-1)
 
 
-def farthest(one: Array, two: Array) -> Array:
+def farthest(left: Array, right: Array) -> Array:
     """The largest difference (…) of any of k numbers (…, k)."""
-    return np.abs(one - two).max(axis=-1, initial=0.0)
+    return np.abs(left - right).max(axis=-1, initial=0.0)
 
 
-def turns(one: Array, two: Array) -> Array:
+def turns(left: Array, right: Array) -> Array:
     """Angles (…) [rad] between unit quaternions (…, 4), in any order of their components.
 
     By the chord, so that tiny angles keep their digits. q and -q are one rotation.
     """
-    chord = np.minimum(distances(one, two), distances(one, -two))
+    chord = np.minimum(distances(left, right), distances(left, -right))
     return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
 
 
@@ -221,28 +221,28 @@ class Common:
 
     Attributes:
         time: (n,) since the start [s].
-        one, two: (n,) rows of the runs.
+        left, right: (n,) rows of the runs.
     """
 
     time: Array
-    one: Ints
-    two: Ints
+    left: Ints
+    right: Ints
 
 
-def common_moments(one: Array, two: Array, steps: tuple[float, float]) -> Common:
+def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Common:
     """Rows of the same moment: nothing is interpolated.
 
     Timesteps of 1/200 and 1/240 s meet every 25 ms; what happens between is left out.
 
     Args:
-        one: (n,) ascending, when the rows of a run are [s]; two: those of the other.
-        two: See one.
+        left: (n,) ascending, when the rows of a run are [s]; right: those of the other.
+        right: See left.
         steps: The timesteps of both [s].
 
     Raises:
         TraceError: They share too few moments.
     """
-    times = [time - time[0] for time in (one, two)]
+    times = [time - time[0] for time in (left, right)]
     near = nearest(times[1], times[0])
     # A time is a sum of timesteps: its rounding grows with their number.
     slack = SAME * min(steps) + 1e-12 * np.arange(len(times[0]))

@@ -78,15 +78,15 @@ class Tolerance:
 
 
 def tolerance_of(
-    kind: str, one: Array, two: Array, reach: float, timestep: float,
+    kind: str, left: Array, right: Array, reach: float, timestep: float,
     given: Mapping[str, float] | None = None,
 ) -> Tolerance:  # fmt: skip
     """The tolerance of a quantity in two runs.
 
     Args:
         kind: Which of `QUANTITIES`.
-        one: Its values (n,) in one run; two: in the other. Of energies and forces they count.
-        two: See one.
+        left: Its values (n,) in one run; right: in the other. Of energies and forces they count.
+        right: See left.
         reach: How far a fingertip gets from the foot of its arm [m].
         timestep: The longer of the two [s].
         given: Values by kind that win over ours [SI].
@@ -104,14 +104,14 @@ def tolerance_of(
         )
     if kind == "energy":
         changes = max(float(np.ptp(v[np.isfinite(v)])) if np.isfinite(v).any() else 0.0
-                      for v in (one, two))  # fmt: skip
+                      for v in (left, right))  # fmt: skip
         return Tolerance(
             max(_ENERGY * changes, 1e-9),
             f"1 % of {rounded(changes, 'J')}, by which the energy changes in the run",
         )
     if kind == "force":
         # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.
-        acting = max(float(v[v > 0].mean()) if (v > 0).any() else 0.0 for v in (one, two))
+        acting = max(float(v[v > 0].mean()) if (v > 0).any() else 0.0 for v in (left, right))
         return Tolerance(
             max(_FORCE * acting, 1e-6),
             "5 % of the mean force while they touch",
@@ -232,25 +232,25 @@ class ContactNames:
             )
         return _OF[model]
 
-    def pair(self, one: int, two: int) -> str:
+    def pair(self, left: int, right: int) -> str:
         """The bodies of two geoms that touch: "gripper on floor"."""
-        return self._names(one, two)[0]
+        return self._names(left, right)[0]
 
-    def geoms(self, one: int, two: int) -> str:
+    def geoms(self, left: int, right: int) -> str:
         """The same, and which of a body's geoms it is: "gripper on floor (fixed_stud_1)"."""
-        return self._names(one, two)[1]
+        return self._names(left, right)[1]
 
-    def _names(self, one: int, two: int) -> tuple[str, str]:
+    def _names(self, left: int, right: int) -> tuple[str, str]:
         """Both, worked out once: a contact lasts for many steps."""
-        if (one, two) not in self._pairs:
-            ordered = sorted((one, two), key=self._distance, reverse=True)
+        if (left, right) not in self._pairs:
+            ordered = sorted((left, right), key=self._distance, reverse=True)
             owners = [self._owner(geom) for geom in ordered]
             pair, own = " on ".join(owners), [self._geoms[geom] for geom in ordered]
             shapes = [
                 name for name, owner in zip(own, owners, strict=True) if name not in ("", owner)
             ]
-            self._pairs[one, two] = pair, pair + (f" ({' on '.join(shapes)})" if shapes else "")
-        return self._pairs[one, two]
+            self._pairs[left, right] = pair, pair + (f" ({' on '.join(shapes)})" if shapes else "")
+        return self._pairs[left, right]
 
     def _owner(self, geom: int) -> str:
         body = self._body_of[geom]
@@ -297,13 +297,13 @@ def overlaps(names: ContactNames, geoms: Ints, distances: Array) -> list[str]:
     return [f"{pair} by {rounded(-distance, 'm')}" for pair, distance in deepest]
 
 
-def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:
-    """What `two` has by pair of bodies, the pairs called as in `one`.
+def same_pairs(left: Mapping[str, _T], right: Mapping[str, _T]) -> dict[str, _T]:
+    """What `right` has by pair of bodies, the pairs called as in `left`.
 
     Two models may number the same bodies in another order.
     """
     renamed = {}
-    for pair, value in two.items():
+    for pair, value in right.items():
         turned = " on ".join(reversed(pair.split(" on ")))
-        renamed[turned if turned in one and pair not in one else pair] = value
+        renamed[turned if turned in left and pair not in left else pair] = value
     return renamed

@@ -78,7 +78,7 @@ def page(
         played: The comparison of their open loop, where it is not that of the closed one.
         floor: The chaos floor, if it was looked for.
     """
-    events, says = events_of(comparison), comparison.one.trace.header.says
+    events, says = events_of(comparison), comparison.left.trace.header.says
     notes = [sentence(line) for line in (*said, *comparison.notes)]
     both = _over_time(comparison, events, explanation, floor)
     reasons: list[Block] = [Text(why_not)] if why_not else []
@@ -129,7 +129,7 @@ def _over_time(
     lead = [k for k, c in enumerate(charts) if c.curve.name == leading(comparison).name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
     return BothRuns(
-        comparison.one.trace.header.experiment,
+        comparison.left.trace.header.experiment,
         comparison,
         at,
         tuple(events),
@@ -157,7 +157,7 @@ def _sorted(runs: BothRuns) -> list[Block]:
 
 def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | None) -> list[Block]:
     """Figures and verdicts, the floor, the reasons of tolerances, what a third party says."""
-    one, two = short_labels(comparison)
+    left, right = short_labels(comparison)
     agreements, checked = comparison.agreements, list[Block]()
     sides: dict[str, Any] = dict.fromkeys(("site", "rows", "by", "left_off", "right_off"))
     if witness is not None:
@@ -166,7 +166,10 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
         )
         checked.append(Section("", "", text, detail=True))
         sides = {name: getattr(witness, name) for name in ("site", "rows", "by")}
-        sides |= {"left_off": f"{1e3 * witness.one:.0e}", "right_off": f"{1e3 * witness.two:.0e}"}
+        sides |= {
+            "left_off": f"{1e3 * witness.left:.0e}",
+            "right_off": f"{1e3 * witness.right:.0e}",
+        }
     figures = Table.of(
         agreements,
         {
@@ -188,7 +191,7 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
             "tolerance": lambda agreement: quantity(agreement.tolerance, agreement.unit),
             **(_floor_columns(floor) if floor else {}),
         },
-        f"{one} against {two}: how far apart",
+        f"{left} against {right}: how far apart",
         words={"verdict"},
         emphasis=lambda agreement: agreement.verdict == "differs",
         wide={"tolerance", "floor", "inside from, s"},
@@ -215,8 +218,8 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
         window=window(comparison),
         floor=floor_words(comparison, floor) if floor else [],
         reasons=reasons,
-        left=one,
-        right=two,
+        left=left,
+        right=right,
         checked=checked,
         **sides,
     )
@@ -267,7 +270,7 @@ def _origin(comparison: Comparison) -> str:
         files[f"{source.model_file} ({source.model_sha256[:8]})"] = None
         seed = "" if source.seed is None else f", seed {source.seed}"
         words.append(f"{label}, {milliseconds(trace.header.timestep)}{seed}")
-    engine = comparison.one.trace.header.label
+    engine = comparison.left.trace.header.label
     return "; ".join([*files, *([] if engine in labels[0] else [f"both on {engine}"]), *words])
 
 
@@ -279,7 +282,7 @@ def junit(comparisons: Sequence[Comparison]) -> str:
     """The text of the file: a suite for each comparison."""
     root = ElementTree.Element("testsuites")
     for comparison in comparisons:
-        sides = comparison.one, comparison.two
+        sides = comparison.left, comparison.right
         name = f"{sides[0].trace.header.experiment}: {sides[0].label}, {sides[1].label}"
         failures = {
             agreement.name: FAILED.format(

@@ -56,7 +56,7 @@ def headline(
         same = all(agreement.max == 0 for agreement in agreements)
         return Headline(LEADS["same" if same else "agree"].format(until=until))
     if comparison.ended:
-        sides = [s.label for s in (comparison.one, comparison.two) if s.trace.header.ended]
+        sides = [s.label for s in (comparison.left, comparison.right) if s.trace.header.ended]
         lead = LEADS["ended"].format(
             sides=" and ".join(sides),
             until=until,
@@ -99,17 +99,17 @@ def _parting(comparison: Comparison, events: Sequence[Figures]) -> str:
 
 def short_labels(comparison: Comparison) -> tuple[str, str]:
     """What the sides are called for short: their engines, or what tells two of one apart."""
-    return comparison.one.short, comparison.two.short
+    return comparison.left.short, comparison.right.short
 
 
 def long_labels(comparison: Comparison) -> tuple[str, str]:
     """What the sides are called: engine and version, or what tells two of one apart."""
-    return comparison.one.label, comparison.two.label
+    return comparison.left.label, comparison.right.label
 
 
 def traces_of(comparison: Comparison) -> tuple[Trace, Trace]:
     """The runs of both sides."""
-    return comparison.one.trace, comparison.two.trace
+    return comparison.left.trace, comparison.right.trace
 
 
 def window(comparison: Comparison) -> str:
@@ -292,7 +292,7 @@ def events_of(comparison: Comparison) -> list[Figures]:
         *(
             (contact.first, "touch", f"first touch: {touch.pair}", side, touch.pair)
             for touch in comparison.touches
-            for side, contact in enumerate((touch.one, touch.two))
+            for side, contact in enumerate((touch.left, touch.right))
             if contact.first is not None
         ),
         *(

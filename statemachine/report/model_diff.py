@@ -87,7 +87,11 @@ def page(result: Figures, everything: bool = False) -> Page:
         result: Of `compare`.
         everything: Whether every figure has a row of its own.
     """
-    named, rows, posed = {"left": result.one, "right": result.two}, result.differences, result.posed
+    named, rows, posed = (
+        {"left": result.left, "right": result.right},
+        result.differences,
+        result.posed,
+    )
     matter = [row for row in rows if row.matters]
     able = dict.fromkeys(name for row in rows for name in row.causes if not row.refused)
     refused = {row.causes[0]: row.refused for row in rows if row.refused}
@@ -131,7 +135,7 @@ def _name(side: Figures) -> str:
 
 def _subject(subject: str, differences: list[Figures], everything: bool) -> list[Block]:
     """What differs in a subject, what the figures mean, and of armature what its lack does."""
-    alike = grouped(((d.figure, d.one, d.two, d.size, d.unit), d) for d in differences).values()
+    alike = grouped(((d.figure, d.left, d.right, d.size, d.unit), d) for d in differences).values()
     # Where three places or more have one figure with the same values, one row is for all.
     groups = [
         rows
@@ -145,7 +149,7 @@ def _subject(subject: str, differences: list[Figures], everything: bool) -> list
     headers = [headers[k] for k in columns]
     worst = max(differences, key=lambda row: row.share)
     times = 1 / (1 - worst.share) if worst.share < 1 else math.inf
-    lacks = subject == "armature" and 0 < worst.share < 1 and not (worst.one and worst.two)
+    lacks = subject == "armature" and 0 < worst.share < 1 and not (worst.left and worst.right)
     return template.blocks(
         "model_diff_subject",
         table=Table(
@@ -157,7 +161,7 @@ def _subject(subject: str, differences: list[Figures], everything: bool) -> list
         more=len(groups) - len(shown) or None,
         times=(f"{times:,.0f}" if times >= 100 else f"{times:.3g}") if lacks else None,
         joint=worst.where,
-        side="left" if worst.two else "right",
+        side="left" if worst.right else "right",
         **{name: if_true(name == subject) for name in SUBJECTS}
         | {
             slot: if_true(subject == of and word in str((headers, rows)))
@@ -170,11 +174,11 @@ def _row(subject: str, group: Sequence[Figures]) -> list[str]:
     first, last = group[0], group[-1]
     unit = _MOMENT if subject == "inertia" and first.unit == "kg m²" else first.unit
     effect = " … ".join(dict.fromkeys((first.effect, last.effect)))
-    values = [_value(value, unit) for value in (first.one, first.two)]
+    values = [_value(value, unit) for value in (first.left, first.right)]
     apart = ""
-    if first.size is not None and (first.one is None) == (first.two is None):
+    if first.size is not None and (first.left is None) == (first.right is None):
         apart = _number(first.size, unit, _APART)
-        values = ["", ""] if first.one is None else values  # what both do not say is their size
+        values = ["", ""] if first.left is None else values  # what both do not say is their size
     return [_label(first, len(group) - 1), *values, apart, effect]
 
 

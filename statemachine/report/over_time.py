@@ -64,22 +64,22 @@ class QuantityChart(Interactive):
     def values(self) -> Traces | None:
         """Both sides: a position as the way from where the first side began; None without."""
         curve, scale = self.curve, reading(self.curve.unit)[0]
-        if not curve.one.size:
+        if not curve.left.size:
             return None
         sides = [
-            np.linalg.norm(side - curve.one[0], axis=1) if side.ndim > 1 else side
-            for side in (curve.one, curve.two)
+            np.linalg.norm(side - curve.left[0], axis=1) if side.ndim > 1 else side
+            for side in (curve.left, curve.right)
         ]
         curves = dict(zip(self.labels, ((curve.time, scale * side) for side in sides), strict=True))
         # What does not matter is not blown up to the height of the chart.
         least = 20 * scale * self.agreement.tolerance
-        title = f"{self.title}, from its start" if curve.one.ndim > 1 else self.title
+        title = f"{self.title}, from its start" if curve.left.ndim > 1 else self.title
         return Traces(f"{title} [{self.unit}]", "", "", curves, sides=True, least=least)
 
     def gap(self) -> Traces:
         """How far apart they are, with the tolerance and the chaos floor."""
         time, scale = self.curve.time, reading(self.curve.unit)[0]
-        name = "" if self.curve.one.size else f"{self.title}: "
+        name = "" if self.curve.left.size else f"{self.title}: "
         verdict = "DIFFERS" if self.agreement.verdict == "differs" else self.agreement.verdict
         return Traces(
             f"{name}{verdict}, {quantity(self.agreement.max, self.agreement.unit)}",

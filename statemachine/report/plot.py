@@ -74,7 +74,7 @@ def of_comparison(comparison: Comparison, floor: Figures | None = None) -> Figur
         seconds=comparison.until,
         part=first,
         notes=_notes(
-            two=if_true(True),
+            right=if_true(True),
             changed=changed_by(floor) if floor else None,
             at=None if first is None else short_time(first),
             names=names,
@@ -127,7 +127,7 @@ def of_trace(trace: Trace) -> Figures:
 
 def _notes(**slots: object) -> list[str]:
     """What the reader must know: the sentences of `plot.md` that have what they need."""
-    none = dict.fromkeys(("two", "changed", "at", "names", "fewer", "not_shown"))
+    none = dict.fromkeys(("right", "changed", "at", "names", "fewer", "not_shown"))
     return template.texts("plot", **(none | slots))
 
 

@@ -39,18 +39,18 @@ PHYSICS = {
 
 def commanded(comparison: Comparison) -> list[Block]:
     """What each actuator was told, at the start and in the end; empty without actuators."""
-    (one, two), labels = traces_of(comparison), long_labels(comparison)
-    actuators = one.header.actuators
-    if not actuators or actuators != two.header.actuators:
+    (left, right), labels = traces_of(comparison), long_labels(comparison)
+    actuators = left.header.actuators
+    if not actuators or actuators != right.header.actuators:
         return []
-    if all(trace.header.options.get("actuation") is False for trace in (one, two)):
+    if all(trace.header.options.get("actuation") is False for trace in (left, right)):
         return [Text("The actuators are off on both sides: nothing is commanded.")]
-    misses = [_ends(trace) for trace in (one, two)]
+    misses = [_ends(trace) for trace in (left, right)]
     # The trace does not say so, but ctrl is an angle where most joints end near it.
     angle = all(np.isfinite(miss).all() and np.median(miss) < _NEAR for miss in misses)
     unit, scale = ("°", 180 / np.pi) if angle else ("", 1.0)
-    same = _same(one.ctrl, two.ctrl)
-    traces = {"": one} if same else {f"{labels[0]}, ": one, f"{labels[1]}, ": two}
+    same = _same(left.ctrl, right.ctrl)
+    traces = {"": left} if same else {f"{labels[0]}, ": left, f"{labels[1]}, ": right}
     columns = {
         f"{side}{when}": [f"{figure(round(ctrl * scale, 9))}{unit}" for ctrl in trace.ctrl[row]]
         for side, trace in traces.items()
@@ -68,12 +68,12 @@ def commanded(comparison: Comparison) -> list[Block]:
     return [Section("", heading, [table], folded=True, detail=True)]
 
 
-def _same(one: Array, two: Array) -> bool:
+def _same(left: Array, right: Array) -> bool:
     """Whether two runs were told the same, each at its own rows."""
     rows = np.linspace(0, 1, 50)
-    a, b = (c[np.round(rows * (len(c) - 1)).astype(int)] for c in (one, two))
+    a, b = (c[np.round(rows * (len(c) - 1)).astype(int)] for c in (left, right))
     return bool(np.allclose(a, b, rtol=0, atol=1e-9)) or (
-        len(one) == len(two) and bool(np.allclose(one[:-1], two[:-1], rtol=0, atol=1e-9))
+        len(left) == len(right) and bool(np.allclose(left[:-1], right[:-1], rtol=0, atol=1e-9))
     )
 
 
@@ -92,7 +92,7 @@ def contact_words(comparison: Comparison) -> Table:
     labels, touches = short_labels(comparison), comparison.touches
     hardest = sorted(
         touches,
-        key=lambda t: (max(t.one.force, t.two.force), max(t.one.deepest, t.two.deepest)),
+        key=lambda t: (max(t.left.force, t.right.force), max(t.left.deepest, t.right.deepest)),
         reverse=True,
     )[:_PAIRS_SHOWN]
     return Table(
@@ -100,7 +100,7 @@ def contact_words(comparison: Comparison) -> Table:
         [
             (touch.pair, label, *_contact_cells(side))
             for touch in hardest
-            for label, side in zip(labels, (touch.one, touch.two), strict=True)
+            for label, side in zip(labels, (touch.left, touch.right), strict=True)
         ],
         f"Who presses on what ({len(hardest)} of {len(touches)} pairs; forces are means over "
         f"{window(comparison)})",
@@ -183,7 +183,7 @@ def emulated(comparison: Comparison) -> list[Block]:
     """What of the model a backend keeps instead of its engine."""
     sides = {
         side.trace.header.label: side.trace.header.provenance.emulated
-        for side in (comparison.one, comparison.two)
+        for side in (comparison.left, comparison.right)
         if side.trace.header.provenance.emulated and side.trace.header.defaults == "model"
     }
     blocks: list[Block] = []
@@ -203,14 +203,14 @@ def emulated(comparison: Comparison) -> list[Block]:
 
 def provenance(comparison: Comparison) -> Table:
     """What made both sides."""
-    headers = comparison.one.trace.header, comparison.two.trace.header
+    headers = comparison.left.trace.header, comparison.right.trace.header
     left, right = (header.provenance.versions for header in headers)
     a, b = (facts_of(header) for header in headers)
     ran = ["recorded, opened here" if h.recorded else "run for this page" for h in headers]
     rows = [
         ("ran as", *ran),
         *((name, left.get(name, NONE), right.get(name, NONE)) for name in left | right),
-        ("rows", f"{comparison.one.rows}", f"{comparison.two.rows}"),
+        ("rows", f"{comparison.left.rows}", f"{comparison.right.rows}"),
         *((name, a[name], b[name]) for name in a if a[name] or b[name]),
     ]
     return Table(

@@ -87,9 +87,9 @@ def make_comparisons(folder: Path) -> list[Path]:
     for name in ("hold", "gravity", "box"):
         print(f"comparing: {name} ...")
         run = run_sides(Request((name,)))
-        one, two = run.traces
-        compared = compare(one, two)
-        page = comparison.page(compared, said=run.said, witness=witness(one, two))
+        left, right = run.traces
+        compared = compare(left, right)
+        page = comparison.page(compared, said=run.said, witness=witness(left, right))
         curves = {
             curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())
             for curve in compared.curves
@@ -98,8 +98,8 @@ def make_comparisons(folder: Path) -> list[Path]:
         apart = Traces("How far apart", "time [s]", "difference [°]", curves, log=True)
         page = replace(page, blocks=[page.blocks[0], apart, *page.blocks[1:]])
         written.append(_write(folder, name, page, f"statemachine compare {name}"))
-        if not (one.header.recorded or two.header.recorded):
-            page = _why_as_they_come(name, (one.header.backend, two.header.backend))
+        if not (left.header.recorded or right.header.recorded):
+            page = _why_as_they_come(name, (left.header.backend, right.header.backend))
             typed = f"statemachine compare {name} --why --defaults engine"
             written.append(_write(folder, f"{name}-why", page, typed))
     return written

@@ -191,7 +191,7 @@ def versions(comparisons: Sequence[Comparison], request: Request) -> Page:
     what, model = request.what[0], request.model or request.scenario().model
     rows, changed, bars = [], [], []
     for comparison in comparisons:
-        both = comparison.one.trace.header, comparison.two.trace.header
+        both = comparison.left.trace.header, comparison.right.trace.header
         left, right = (header.provenance.versions[header.backend] for header in both)
         cells, worst = ("nothing differs", NONE, NONE, NONE), leading(comparison)
         bars.append((worst.max / worst.tolerance if worst.tolerance else 0.0, None))

@@ -101,8 +101,8 @@ def read(
 
 
 def compare(
-    one: str | os.PathLike[str],
-    two: str | os.PathLike[str],
+    left: str | os.PathLike[str],
+    right: str | os.PathLike[str],
     engines: tuple[str | None, str | None] = (None, None),
     frames: Mapping[str, str] | None = None,
     rename: Mapping[str, str] | None = None,
@@ -113,17 +113,17 @@ def compare(
     """Every difference between two descriptions.
 
     Args:
-        one: A name or a file.
-        two: The other.
+        left: A name or a file.
+        right: The other.
         engines: For each the engine that it is asked of; None for the file itself.
-        frames: Frames of `one` that go by other names in `two`.
-        rename: Joints, links and frames of `one` that go by other names in `two`.
+        frames: Frames of `left` that go by other names in `right`.
+        rename: Joints, links and frames of `left` that go by other names in `right`.
         digits: Figures that agree to so many count as equal, 1 to 17.
         seed: Of the poses at which both are compared.
         menagerie: A folder to look names up in.
 
     Returns:
-        one, two: The sides, left and right: the file with its folder; its format, URDF, MJCF, MJB
+        left, right: The sides: the file with its folder; its format, URDF, MJCF, MJB
             or the engine that it was loaded into; what read it; how many links, joints and shapes
             it has; notes of the reader.
         differences: The weightiest subjects first, and in each the weightiest difference.
@@ -140,7 +140,7 @@ def compare(
         UnknownNameError: No such model, engine, joint or frame.
         MissingEngineError, ModelError, ModelFileError, UnsupportedError: As `read`.
     """
-    robots = [read(m, e, menagerie) for m, e in zip((one, two), engines, strict=True)]
+    robots = [read(m, e, menagerie) for m, e in zip((left, right), engines, strict=True)]
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
     formats, skipped = [robot.format for robot in robots], list[str]()
     compilers = [engine or DEFAULT for engine in engines]
@@ -149,7 +149,7 @@ def compare(
         try:
             models = [
                 load(resolve(m, menagerie), backend=name, defaults="engine")
-                for m, name in zip((one, two), compilers, strict=True)
+                for m, name in zip((left, right), compilers, strict=True)
             ]
             differences, matched = compiled(models, rename or {}, trees[0])
         except StateMachineError as error:
@@ -169,7 +169,7 @@ def compare(
     # A URDF was read by no engine.
     readers = [robot.reader.partition(" ") for robot in robots if robot.format != "URDF"]
     versions |= {engine: version for engine, _, version in readers}
-    left, right = [
+    left_side, right_side = [
         Figures(
             file=robot.name,
             format=robot.format,
@@ -184,8 +184,8 @@ def compare(
     ]
     rows = book.ordered()
     return Figures(
-        one=left,
-        two=right,
+        left=left_side,
+        right=right_side,
         differences=rows,
         agreements=tuple(book.agreements()),
         posed=posed,
@@ -198,12 +198,12 @@ def compare(
     )
 
 
-def own_ways(one: str | None, two: str | None) -> tuple[tuple[str, str, str], ...]:
+def own_ways(left: str | None, right: str | None) -> tuple[tuple[str, str, str], ...]:
     """For each question that two engines answer otherwise: its title, and both answers.
 
     They are asked on small models, whatever a file says.
     """
-    engines = [engine for engine in (one, two) if engine and room(engine).can("measurement")]
+    engines = [engine for engine in (left, right) if engine and room(engine).can("measurement")]
     if len({*engines}) < 2:
         return ()
     answers = [

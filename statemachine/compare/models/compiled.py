@@ -110,7 +110,7 @@ def enter_rest(book: Ledger, matched: Matched, robots: Sequence[Robot], reach: f
             if key not in book.entered and (book.complete or not _is_told(difference)):
                 _enter(book, key, difference, reach)
     if matched.reordered:  # who writes ctrl by number meets other actuators
-        names = [few(list(model.actuator_names), 6) for model in (matched.one, matched.two)]
+        names = [few(list(model.actuator_names), 6) for model in (matched.left, matched.right)]
         book.differ("further", "ctrl", "order", names, share=0.5)
     _enter_keyframes(book, matched)
     _enter_sensors(book, matched)
@@ -155,7 +155,7 @@ def _enter_keyframes(book: Ledger, matched: Matched) -> None:
     """Keyframes by name, those without one by number."""
     frames = [
         {frame.name or f"number {k}": frame for k, frame in enumerate(model.keyframes)}
-        for model in (matched.one, matched.two)
+        for model in (matched.left, matched.right)
     ]
     for name in frames[0] | frames[1]:
         where, a, b = f"keyframe {name}", frames[0].get(name), frames[1].get(name)
@@ -181,13 +181,13 @@ def _enter_sensors(book: Ledger, matched: Matched) -> None:
     only: tuple[list[str], list[str]] = [], []
     effect = "only a controller that reads it moves otherwise"
     for difference in sensors_of(matched):
-        for name, one, two in difference.values:
+        for name, left, right in difference.values:
             if difference.subject == "extra sensor":
-                only[one is None].append(difference.where)
+                only[left is None].append(difference.where)
                 continue
             where = f"sensor {difference.where}" if difference.where else "sensordata"
             book.enter(
-                *("further", where, name, [_value(one), _value(two)]),
+                *("further", where, name, [_value(left), _value(right)]),
                 share=0.0,
                 effect=effect,
                 matters=False,

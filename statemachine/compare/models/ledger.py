@@ -99,7 +99,7 @@ class Ledger:
             subject: A key of `SUBJECTS`.
             where: The joint, link or frame.
             figure: What of it.
-            values: `one` and `two` of the difference, SI units; None where a file does not say.
+            values: `left` and `right` of the difference, SI units; None where a file does not say.
             unit: Theirs.
             size: How far they are apart, in `unit`; None where that is no number.
             share: How much it matters, from 0 to 1; of what, each comparing function says.
@@ -122,8 +122,8 @@ class Ledger:
                 subject=subject,
                 where=where,
                 figure=figure,
-                one=left,
-                two=right,
+                left=left,
+                right=right,
                 unit=unit,
                 size=size,
                 share=share,

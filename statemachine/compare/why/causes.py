@@ -57,8 +57,8 @@ class Cause:
 
 
 def differences_of(
-    one: Model,
-    two: Model,
+    left: Model,
+    right: Model,
     matched: Matched,
     world: bool = True,
     finer: bool = False,
@@ -67,19 +67,19 @@ def differences_of(
     """All that two Models differ in by their compiled models.
 
     Args:
-        one: The Model that the other is brought to.
-        two: The other.
+        left: The Model that the other is brought to.
+        right: The other.
         matched: What of one is what of the other.
         world: Whether gravity and timestep count; not where they are an engine's own.
         finer: By single entries, where they can be brought over one by one.
         sensors: Whether sensors count, which act on nothing but a controller that reads them.
     """
     own = room(DEFAULT)
-    rows = list(own.differences(one.compiled, two.compiled, matched, world=world))
+    rows = list(own.differences(left.compiled, right.compiled, matched, world=world))
     if sensors:
         rows += sensors_of(matched)
     if finer:
-        rows = [part for row in rows for part in own.entries(two.compiled, row)]
+        rows = [part for row in rows for part in own.entries(right.compiled, row)]
     extra = [
         ModelDifference(
             *("extra joint", "joint", name, (("joint", *there),)),
@@ -93,7 +93,7 @@ def differences_of(
 
 def sensors_of(matched: Matched) -> list[ModelDifference]:
     """What the sensors of two Models differ in, which only a controller reads."""
-    return room(DEFAULT).sensors(matched.one.compiled, matched.two.compiled, matched)
+    return room(DEFAULT).sensors(matched.left.compiled, matched.right.compiled, matched)
 
 
 def built(model: Model, edits: tuple[Edit, ...]) -> Model:
@@ -167,10 +167,10 @@ def of_the_run(
         starts: Of both.
         keyframe: The keyframe of both; None where one has another, or none.
     """
-    one, two = starts
+    left, right = starts
     off = max(
-        float(farthest(matched.moved("qpos", one.qpos, two.qpos), two.qpos)),
-        float(farthest(matched.moved("qvel", one.qvel, two.qvel), two.qvel)),
+        float(farthest(matched.moved("qpos", left.qpos, right.qpos), right.qpos)),
+        float(farthest(matched.moved("qvel", left.qvel, right.qvel), right.qvel)),
     )
     if off > _SAME:
         yield ModelDifference(START, "run", "", (("farthest coordinate", 0.0, off),))
@@ -182,7 +182,7 @@ def order_of_ctrl(matched: Matched) -> tuple[ModelDifference, ...]:
     """The actuators that stand elsewhere on the right, where somebody writes ctrl by number."""
     if not matched.reordered:
         return ()
-    pairs, names = matched.actuators, matched.one.actuator_names
+    pairs, names = matched.actuators, matched.left.actuator_names
     left, right = (
         [names[a] or f"ctrl[{a}]" for a, _ in sorted(pairs, key=lambda pair: pair[side])]
         for side in (0, 1)
@@ -194,7 +194,7 @@ def order_of_ctrl(matched: Matched) -> tuple[ModelDifference, ...]:
 
 def order_of_joints(matched: Matched) -> tuple[str, ...]:
     """What a function of the user's may stumble over."""
-    places = [int(matched.two.jnt_qposadr[b]) for _, b in matched.joints]
+    places = [int(matched.right.jnt_qposadr[b]) for _, b in matched.joints]
     if places == sorted(places):
         return ()
     return (
@@ -205,10 +205,10 @@ def order_of_joints(matched: Matched) -> tuple[str, ...]:
 
 def _of_keyframe(matched: Matched, name: str) -> Iterator[ModelDifference]:
     """What else a keyframe sets: the time, ctrl, act, the mocap bodies."""
-    models = matched.one, matched.two
-    one, two = (model.compiled for model in models)
+    models = matched.left, matched.right
+    left, right = (model.compiled for model in models)
     keys = [[frame.name for frame in model.keyframes].index(name) for model in models]
-    times = [float(raw.key_time[key]) for raw, key in zip((one, two), keys, strict=True)]
+    times = [float(raw.key_time[key]) for raw, key in zip((left, right), keys, strict=True)]
     if times[0] != times[1]:
         values = (("time", times[0], times[1]),)
         edits: tuple[Edit, ...] = (("key_time", (keys[1],), times[0]),)
@@ -219,7 +219,7 @@ def _of_keyframe(matched: Matched, name: str) -> Iterator[ModelDifference]:
         ("mocap places", "key_mpos", "mocap_pos"),
         ("mocap turns", "key_mquat", "mocap_quat"),
     ):
-        ours, theirs = getattr(one, field)[keys[0]], getattr(two, field)[keys[1]]
+        ours, theirs = getattr(left, field)[keys[0]], getattr(right, field)[keys[1]]
         pairs = zip(*matched.places[part], strict=True)
         off = [(a, b) for a, b in pairs if abs(ours[a] - theirs[b]) > _SAME]
         if off:

@@ -39,7 +39,7 @@ class Explanation(Figures):
 
     Attributes:
         experiment, says, seconds: What was run.
-        one, two: The sides, left and right; differences are brought from the right to the left.
+        labels: What the sides are called; differences are brought from the right to the left.
         quantity: What the gap is measured in; unit: of it.
         measure: Which figure of it: the worst at any moment, that of the end, or the rms.
         first: The gap in each quantity, as they come.
@@ -91,8 +91,8 @@ class Explanation(Figures):
 
 
 def explain(
-    one: Model,
-    two: Model,
+    left: Model,
+    right: Model,
     scenario: Scenario,
     *,
     recordings: Sequence[Trace] = (),
@@ -113,15 +113,15 @@ def explain(
     What stays is looked for by leaving out, on both sides, what no setting holds.
 
     Args:
-        one: The left side, as loaded; the other is brought to it.
-        two: The right side, of any file and engine. Where one side comes with the settings of its
+        left: The left side, as loaded; the other is brought to it.
+        right: The right side, of any file and engine. Where one side comes with the settings of its
             engine and the other does not, each of them is a cause.
         scenario: What is run.
         recordings: Runs with the start and the commands of the left and of the right instead of the
             scenario's; of one alone both are given those.
         seconds: Simulated time; None for the scenario's own.
         seed: Of what the scenario draws, and of the orders that are drawn.
-        names: Joints, bodies, sites and actuators of `one` that go by other names in `two`.
+        names: Joints, bodies, sites and actuators of `left` that go by other names in `right`.
         quantity: What the gap is measured in; None for a free body that is touched at the start,
             relative to the tip, else the joints, or what differs most where these agree.
         measure: Which figure of it.
@@ -140,10 +140,10 @@ def explain(
         BadInputError: Nothing can be measured, or `jobs` is less than 1.
         UnknownNameError: There is no such quantity, or name.
     """
-    began, (left, right) = time.perf_counter(), labels or _labels(one, two)
-    scenario = scenario if recordings else scenario.on(one)
-    compiled = one.compiled is not None and two.compiled is not None
-    matched = match_models(one, two, names) if compiled else match_alike(one, two)
+    began, (left_label, right_label) = time.perf_counter(), labels or _labels(left, right)
+    scenario = scenario if recordings else scenario.on(left)
+    compiled = left.compiled is not None and right.compiled is not None
+    matched = match_models(left, right, names) if compiled else match_alike(left, right)
     runs, expected = 0, 10
 
     def ran() -> None:
@@ -154,7 +154,7 @@ def explain(
         progress(0.99 * runs / expected)
 
     length = scenario.seconds if seconds is None else seconds
-    trials = Trials((one, two), matched, scenario, recordings, length, seed, ran, jobs)
+    trials = Trials((left, right), matched, scenario, recordings, length, seed, ran, jobs)
     units = trials.ruler.units
     if quantity is not None:
         quantity = trials.ruler.named(quantity)
@@ -166,13 +166,13 @@ def explain(
         raise _ended(trials, able)
     if scenario.own and not trials.repeats():
         raise BadInputError(
-            f"two runs of {left} from the same start differ: "
+            f"two runs of {left_label} from the same start differ: "
             f"{scenario.name} does not command the same twice, and so no gap has a cause; give "
             "what it draws a seed, and let it keep nothing from one run to the next"
         )
     floors = {} if uncertain is None else trials.floor(uncertain, measure)
     if quantity is None:
-        quantity = _quantity(trials, first, floors, measure, one)
+        quantity = _quantity(trials, first, floors, measure, left)
     gap, floor = getattr(first[quantity], measure), floors.get(quantity, 0.0)
     negligible = ROUNDING[units[quantity]]
     nothing = gap <= max(negligible, floor / NOISY)
@@ -201,7 +201,7 @@ def explain(
             trials, frozenset(able), quantity, measure, gap, brought, max(negligible, floor)
         )
     )
-    shares = _shares(listed, divided, rest, two, nothing)
+    shares = _shares(listed, divided, rest, right, nothing)
     explained, located, unexplained = _parts(gap, brought, rest, nothing)
     # Each of them explains nearly all alone, and next to nothing after the others.
     redundant = [
@@ -217,8 +217,7 @@ def explain(
         experiment=scenario.name,
         says=scenario.says,
         seconds=length,
-        one=left,
-        two=right,
+        labels=(left_label, right_label),
         quantity=quantity,
         unit=units[quantity],
         measure=measure,
@@ -237,16 +236,16 @@ def explain(
         redundant=tuple(redundant) if len(redundant) > 1 and explained > UNEXPLAINED else (),
         impossible=divided.impossible,
         unmatched=matched.only,
-        missing=missing_parts(one, two),
+        missing=missing_parts(left, right),
         # What a function of the user's may stumble over.
         notes=(*matched.notes, *(order_of_joints(matched) if scenario.own else ())),
-        still=_still(listed, one, trials.traces[0]),
+        still=_still(listed, left, trials.traces[0]),
         touch=None if nothing else trials.touch(quantity),
         moments=len(trials.ruler.time),
         between=trials.ruler.between,
         runs=trials.count,
         took=time.perf_counter() - began,
-        provenance=(provenance(one), provenance(two)),
+        provenance=(provenance(left), provenance(right)),
     )
 
 
@@ -372,10 +371,12 @@ def _still(listed: tuple[Cause, ...], model: Model, trace: Trace) -> tuple[str, 
     )
 
 
-def _labels(one: Model, two: Model) -> Sequence[str]:
+def _labels(left: Model, right: Model) -> Sequence[str]:
     """File and engine of both, with the folders by which two files of one name differ."""
     return [
         f"{file} on {engine_of(model.backend)} {model.engine_version}"
         + ", engine defaults" * (getattr(model, "defaults", "model") == "engine")
-        for file, model in zip(files_apart(one.path.parts, two.path.parts), (one, two), strict=True)
+        for file, model in zip(
+            files_apart(left.path.parts, right.path.parts), (left, right), strict=True
+        )
     ]

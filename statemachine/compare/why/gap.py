@@ -39,23 +39,23 @@ class Ruler:
         units: Unit of each quantity.
     """
 
-    def __init__(self, matched: Matched, one: Trace, two: Trace) -> None:
+    def __init__(self, matched: Matched, left: Trace, right: Trace) -> None:
         """Of two runs as they come.
 
         Args:
             matched: What of the one Model is what of the other. Poses are computed with the
                 first, unless `curves` is given another.
-            one: A run of the first Model.
-            two: One of the second.
+            left: A run of the first Model.
+            right: One of the second.
         """
         try:
             self.between = False
-            self.time = common_moments(one.time, two.time, (one.timestep, two.timestep)).time
+            self.time = common_moments(left.time, right.time, (left.timestep, right.timestep)).time
         except TraceError:  # too few: rows of the second are made up between its own
-            time, end = one.time - one.time[0], two.time[-1] - two.time[0]
-            self.between, self.time = True, time[time <= end + SAME * one.header.timestep]
-        self._model = model = matched.one
-        joints, models = np.array(matched.joints, np.int64).reshape(-1, 2).T, (model, matched.two)
+            time, end = left.time - left.time[0], right.time[-1] - right.time[0]
+            self.between, self.time = True, time[time <= end + SAME * left.header.timestep]
+        self._model = model = matched.left
+        joints, models = np.array(matched.joints, np.int64).reshape(-1, 2).T, (model, matched.right)
         tip = usual_site([model.site_names[a] for a, _ in matched.sites])
         self._tips = (None, None) if tip is None else matched.sites[tip]
         self._places = [
@@ -67,7 +67,7 @@ class Ruler:
             for m, j in zip(models, joints, strict=True)
         ]
         free = joints[0][model.jnt_type[joints[0]] == int(JointType.FREE)]
-        self._joints = [one.header.joint_labels[joint] for joint in free]
+        self._joints = [left.header.joint_labels[joint] for joint in free]
         self._names = [model.body_names[b] or f"body {b}" for b in self._bodies[0]]
         tip = self._tips[0]
         self._tip = "" if tip is None else model.site_names[tip] or f"site {tip}"
@@ -162,9 +162,9 @@ class Ruler:
         """What a gap has to be above to matter; of a place, that of a body."""
         return QUANTITIES[self._kinds[quantity]].tolerance or 0.0
 
-    def distances(self, quantity: str, one: Curves, two: Curves) -> Array:
+    def distances(self, quantity: str, left: Curves, right: Curves) -> Array:
         """(n,) how far apart: the worst joint, or the length of the way between."""
-        a, b = one[quantity], two[quantity]
+        a, b = left[quantity], right[quantity]
         match self._kinds[quantity]:
             case "body":
                 return distances(a, b)
@@ -172,13 +172,13 @@ class Ruler:
                 return turns(a, b)
         return turns(a, b).max(axis=1) if quantity == BALLS else farthest(a, b)
 
-    def gap(self, quantity: str, one: Curves, two: Curves) -> Deviation:
+    def gap(self, quantity: str, left: Curves, right: Curves) -> Deviation:
         """In one quantity."""
-        return Deviation.of(self.distances(quantity, one, two), self.time, self.units[quantity])
+        return Deviation.of(self.distances(quantity, left, right), self.time, self.units[quantity])
 
-    def gaps(self, one: Curves, two: Curves) -> dict[str, Deviation]:
+    def gaps(self, left: Curves, right: Curves) -> dict[str, Deviation]:
         """In every quantity."""
-        return {name: self.gap(name, one, two) for name in self.units}
+        return {name: self.gap(name, left, right) for name in self.units}
 
     def floor(
         self, run: Curves, perturbed: Sequence[Curves | None], measure: str

@@ -107,7 +107,7 @@ def shapley(
     game, everything = _Game(value, gap, ahead, needs), frozenset(causes)
     if causes:
         ones = [frozenset({cause}) for cause in causes]
-        game.expect([*ones, *(everything - one for one in ones), everything])
+        game.expect([*ones, *(everything - left for left in ones), everything])
     alone = {cause: game.takes(cause, frozenset()) for cause in causes}
     last = {cause: game.takes(cause, everything - {cause}) for cause in causes}
     share, error = dict.fromkeys(causes, 0.0), dict.fromkeys(causes, 0.0)
@@ -214,8 +214,8 @@ def _drawn(game: _Game, active: Sequence[str], budget: int, random: np.random.Ge
         game.expect(
             frozenset(sequence[:n]) for sequence in orders for n in range(len(sequence) + 1)
         )
-        one, two = (_along(game, sequence) for sequence in orders)
-        pair = [(one[cause] + two[cause]) / 2 for cause in active]
+        left, right = (_along(game, sequence) for sequence in orders)
+        pair = [(left[cause] + right[cause]) / 2 for cause in active]
         if math.isnan(sum(pair)):
             failed += 1
         else:

@@ -109,22 +109,24 @@ class Trials:
         checked_jobs(jobs)  # refuses what is no number of them
         options = dict(scenario.options)
         self._own = _own_settings(models, options)
-        one, two = (model.replace(**options) if options else model for model in models)
-        self._models, self._matched, self._jobs = (one, two), matched, jobs
+        left, right = (model.replace(**options) if options else model for model in models)
+        self._models, self._matched, self._jobs = (left, right), matched, jobs
         self.seconds, self.seed, self._ran = seconds, seed, ran
         self._scenario = scenario
-        key, left = scenario.keyframe, start_of(one, scenario.keyframe)
+        key, left_start = scenario.keyframe, start_of(left, scenario.keyframe)
         # The second, if it has no such keyframe, starts where the first does.
-        known = key is None or key in [frame.name for frame in two.keyframes]
+        known = key is None or key in [frame.name for frame in right.keyframes]
         self._keyframes = key, key if known else None
-        right = start_of(two, self._keyframes[1])
-        self._starts = left, right if known else matched.start(left, right)
+        right_start = start_of(right, self._keyframes[1])
+        self._starts = left_start, right_start if known else matched.start(left_start, right_start)
         self._recordings = tuple(recordings)
         if recordings:
             first = recordings[0]
-            self._recordings = first, (*recordings, translated(first, matched, right))[1]
-            left, right = (SideStart(t.qpos[0], t.qvel[0], t.ctrl[0]) for t in self._recordings)
-            self._starts = left, right
+            self._recordings = first, (*recordings, translated(first, matched, right_start))[1]
+            left_start, right_start = (
+                SideStart(t.qpos[0], t.qvel[0], t.ctrl[0]) for t in self._recordings
+            )
+            self._starts = left_start, right_start
         self.ended, self._repeated = "", 0
         self._runs: dict[_Run, Figures] = {}
         self._by_name: dict[str, Cause] = {}
@@ -152,20 +154,22 @@ class Trials:
         Args:
             finer: Differences of files by their single entries, each by itself.
         """
-        one, two = self._models
+        left, right = self._models
         own = [setting for setting in self._own if setting]
         rows: list[ModelDifference] = []
-        if one.compiled is not None and two.compiled is not None:
+        if left.compiled is not None and right.compiled is not None:
             files = differences_of(
-                one, two, self._matched, not own, finer, sensors=self._scenario.own
+                left, right, self._matched, not own, finer, sensors=self._scenario.own
             )
             rows += [row for row in files if (row.kind, row.subject) != ("option", "timestep")]
             rows += of_the_run(self._matched, self._starts, self._keyframes[1])
         if self._recordings:
-            left, right = self._recordings
-            given = translated(left, self._matched, self._starts[1])
+            left_recording, right_recording = self._recordings
+            given = translated(left_recording, self._matched, self._starts[1])
             rows += (
-                [] if commands_alike(given, right) else [ModelDifference(COMMANDS, "run", "", ())]
+                []
+                if commands_alike(given, right_recording)
+                else [ModelDifference(COMMANDS, "run", "", ())]
             )
         for side, settings in enumerate(self._own):
             rows += settings.differences(side) if settings else []
@@ -180,22 +184,24 @@ class Trials:
 
     def _by_option(self) -> Iterator[ModelDifference]:
         """What differs and is brought over by `Model.replace`."""
-        one, two = self._models
-        names = ["timestep"] if one.compiled is not None and two.compiled is not None else BY_OPTION
+        left, right = self._models
+        names = (
+            ["timestep"] if left.compiled is not None and right.compiled is not None else BY_OPTION
+        )
         for name in names:
             values = tuple(
-                (option, getattr(one, fact), getattr(two, fact))
+                (option, getattr(left, fact), getattr(right, fact))
                 for option, fact in BY_OPTION[name].items()
-                if not np.array_equal(getattr(one, fact), getattr(two, fact))
+                if not np.array_equal(getattr(left, fact), getattr(right, fact))
             )
-            if values and set(BY_OPTION[name]) <= set(two.capabilities.options):
+            if values and set(BY_OPTION[name]) <= set(right.capabilities.options):
                 unit = "s" if name == "timestep" else ""
                 yield ModelDifference(name, "option", "", values, unit)
 
     def touch(self, quantity: str) -> Figures | None:
         """The first contact of either side; None where nothing touches, or it is not told."""
-        one, two = (self._runs[_Run(side, _NONE)].curves for side in (0, 1))
-        gap = self.ruler.distances(quantity, one, two) if one and two else None
+        left, right = (self._runs[_Run(side, _NONE)].curves for side in (0, 1))
+        gap = self.ruler.distances(quantity, left, right) if left and right else None
         return None if gap is None else first_touch(self.traces, self.ruler.time, gap)
 
     @property
@@ -214,8 +220,8 @@ class Trials:
             without: Features that are left out on both sides.
             integrator: Another one, on the side that has several.
         """
-        one, two = (self._run(run) for run in self._pair(brought, without, integrator))
-        return self.ruler.gaps(one, two) if one and two else {}
+        left, right = (self._run(run) for run in self._pair(brought, without, integrator))
+        return self.ruler.gaps(left, right) if left and right else {}
 
     def _pair(
         self, brought: frozenset[str], without: frozenset[str] = _NONE, integrator: str = ""

@@ -199,8 +199,8 @@ def _bar(share: float, text: str, signed: bool) -> Html:
 def quantity_row(quantity: QuantityChart) -> Html:
     """A row of a quantity: how far apart over time, both sides, and the figures on demand."""
     values, agreement = quantity.values(), quantity.agreement
-    one, two = quantity.labels
-    keys = tag("i", class_="key one"), f"{one} ", tag("i", class_="key two"), two
+    left, right = quantity.labels
+    keys = tag("i", class_="key one"), f"{left} ", tag("i", class_="key two"), right
     gap = f"how far apart, {quantity.unit}; log axis; dotted: the tolerance"
     if quantity.floor is not None:
         gap += "; grey: the chaos floor"

@@ -79,7 +79,7 @@ def report(page: Page, looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK)) -> str:
 def _header(page: Page, opening: Sequence[Block], stage: Html, runs: BothRuns | None) -> Html:
     name: list[object] = [tag("span", page.title, class_="experiment")]
     if runs is not None:
-        one, two = (
+        left, right = (
             tag("span", tag("i", class_=f"key {look}"), label, class_="side")
             for look, label in zip(("one", "two"), long_labels(runs.comparison), strict=True)
         )
@@ -87,9 +87,9 @@ def _header(page: Page, opening: Sequence[Block], stage: Html, runs: BothRuns | 
                     aria_label="Dark colours")  # fmt: skip
         name = [
             tag("span", runs.title, class_="experiment"),
-            one,
+            left,
             tag("span", "against", class_="against"),
-            two,
+            right,
             theme,
         ]
     lead = [block for block in opening[:1] if isinstance(block, Text)]
@@ -164,15 +164,15 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> tuple[Html, dict[str, Any],
         "lead": list(runs.lead),
         "scene": scene,
     }
-    now, (one, two) = float(times[start]), long_labels(runs.comparison)
-    short_one, short_two = short_labels(runs.comparison)
+    now, (left, right) = float(times[start]), long_labels(runs.comparison)
+    short_left, short_right = short_labels(runs.comparison)
     slots = {
-        "one": one,
-        "two": two,
-        "short_one": short_one,
-        "short_two": short_two,
-        "on_one": non_breaking(f"{until:g} s {on(one)}"),
-        "on_two": on(two),
+        "left": left,
+        "right": right,
+        "short_left": short_left,
+        "short_right": short_right,
+        "on_left": non_breaking(f"{until:g} s {on(left)}"),
+        "on_right": on(right),
         "tip": _TOOL if site == "gripperframe" else site or "a site",
         "now": short_time(now),
         "arrows": non_breaking(ARROWS.format(force=figure(strongest))) if strongest else "",
@@ -256,7 +256,7 @@ def _quantity_data(chart: QuantityChart, rows: Ints) -> dict[str, Any]:
         "tolerance": chart.agreement.tolerance * scale,
         "apart": packed(curve.difference[rows] * scale, "f4"),
     }
-    if curve.one.ndim == 1 and curve.one.size:
-        data["one"] = packed(curve.one[rows] * scale, "f4")
-        data["two"] = packed(curve.two[rows] * scale, "f4")
+    if curve.left.ndim == 1 and curve.left.size:
+        data["one"] = packed(curve.left[rows] * scale, "f4")
+        data["two"] = packed(curve.right[rows] * scale, "f4")
     return data

@@ -39,23 +39,23 @@ _ASPECT = 1.45  # width of the picture through its height; the script has it too
 Scene = tuple[dict[str, Any] | None, list[str], float]
 
 
-def moments_of(one: Trace, two: Trace, must: Sequence[float] = ()) -> tuple[Array, int]:
+def moments_of(left: Trace, right: Trace, must: Sequence[float] = ()) -> tuple[Array, int]:
     """Moments to be shown: those that were compared, unless they are too few to look like motion.
 
     Args:
-        one: A trace; without enough common moments its own are shown.
-        two: The other.
+        left: A trace; without enough common moments its own are shown.
+        right: The other.
         must: Moments that have to be among them [s].
 
     Returns:
         (n,) since the start [s], and how many compared moments are left out for their number.
     """
-    bodies = len(one.header.bodies) + len(two.header.bodies)
+    bodies = len(left.header.bodies) + len(right.header.bodies)
     most = max(60, min(1200, _BYTES // (14 * bodies)))
-    common = common_moments(one.time, two.time, (one.timestep, two.timestep)).time
+    common = common_moments(left.time, right.time, (left.timestep, right.timestep)).time
     time, until = common, float(common[-1])
-    if until / max(1, len(common) - 1) > max(_SMOOTH, 1.5 * max(one.timestep, two.timestep)):
-        time = one.time - one.time[0]
+    if until / max(1, len(common) - 1) > max(_SMOOTH, 1.5 * max(left.timestep, right.timestep)):
+        time = left.time - left.time[0]
         time = time[time <= until + 1e-9]
     wanted = np.searchsorted(time, np.array([*must, until]) - 1e-9)
     keep = np.union1d(np.arange(0, len(time), -(-len(time) // most)), wanted)
@@ -211,10 +211,10 @@ def _tips(
 ) -> tuple[Array, Array] | None:
     if any("site_xpos" not in trace or tip not in trace.header.sites for trace in traces):
         return None
-    one, two = (
+    left, right = (
         _between(trace.site(tip)[0], *place) for trace, place in zip(traces, places, strict=True)
     )
-    return (one, two) if np.isfinite([one, two]).all() else None
+    return (left, right) if np.isfinite([left, right]).all() else None
 
 
 def _way(trace: Trace, tip: str, shown: Array) -> dict[str, str]:
@@ -259,11 +259,11 @@ def _contacts(trace: Trace, rows: Ints, most: int) -> tuple[dict[str, str], floa
     return {"count": packed(counts, "u1"), "at": packed(where, "f4")}, strongest, more
 
 
-def _moving(one: Trace, two: Trace) -> list[int]:
+def _moving(left: Trace, right: Trace) -> list[int]:
     """Whether each body of the second side is elsewhere at another time or on the other side."""
-    pairs = zip(one.header.bodies, two.header.bodies, strict=False)
-    still = np.array([left == right for left, right in pairs])
-    for trace, column in itertools.product((one, two), ("xpos", "xquat")):
-        moved = np.abs(trace[column][:, : len(still)] - one[column][0, : len(still)])
+    pairs = zip(left.header.bodies, right.header.bodies, strict=False)
+    still = np.array([left_body == right_body for left_body, right_body in pairs])
+    for trace, column in itertools.product((left, right), ("xpos", "xquat")):
+        moved = np.abs(trace[column][:, : len(still)] - left[column][0, : len(still)])
         still &= moved.max(axis=(0, 2)) <= 1e-6
-    return [*np.where(still, 0, 1).tolist(), *[1] * (len(two.header.bodies) - len(still))]
+    return [*np.where(still, 0, 1).tolist(), *[1] * (len(right.header.bodies) - len(still))]
