@@ -145,7 +145,7 @@ $(VENV)/run.stamp: pyproject.toml constraints.txt
 	"(Debian, Ubuntu: apt-get install python3-venv)"; exit 1; }
 	@echo "setting up $(VENV) with $(PYTHON): about a minute the first time ..."
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(PIP) $(CONSTRAINTS) -e '.[mutants]'
+	@$(PIP) $(CONSTRAINTS) -e '.[faults]'
 	@touch $@
 
 $(VENV)/test.stamp: $(VENV)/run.stamp

@@ -63,12 +63,18 @@ class _Parser(argparse.ArgumentParser):
             behind = sys.argv[sys.argv.index(flag) + 1 :] if flag in sys.argv else []
             if behind and behind[0] and behind[0] not in named:
                 message += f" (one that begins with a minus: {flag}={behind[0]})"
-            elif flag in named and isinstance(metavar := named[flag].metavar, str):
-                message += f": {flag} {metavar}"
+            elif flag in named:
+                message += f": {flag} {named[flag].metavar or '|'.join(named[flag].choices or ())}"
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
             known = _flags(_parser(COMMANDS), sys.argv[1:])
-            message += did_you_mean(given, known, 0.6)
+            from .lessons import LESSONS
+
+            others = [x.name for x in LESSONS.values() if given.removeprefix("--") in x.defaults]
+            if "lesson" in sys.argv and others:
+                message += f"; it is an option of {PROGRAM} lesson {' and '.join(others)}"
+            else:
+                message += did_you_mean(given, known, 0.6)
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
 
@@ -135,9 +141,6 @@ def _options(words: list[str]) -> argparse.Namespace:
         from .commands import lesson
 
         parser.set_defaults(run=lesson.overview)
-        for k, word in enumerate(words[1:], start=1):
-            if words[k - 1] == "lesson":  # one of the path may be called by its number
-                words[k] = lesson.by_number(word)
     options = parser.parse_args(words)
     if getattr(options, "trust_binary", False):
         from .backends.binary import TRUST

@@ -447,6 +447,22 @@ def test_shapes_inside_each_other_at_the_start_are_told(model: Any) -> None:
     assert "2 of 2: robot.xml, lower on upper by 150 mm" in table
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "lesson hold --seconds .1",
+        "lesson replay --steps 9",
+        "trace record hold --seconds .1",
+        "compare hold --seconds .1",
+    ],
+)
+def test_a_start_outside_of_joint_limits_is_told(words: str, model: Any, here: Cli) -> None:
+    file = model(MIXED.format(rest=HOME.replace(".2", "1.2")), f"{words}.xml").path  # told once
+    assert (
+        here(*words.split(), "--model", file).stderr.count(": rail at 1.2 (limits -1 to 1)\n") == 1
+    )
+
+
 def test_nothing_is_told_of_shapes_that_touch_or_start_apart(
     model: Any, recwarn: pytest.WarningsRecorder
 ) -> None:

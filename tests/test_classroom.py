@@ -25,9 +25,9 @@ from statemachine.grading.classroom import (
     submissions,
 )
 from statemachine.grading.exercise import LOOK, ExerciseJudge, grade_of
+from statemachine.grading.faults import FAULTS
+from statemachine.grading.faults.run import examination_of, trial_of
 from statemachine.grading.judges import JUDGES, Judgement
-from statemachine.grading.mutants import MUTANTS
-from statemachine.grading.mutants.run import examination_of, trial_of
 from statemachine.page import Figures, Text
 from statemachine.report.grading import class_page, gradescope_results
 from statemachine.runs.whole import csv_text, replace_csv
@@ -127,9 +127,9 @@ def test_of_several_files_the_exercises_own_name_counts(tmp_path: Path) -> None:
 
 def test_a_folder_with_nothing_but_tests_and_no_jobs(tmp_path: Path, folder: Path) -> None:
     only = written_all(tmp_path / "only", {"test_arm.py": "def test_nothing(): ...\n"})
-    mutants = r"Did you mean .* --mutants .*test_arm.py\?"
+    meant = r"Did you mean .* --faults .*test_arm.py\?"
     refused(
-        (BadInputError, mutants, lambda: submission_in(only)),
+        (BadInputError, meant, lambda: submission_in(only)),
         (BadInputError, "at least 1", lambda: judge_all(submissions([folder]), "mujoco", jobs=0)),
     )
 
@@ -268,7 +268,7 @@ def test_tests_and_predictions_are_in_the_same_table(
         ran.append(file)
         caught = (Figures(test="test_x", why="no"),)
         trials = tuple(
-            trial_of(mutant, caught if k else ()) for k, mutant in enumerate(MUTANTS.values())
+            trial_of(fault, caught if k else ()) for k, fault in enumerate(FAULTS.values())
         )
         bad = caught if "bad" in file.read_text() else ()
         return examination_of(file.name, backend, "4", ("test_x",), bad, () if bad else trials)
@@ -405,11 +405,11 @@ def test_what_gradescope_reads(judged: list[str]) -> None:
         Judgement("demo_replay", True, False, ("busy",), judged=False),
     )
     grade = grade_of("step_loop.py", "0", "mujoco", {"mujoco": "4"}, marks)
-    read = json.loads(gradescope_results(grade, points=2.5))
+    read = json.loads(gradescope_results(grade))
     tests = {each["name"]: each for each in read["tests"]}
     assert list(tests) == list(JUDGES)
-    assert [each["score"] for each in tests.values()] == [2.5, 0, 0, 0]
-    assert {each["max_score"] for each in tests.values()} == {2.5}
+    assert [each["score"] for each in tests.values()] == [1, 0, 0, 0]
+    assert {each["max_score"] for each in tests.values()} == {1}
     assert [each["status"] for each in tests.values()] == ["passed", "failed", "failed", "failed"]
     assert tests["demo_state"]["output"] == "wrong\nbad\nworse"
     assert tests["demo_replay"]["output"] == "not judged\nbusy"

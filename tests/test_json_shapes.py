@@ -43,7 +43,7 @@ COMMANDS = [
     "compare --models so101 so101/scene",
     "trace show {ROOT}/statemachine/runs/recorded/droop.pybullet.npz",
     "check {ROOT}/teaching/solutions/step_loop.py",
-    "check --mutants {ROOT}/exercises/test_arm.py --only xyzw",
+    "check --faults {ROOT}/exercises/test_arm.py --only xyzw",
     "robots {ROOT}/models/so101/so101.xml --quick",
     "sweep droop --vary damping=0.5,0.6 --seconds 0.1 --backend mujoco --out swept",
 ]

@@ -276,7 +276,6 @@ def test_a_lesson_runs_what_is_compared(
 
 
 def test_the_line_that_loads_a_model() -> None:
-    assert load_line("so101/scene", "mujoco") == 'sm.load("so101/scene", backend="mujoco")'
     assert load_line("a", "b", "c d") == 'sm.load("a", backend="b", menagerie=\'c d\')'
     assert eval(load_line('x"y\\z', "b"), {"sm": type("S", (), {"load": lambda m, **_: m})})
 
@@ -587,7 +586,7 @@ _LATER = "Go on later with: statemachine lesson --from "
         ("state", [(_ASKED, "\n")], {}, "", "You predicted"),  # passed
         ("state --no-questions", [], {}, "", _ASKED),
         ("state --no-questions", [], {"lines": 9}, "", _MORE),
-        ("2", [(_ASKED, "\x03")], {}, "", "13 12 6"),
+        ("state", [(_ASKED, "\x03")], {}, "", "13 12 6"),
         # All but the verdict has room.
         (
             *("state", [(_ASKED, "a\n")], {"lines": 200}),
@@ -598,7 +597,17 @@ _LATER = "Go on later with: statemachine lesson --from "
             *("--from state", [(_ASKED, "a\n"), (_MORE, "q\n")], {"more": False}),
             *(f"{_LATER}state", "3 of 10"),
         ),
-        ("--from 9", [(_ASKED, "q\n")], {}, f"9 of 10.*{_LATER}time", "10 of 10|Where to go next"),
+        (
+            "--from time",
+            [(_ASKED, "q\n")],
+            {},
+            f"9 of 10.*{_LATER}time",
+            "10 of 10|Where to go next",
+        ),
+        (
+            *("--from time --record {tmp_path}/mine.json", [(_ASKED, "\x03")], {}),
+            *(rf"{_LATER}time --record\s\S*mine\.json", "10 of 10"),
+        ),
         (
             "",
             [
@@ -610,10 +619,17 @@ _LATER = "Go on later with: statemachine lesson --from "
     ],
 )
 def test_what_a_reader_at_a_terminal_is_asked_and_shown(
-    words: str, typed: list[tuple[str, str]], options: dict[str, Any], shown: str, absent: str
+    tmp_path: Path,
+    words: str,
+    typed: list[tuple[str, str]],
+    options: dict[str, Any],
+    shown: str,
+    absent: str,
 ) -> None:
     """A prediction is asked for before the answer, and each page waits for its reader."""
-    seen = _at_a_terminal("lesson", *words.split(), typed=typed, **options)
+    seen = _at_a_terminal(
+        "lesson", *words.format(tmp_path=tmp_path).split(), typed=typed, **options
+    )
     assert re.search(shown, seen, re.S)
     assert not absent or not re.search(absent, seen, re.S)
 
@@ -792,7 +808,6 @@ _SMALL = {
 def test_the_code_runs_with_the_smallest_options(name: str) -> None:
     _, taken = _take(name, "mujoco", **_SMALL[name])
     assert taken.printed
-    assert "Error" not in taken.printed
 
 
 @pytest.mark.parametrize("steps", [1, 40])
@@ -810,7 +825,6 @@ def test_two_worst_joints_are_named() -> None:
     for gaps in (taken.result.qpos[-1] - target, free - target):
         joint = int(np.argmax(np.abs(gaps)))
         assert f"{taken.result.joints[joint]}, by {np.degrees(abs(gaps[joint])):.2f}°" in said
-    assert "worst joint" not in said
 
 
 @pytest.mark.usefixtures("matplotlib")

@@ -94,7 +94,7 @@ COMMANDS = [
     _slow("audit --steps 3", 0, f"this interface on {NAME}"),
     _slow(f"check {ROOT}/exercises/step_loop.py", SAYS_NO, f"step_loop.py on {NAME}"),
     _slow(f"check {ROOT}/exercises/step_loop.py", SAYS_NO, "4 not written yet"),
-    (f"check --mutants {ROOT}/tests/test_arm.py", BAD_INPUT, "are made for mujoco and pybullet"),
+    (f"check --faults {ROOT}/tests/test_arm.py", BAD_INPUT, "are made for mujoco and pybullet"),
 ]
 
 

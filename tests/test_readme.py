@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from statemachine.grading.faults import FAULTS
 from statemachine.grading.judges import JUDGES
-from statemachine.grading.mutants.faults import FAULTS
 from statemachine.interface import Model
 from statemachine.lessons import PATH
 from statemachine.lessons.questions import ASKED
@@ -61,7 +61,7 @@ PYTHON = {name: "".join(blocks(page, "python")) for name, page in PAGES.items()}
 # Of exercises that are still to be written.
 SAYS_NO = (
     "statemachine check exercises/step_loop.py",
-    "statemachine check --mutants exercises/test_arm.py",
+    "statemachine check --faults exercises/test_arm.py",
     "python exercises/step_loop.py --gravity",
     "statemachine sweep hold --vary damping=0.6x:1.4x:5 --seconds 0.4 --out sweep-damping --report "
     "--floor-cells 4",
@@ -207,7 +207,7 @@ def test_what_is_counted() -> None:
 def test_what_is_to_be_installed_exists() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     extras = {name for page in PAGES.values() for name in re.findall(r'"\.\[(\w+)\]"', page)}
-    assert {"mutants", "test", "notebook"} <= extras <= set(project["optional-dependencies"])
+    assert {"faults", "test", "notebook"} <= extras <= set(project["optional-dependencies"])
 
 
 def test_files_that_are_linked_exist() -> None:

@@ -2,7 +2,7 @@
 
 The faults are put into the backend of an engine, one at a time, as a third-party backend that is
 registered under the name "faulty"; those of PyBullet's stand in `pybullet_faults`. Those that
-students' tests have to catch too come from `statemachine.grading.mutants`.
+students' tests have to catch too come from `statemachine.grading.faults`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from statemachine import conformance
 from statemachine.backends import _edits, mujoco_backend
 from statemachine.backends._mujoco_alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
-from statemachine.grading.mutants import faults as mutants
+from statemachine.grading.faults import patches
 from statemachine.interface import Model, State, read_only
 
 from .conftest import Patch, around, followed_by, need_engine, refused, registered
@@ -55,7 +55,7 @@ def _damp_bodies(raw: Any, by: float) -> None:
     raw.dof_damping[6:] = by
 
 
-free_body_damped = mutants.compiled(partial(_damp_bodies, by=0.4), partial(_damp_bodies, by=0))
+free_body_damped = patches.compiled(partial(_damp_bodies, by=0.4), partial(_damp_bodies, by=0))
 
 
 def changes_with(*names: str) -> Patch:
@@ -92,13 +92,13 @@ def facts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patch:
 
 
 FAULTS: dict[str, tuple[Patch, set[str]]] = {
-    "xyzw for wxyz": (mutants.xyzw, {"xquat_is_wxyz", "the_witness_agrees"}),
-    "centre of mass for frame": (mutants.com_for_frame, {"the_witness_agrees"}),
-    "forward omitted": (mutants.no_forward, {"a_write_marks_nothing_dirty"}),
-    "forward takes a step": (mutants.forward_steps, {"forward_changes_no_input"}),
+    "xyzw for wxyz": (patches.xyzw, {"xquat_is_wxyz", "the_witness_agrees"}),
+    "centre of mass for frame": (patches.com_for_frame, {"the_witness_agrees"}),
+    "forward omitted": (patches.no_forward, {"a_write_marks_nothing_dirty"}),
+    "forward takes a step": (patches.forward_steps, {"forward_changes_no_input"}),
     "a read recomputes": (a_read_recomputes, {"a_write_marks_nothing_dirty"}),
     "step ends with forward": (
-        mutants.step_and_forward,
+        patches.step_and_forward,
         {"a_step_leaves_values_of_the_state_before"},
     ),
     "reset keeps the time": (
@@ -135,16 +135,16 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
         contacts_with("geom", lambda geom: geom[:, ::-1].copy()),
         {"contact_carries_the_weight"},
     ),
-    "default motor left on": (mutants.motor_left_on, {"options_do_what_they_say"}),
-    "bulk is one short": (mutants.one_step_short, {"steps_add_up"}),
-    "gravity sign": (mutants.gravity_up, {"free_fall"}),
-    "gains doubled": (mutants.gains_doubled, {"untouched_ctrl_is_a_command"}),
-    "degrees": (mutants.degrees, {"the_witness_agrees", "the_servo_law"}),
-    "spin in world axes": (mutants.spin_in_world, {"free_body_velocity_conventions"}),
-    "reset keeps ctrl": (mutants.reset_keeps_ctrl, {"keyframes_are_taken_whole"}),
-    "no replay": (mutants.no_replay, {"replay_is_bit_identical"}),
+    "default motor left on": (patches.motor_left_on, {"options_do_what_they_say"}),
+    "bulk is one short": (patches.one_step_short, {"steps_add_up"}),
+    "gravity sign": (patches.gravity_up, {"free_fall"}),
+    "gains doubled": (patches.gains_doubled, {"untouched_ctrl_is_a_command"}),
+    "degrees": (patches.degrees, {"the_witness_agrees", "the_servo_law"}),
+    "spin in world axes": (patches.spin_in_world, {"free_body_velocity_conventions"}),
+    "reset keeps ctrl": (patches.reset_keeps_ctrl, {"keyframes_are_taken_whole"}),
+    "no replay": (patches.no_replay, {"replay_is_bit_identical"}),
     "free body damped": (free_body_damped, {"free_body_velocity_conventions"}),
-    "joints shifted": (mutants.joints_shifted, {"the_witness_agrees"}),
+    "joints shifted": (patches.joints_shifted, {"the_witness_agrees"}),
     "options ignored": (
         around(MujocoModel, "_replace")(lambda right, self, _: MujocoModel(self.raw, self.path, 1)),
         {"options_do_what_they_say"},

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from statemachine.grading.mutants.faults import FAULTS
+from statemachine.grading.faults import FAULTS
 from statemachine.lessons import LESSONS
 from statemachine.probes.conventions import CONCEPTS
 from statemachine.report.conventions import OURS, REMEMBER

@@ -26,7 +26,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Call each function of a student's file on several models, in a process of "
         "its own with limits, and say what is wrong with what it does. Several files, or the "
-        "folder of a class: a table. Or, with --mutants: put faults into the arm, and say which "
+        "folder of a class: a table. Or, with --faults: put faults into the arm, and say which "
         "of them a student's tests catch."
     )
     parser.epilog = (
@@ -81,27 +81,27 @@ def add(parser: argparse.ArgumentParser) -> None:
             {"type": file_name},
         ),
         (
-            "--mutants",
+            "--faults",
             "TESTFILE",
             "run these tests on the arm with one fault at a time, and say which they catch",
         ),
         (
             "--only",
             "FAULT",
-            "with --mutants: only this fault; may be given several times",
+            "with --faults: only this fault; may be given several times",
             REPEATED,
         ),
         json_of("judgement"),
     )
-    add_rules(parser, ("only", NEEDS, "mutants"))
+    add_rules(parser, ("only", NEEDS, "faults"))
 
 
 def run(options: argparse.Namespace) -> int:
     """Judge, and show."""
     refuse(
         (
-            (not options.files) == (options.mutants is None),
-            "expected one of FILE and --mutants TESTFILE",
+            (not options.files) == (options.faults is None),
+            "expected one of FILE and --faults TESTFILE",
         )
     )
     from ..grading.classroom import is_one_students
@@ -115,7 +115,7 @@ def run(options: argparse.Namespace) -> int:
     several = len(options.files) > 1 or (folder and not single)
     refuse(
         (
-            (options.mutants is not None or several) and options.gradescope,
+            (options.faults is not None or several) and options.gradescope,
             "--gradescope goes with one FILE, or one FOLDER",
         ),
         (
@@ -123,23 +123,23 @@ def run(options: argparse.Namespace) -> int:
             "--csv, --jobs, --roster and --tests go with several files, or a folder",
         ),
     )
-    if options.mutants is not None:
-        return _mutants(options)
+    if options.faults is not None:
+        return _faults(options)
     for target in (options.csv, options.gradescope):
         if target is not None:
             check_place(target)
     return _class(options) if several else _one(options)
 
 
-def _mutants(options: argparse.Namespace) -> int:
-    """A student's tests, on every mutant."""
-    from ..grading.mutants.run import examine
-    from ..report.grading import mutants_page
+def _faults(options: argparse.Namespace) -> int:
+    """A student's tests, on an arm with each of the faults."""
+    from ..grading.faults.run import examine
+    from ..report.grading import faults_page
     from ..report.terminal import progress
 
-    with progress("mutants") as report:
-        examination = examine(options.mutants, options.backend, options.only, progress=report)
-    return show(mutants_page(examination), examination, options.json)
+    with progress("faults") as report:
+        examination = examine(options.faults, options.backend, options.only, progress=report)
+    return show(faults_page(examination), examination, options.json)
 
 
 def _one(options: argparse.Namespace) -> int:

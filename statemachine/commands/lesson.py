@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
+from ..installed import DEFAULT
 from ..lessons import BESIDE, LESSONS, PATH, Lesson
+from ..page import Heading
 from ._common import (
     BACKEND,
     MISSING,
@@ -40,19 +42,13 @@ def add(parser: argparse.ArgumentParser) -> None:
             "--from",
             "LESSON",
             "of the whole path: where to begin, if not at the first",
-            {"dest": "start", "type": by_number, "choices": [lesson.name for lesson in PATH]},
+            {"dest": "start", "choices": [lesson.name for lesson in PATH]},
         ),
     )
     parser.set_defaults(run=run_path)
     named = parser.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
         _add_lesson(named, lesson)
-
-
-def by_number(word: str) -> str:
-    """The name of a lesson of the path that was given by its number."""
-    names = [lesson.name for lesson in PATH]
-    return names[int(word) - 1] if word.isdecimal() and 0 < int(word) <= len(names) else word
 
 
 def _shared() -> Iterator[Row]:
@@ -67,9 +63,10 @@ def _add_lesson(named: Any, lesson: Lesson) -> None:
     parser = named.add_parser(lesson.name, help=lesson.question, description=lesson.question)
     rows: list[Row] = [(*row, {"default": argparse.SUPPRESS}) for row in _shared()]
     rows += lesson.options
-    rows.append(("--plot", "FILE", "write its pictures: .svg, .png or .pdf"))
+    if lesson.plots:
+        rows.append(("--plot", "FILE", "write its pictures: .svg, .png or .pdf"))
     add_table(parser, *rows, model_of(lesson.model))
-    parser.set_defaults(run=run, lesson=lesson)
+    parser.set_defaults(run=run, lesson=lesson, plot=None)
 
 
 _OVERVIEW = f"""\
@@ -106,16 +103,15 @@ def run(options: argparse.Namespace) -> int:
     )
     values = {key: getattr(options, key) for key in lesson.defaults}
     reader = _reader(options, lesson)
-    if options.plot is not None:
-        from ..report.figures import check_suffix
-
-        check_suffix(Path(options.plot))
     page, results = _compute(options, lesson, options.model, values)
     if options.plot is not None:
         from ..report.figures import write_pictures
 
         size = write_pictures(page.blocks, Path(options.plot))
         print(f"wrote {options.plot} ({size / 1e3:.0f} kB)", file=sys.stderr)
+    if any(values[part] for part in lesson.more) and not options.json:
+        parts = [isinstance(block, Heading) for block in page.blocks]
+        page = replace(page, blocks=page.blocks[parts.index(True) :])
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
     following = f"{PROGRAM} lesson {later[0]}" if later else "python exercises/step_loop.py"
@@ -144,6 +140,7 @@ Where to go next:
 
 def run_path(options: argparse.Namespace) -> int:
     """All lessons of the path, one after the other."""
+    from ..measures.text import command
     from ..report import terminal
     from ..report.as_json import dumps
     from ..report.quiz import Stopped
@@ -172,7 +169,12 @@ def run_path(options: argparse.Namespace) -> int:
                 code = _last_page(options, reader)
     except (Stopped, KeyboardInterrupt) as stop:
         if reader:
-            print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
+            again = command(
+                [PROGRAM, "lesson", "--from", lesson.name],
+                ("--backend", options.backend, DEFAULT),
+                ("--record", options.record, None),
+            )
+            print(f"\nGo on later with: {again}")
         if isinstance(stop, KeyboardInterrupt):
             raise
     finally:
@@ -230,10 +232,9 @@ def _compute(
     from ..report import conventions
 
     recordings = {name: t.calls for name, t in taken.items() if t.calls and t.calls.statements}
-    if recordings:
-        page = replace(page, blocks=[*page.blocks, *conventions.recorded_calls(recordings)])
-    for name in [name for name, run in taken.items() if run.calls is None]:
-        page = replace(page, blocks=[*page.blocks, conventions.not_asked(name)])
+    recorded = conventions.recorded_calls(recordings) if recordings else ()
+    silent = [conventions.not_asked(name) for name, run in taken.items() if run.calls is None]
+    page = replace(page, blocks=[*page.blocks, *recorded, *silent])
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 
 

@@ -76,9 +76,9 @@ def check_forces_balance_at_rest(lab: Lab, model: Model, data: Data) -> None:
     _parts_add_up(fallen)
 
 
-def _parts_add_up(data: object) -> None:
-    parts = sum(getattr(data, f"qfrc_{part}") for part in ("contact", "friction", "limit"))
-    require_close(parts, getattr(data, "qfrc_constraint"), 1e-9, "parts of qfrc_constraint")  # noqa: B009
+def _parts_add_up(data: Data) -> None:
+    parts = data.qfrc_contact + data.qfrc_friction + data.qfrc_limit
+    require_close(parts, data.qfrc_constraint, 1e-9, "parts of qfrc_constraint")
 
 
 @check(on="arm")

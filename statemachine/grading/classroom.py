@@ -18,7 +18,7 @@ from . import score
 from .calls import reason
 from .class_table import NOTHING, ClassEntry, read, rows_of
 from .exercise import TIME_LIMIT, ExerciseJudge
-from .mutants.run import examine
+from .faults.run import examine
 from .recording import code_of, digest, has_functions, in_folder, likeness, shape_of
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
@@ -154,7 +154,7 @@ def _in_entry(entry: Path) -> list[Submission]:
     if notebooks := sorted(entry.rglob("*.ipynb")):
         text += f". {notebooks[0].name} is {_UNREAD['.ipynb']}"
     if (tests := entry / _NAMES[1]).is_file():
-        text += f". Did you mean statemachine check --mutants {tests.as_posix()}?"
+        text += f". Did you mean statemachine check --faults {tests.as_posix()}?"
     if files:
         names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
         text = f"{len(files)} files in it have the functions: {names}"
@@ -303,7 +303,7 @@ def _caught(file: Path, backend: str) -> str:
         return str(error)
     if examination.failures:
         return f"{examination.failures[0].test} fails on the arm without a fault"
-    missed = ", ".join(mutant.name for mutant in examination.survivors)
+    missed = ", ".join(fault.name for fault in examination.missed)
     return f"{examination.caught} of {len(examination.trials)}" + f"; not {missed}" * bool(missed)
 
 

@@ -296,7 +296,7 @@ def _python_file(path: Path) -> Path:
         (
             tests,
             f"{path.name} holds tests and none of the functions: did you mean "
-            f"statemachine check --mutants {path.name}?",
+            f"statemachine check --faults {path}?",
         ),
     )
     return path

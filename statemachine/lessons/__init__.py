@@ -26,8 +26,9 @@ class Lesson:
     """An entry of the table of lessons.
 
     Attributes:
-        more: Switches that show more of it; JSON and documentation show all.
+        more: Switches, each of which shows a part of it; JSON and documentation show all.
         on_path: Whether the guided path has it.
+        plots: Whether it has pictures for a file.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Lesson:
     options: tuple[Row, ...] = ()
     more: tuple[str, ...] = ()
     on_path: bool = True
+    plots: bool = False
 
     @property
     def defaults(self) -> dict[str, Any]:
@@ -64,6 +66,7 @@ LESSONS = {
             "state",
             "Which numbers are the state?",
             "so101/scene_box",
+            plots=True,
         ),
         Lesson(
             "write",
@@ -79,11 +82,12 @@ LESSONS = {
                 _JOINT,
                 _VALUE,
                 ("--site", "SITE", "the fingertip (default gripperframe, or the last site)"),
-                ("--arrays", "", "show which arrays each call changes"),
-                ("--lag", "", "show how far behind a step leaves it"),
+                ("--arrays", "", "show only which arrays each call changes"),
+                ("--lag", "", "show only how far behind a step leaves it"),
                 ("--seconds", "S", "simulated time of --lag (default 2)"),
             ),
             more=("arrays", "lag"),
+            plots=True,
         ),
         Lesson(
             "hold",
@@ -91,8 +95,9 @@ LESSONS = {
             "so101/scene",
             (
                 ("--seconds", "S", "simulated time (default 2)", {"default": 2.0}),
-                ("--target", "X,X,…", "command, one number an actuator"),
+                ("--target", "X,X,…", "command, one number an actuator [rad for a servo]"),
             ),
+            plots=True,
         ),
         Lesson(
             "gravity",
@@ -107,6 +112,7 @@ LESSONS = {
                 ),
                 ("--longer", "S", "simulated time of the fall; 0 for none (default 100)"),
             ),
+            plots=True,
         ),
         Lesson(
             "reset",
@@ -119,14 +125,15 @@ LESSONS = {
             "so101/scene_box",
             (
                 ("--steps", "N", "steps of each run (default 600)", {"default": 600}),
-                ("--ctrl", "X,X,…", "command, one number an actuator"),
+                ("--ctrl", "X,X,…", "command, one number an actuator [rad for a servo]"),
                 (
                     "--break",
                     None,
-                    "make the second run differ",
+                    "make the second run differ: one step more, or the command one step late",
                     {"choices": ("extra-step", "late-ctrl")},
                 ),
             ),
+            plots=True,
         ),
         Lesson(
             "time",
@@ -149,6 +156,7 @@ LESSONS = {
             "so101/scene_box",
             (("--most", "N", "the largest number of worlds (default 4096)", {"default": 4096}),),
             on_path=False,
+            plots=True,
         ),
         Lesson("questions", "Check yourself: six questions.", "so101/scene_box", on_path=False),
     )

@@ -199,9 +199,9 @@ def check_servos(model: Model, lesson: str, joint: str | None = None) -> None:
     """Raise BadInputError for a model, or a joint, without a position servo."""
     servos = model.actuator_jntid[is_servo(model)]
     if not servos.size or (joint is not None and model.joint_id(joint) not in servos):
-        file = model.path.name
+        robot = f"--model {model.path}"
         raise BadInputError(
-            f"no position servo drives {joint or file}, and this lesson is about servos; without "
-            f"one: statemachine compare {lesson} --model {file}, or "
-            f"statemachine trace record {lesson} --model {file}"
+            f"no position servo drives {joint or model.path.name}, and this lesson is about "
+            f"servos; without one: statemachine compare {lesson} {robot}, or "
+            f"statemachine trace record {lesson} {robot}"
         )

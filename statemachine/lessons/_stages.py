@@ -159,8 +159,8 @@ def lag_tables(results: Mapping[str, Figures]) -> list[Any]:
     return [
         Table(
             (
-                "after a step",
-                *(f"{name}: {moment} it" for name in results for moment in ("before", "after")),
+                "array",
+                *(f"{name}: {side} it" for name in results for side in ("before", "after")),
             ),
             [
                 (
@@ -173,7 +173,7 @@ def lag_tables(results: Mapping[str, Figures]) -> list[Any]:
                 )
                 for name in _MOMENTS
             ],
-            title="After how many steps each is that of the state before the step, and after it",
+            title="In how many steps each is that of the state before the step, and after it",
         ),
         Traces(
             "How far site_xpos is behind after each step",

@@ -156,7 +156,6 @@ def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     gaps, free = np.abs(result.qpos[-1] - result.goal), result.without_contacts
     away, worst = int((gaps > _THERE).sum()), largest(gaps)[1]
-    speed, fastest = largest(np.abs(result.speed))
     free_gaps, older = gaps if free is None else np.abs(free - result.goal), result.older
     return {
         "right": 0 if away == 0 else 2 if away == len(gaps) else 1,
@@ -164,8 +163,6 @@ def slots(result: Figures) -> dict[str, Any]:
         "seconds": f"{result.time[-1]:g} s",
         "away": f"{away} of {len(gaps)}",
         "worst": _farthest(result, gaps),
-        "fastest": result.joints[fastest],
-        "speed": f"{position(speed, result.slides[fastest], 3)}/s",
         "touches": result.first_contact is not None,
         "touched": together(result.touched),
         "touched_at": "" if result.first_contact is None else short_time(result.first_contact),

@@ -188,8 +188,8 @@ def _keyframe(number: int, scenes: Mapping[str, Figures]) -> Table:
     if first.body is not None:
         rows += [
             (f"{after}the robot touches the {first.body}", *(str(s.robot_steps) for s in columns)),
-            (f"{after}the world touches it", *(str(s.world_steps) for s in columns)),
-            ("its height changes meanwhile by", *(millimetres(s.rise) for s in columns)),
+            (f"{after}something fixed touches it", *(str(s.world_steps) for s in columns)),
+            (f"meanwhile the {first.body} rises by", *(millimetres(s.rise) for s in columns)),
         ]
     return Table(
         ("what touches", *scenes),

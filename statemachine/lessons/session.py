@@ -20,7 +20,7 @@ from ..interface import Data, Model, make_data, step
 from ..page import Code, Figures, Page, Printed
 from ..probes.calls import record, recorded_engines, statements
 from ..runs.drive import Progress, silent, steps_in
-from ..runs.robot import is_the_arm
+from ..runs.robot import is_the_arm, warn_of_start
 from . import Lesson, module, template
 
 
@@ -121,6 +121,7 @@ class CodeRun(ExitStack):
 
         def note(data: Data) -> None:
             if data not in courses:
+                warn_of_start(data.model, data.qpos)
                 courses[data] = Figures(ctrl=data.ctrl.copy(), time=[], qpos=[], looks=[])
             courses[data].time.append(data.time)
             courses[data].qpos.append(data.qpos.copy())

@@ -151,8 +151,8 @@ def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     rows = {
         "not waiting": lambda r: f"{duration(r.free)}, {r.factor:.3g} × real time",
         "paced": lambda r: f"{r.paced:.3f} s, {r.paced_factor:.3g} × real time",
-        "of that waiting": lambda r: f"{r.waited / r.paced:.0%}",
-        "latest step, late by": lambda r: duration(r.latest),
+        "part of that spent waiting": lambda r: f"{r.waited / r.paced:.0%}",
+        "the latest step was late by": lambda r: duration(r.latest),
     }
     steps = count(first.nstep, "step")
     title = f"{first.simulated:g} s of simulated time, {steps}, by the clock"

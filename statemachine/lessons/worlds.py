@@ -196,7 +196,7 @@ def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
     made = {
         "load a model": lambda r: duration(r.load),
         "make a Data of it": lambda r: duration(r.make_data),
-        "Data for the time of a load": lambda r: f"{r.ratio:,.0f}",
+        "Data made in the time of a load": lambda r: f"{r.ratio:,.0f}",
         "memory of a Data": lambda r: _memory(r.data_bytes),
         "memory of a world": lambda r: _memory(r.world_bytes),
     }

@@ -41,7 +41,7 @@ _PACKAGES = (
     ("gymnasium", "reinforcement learning", ("gym",)),
     ("mujoco-menagerie", "public robots", ("menagerie",)),
     ("robot_descriptions", "public robots", ("robots",)),
-    ("pytest", "check --mutants", ("mutants",)),
+    ("pytest", "check --faults", ("faults",)),
     ("jupyterlab", "the path as a notebook", ("notebook",)),
     ("sphinx", "pages (make docs)", ("docs",)),
     ("furo", "pages (make docs)", ("docs",)),

@@ -78,23 +78,26 @@ def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Pa
 _WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
 
 
-def mutants_page(examination: Figures) -> Page:
+def faults_page(examination: Figures) -> Page:
     """The examination as a page."""
     trials = Table.of(
         examination.trials,
         {
-            "fault": lambda trial: trial.mutant.name,
-            "what is wrong": lambda trial: trial.mutant.wrong,
+            "fault": lambda trial: trial.fault.name,
+            "what is wrong": lambda trial: trial.fault.wrong,
             "caught by": _catchers,
         },
         "One fault at a time",
         words={"what is wrong", "caught by"},
         emphasis=lambda trial: not trial.caught,
     )
-    failures, hints = examination.failures, [(m.name, m.hint) for m in examination.survivors]
+    failures, hints = (
+        examination.failures,
+        [(fault.name, fault.hint) for fault in examination.missed],
+    )
     idle = examination.idle and len(examination.trials) > 1 and not failures
     return template.page(
-        "mutants",
+        "faults",
         file=examination.file,
         tests=count(len(examination.tests), "test"),
         backend=examination.backend,
@@ -123,7 +126,7 @@ def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else text[: most - 1] + "…"
 
 
-def gradescope_results(grade: Figures | None, refusal: str = "", points: float = 1.0) -> str:
+def gradescope_results(grade: Figures | None, refusal: str = "") -> str:
     """A judgement in the form that Gradescope reads, the text of its `results.json`.
 
     The form is described in Gradescope's documentation, "Autograder Specifications".
@@ -131,19 +134,18 @@ def gradescope_results(grade: Figures | None, refusal: str = "", points: float =
     Args:
         grade: Of the submission; None where it could not be judged.
         refusal: Why it could not, shown to the student.
-        points: For each function.
     """
     judgements = {judgement.function: judgement for judgement in grade.functions} if grade else {}
     tests = []
     for name in JUDGES:
         judgement = judgements.get(name)
-        passed = judgement is not None and judgement.passed
+        passed = judgement is not None and judgement.passed  # a point each
         remarks = [refusal] if judgement is None else [verdict_word(judgement), *judgement.remarks]
         tests.append(
             {
                 "name": name,
-                "score": points if passed else 0.0,
-                "max_score": points,
+                "score": float(passed),
+                "max_score": 1.0,
                 "status": "passed" if passed else "failed",
                 "output": "\n".join(remarks),
                 "visibility": "visible",

@@ -35,6 +35,7 @@ from ..interface import (
 from ..interface.options import HUGE
 from .drive import Controller, Progress, drive, part_of, silent, steps_in
 from .header import Header, provenance
+from .robot import warn_of_start
 from .trace import COLUMNS, CONTACTS, Trace
 
 
@@ -103,6 +104,7 @@ def record(
     share = 0.3 if derive else 1.0
     with make_data(model) as data:
         begin(model, data)
+        warn_of_start(model, data.qpos)
         inputs, ended = _run(model, data, controller, total, part_of(progress, 0.0, share))
     columns: dict[str, Any] = dict(inputs)
     rewritten, energy_by = 0, ""

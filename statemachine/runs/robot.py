@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BadInputError, UnsupportedError
+from ..errors import BadInputError, EngineWarning, UnsupportedError
 from ..interface import Array, Contacts, JointType, Model, forward, make_data, reset
 from ..interface.options import check_entries
 from ..measures import ContactNames
+from ..measures.text import few
 
 ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 _PLANE, _HFIELD = 0, 1  # mjtGeom
@@ -112,8 +114,29 @@ def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
 _PART = 0.25  # of its range: how far a servo is sent
 _FARTHEST = {JointType.HINGE: 0.5, JointType.SLIDE: 0.1}  # rad, m; of a wide range or none
+_OUTSIDE = 1e-3  # rad, m; less is how a file rounds its numbers
 _NO_FORCE = 1e-9  # N·m or N; less is rounding
 _DIGITS = 4  # of what is computed, so that it can be typed and is the same on every engine
+
+
+def warn_of_start(model: Model, qpos: Array) -> None:
+    """Issue an EngineWarning if a run starts outside of the limits of hinges or slides.
+
+    Args:
+        model: What is run.
+        qpos: (nq,) where it starts.
+    """
+    scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
+    joints = np.flatnonzero(scalar & model.jnt_limited)
+    at, (low, high) = qpos[model.jnt_qposadr[joints]], model.jnt_range[joints].T
+    names = [model.joint_names[joint] or f"joint {joint}" for joint in joints]
+    outside = [
+        f"{names[k]} at {at[k]:.4g} (limits {low[k]:.4g} to {high[k]:.4g})"
+        for k in np.flatnonzero((at < low - _OUTSIDE) | (at > high + _OUTSIDE))
+    ]
+    if outside:
+        text = f"{model.path.name}: the run starts outside of joint limits [rad or m]: "
+        warnings.warn(text + few(outside), EngineWarning, stacklevel=3)
 
 
 def home(model: Model) -> str | None:

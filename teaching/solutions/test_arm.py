@@ -1,6 +1,6 @@
 """One solution of exercises/test_arm.py: every fault is caught, on both engines.
 
-    statemachine check --mutants teaching/solutions/test_arm.py
+    statemachine check --faults teaching/solutions/test_arm.py
 
 Each test knows its answer without the simulator: from a drawing, from school physics, or
 because two ways to the same place must end there.

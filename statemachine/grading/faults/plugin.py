@@ -5,7 +5,7 @@ part of it, and what was written before a crash is there.
 
 A student's tests get the fixtures `backend`, `model` (the arm, a floor and a box; made once)
 and `data` (a new one for each test). Without a fault in the environment the arm is healthy:
-`pytest -p statemachine.grading.mutants.plugin test_arm.py`.
+`pytest -p statemachine.grading.faults.plugin test_arm.py`.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Put the fault in; nothing of the student's is imported yet."""
-    from .faults import FAULTS  # on the healthy arm too, so that it tells nothing
+    from .patches import PATCHES  # on the healthy arm too, so that it tells nothing
 
     if name := os.environ.pop(FAULT, ""):
-        FAULTS[name](pytest.MonkeyPatch())  # for the life of the process
+        PATCHES[name](pytest.MonkeyPatch())  # for the life of the process
     if path := config.getoption("record"):
         config.pluginmanager.register(PytestRecorder(Path(path)))
         os.chdir(Path(path).parent)  # what tests write does not end up beside them

@@ -1,6 +1,6 @@
-"""The faults themselves: patches on the contract's own classes, so that each holds on every engine.
+"""Patches that make the faults, on the contract's own classes: so each holds on every engine.
 
-A fault is a function that takes a patcher, such as pytest's MonkeyPatch. What is wrong is what
+A patch is a function that takes a patcher, such as pytest's MonkeyPatch. What is wrong is what
 the arm does; what the Model tells of itself (gravity, gains, friction) stays right.
 """
 
@@ -21,10 +21,10 @@ from ...errors import MissingEngineError
 from ...installed import require
 from ...interface import INPUTS, Array, Data, JointType, read_only
 from ...rotations import matrix_from_quat, xyzw_from_wxyz
-from . import MUTANTS
+from . import FAULTS
 
 Patcher = Any  # what has setattr(target, name, value), as pytest's MonkeyPatch
-Fault = Callable[[Patcher], None]
+Patch = Callable[[Patcher], None]
 # (data, the right function, its arguments); what a fault does in its place.
 Instead = Callable[..., Any]
 
@@ -39,7 +39,7 @@ def _adapters() -> list[ModuleType]:
     return adapters
 
 
-def reading(name: str, function: Callable[[Data, Array], Array]) -> Fault:
+def reading(name: str, function: Callable[[Data, Array], Array]) -> Patch:
     """A fault in a derived array as it is read."""
 
     def fault(patch: Patcher) -> None:
@@ -49,7 +49,7 @@ def reading(name: str, function: Callable[[Data, Array], Array]) -> Fault:
     return fault
 
 
-def hook(name: str, instead: Instead) -> Fault:
+def hook(name: str, instead: Instead) -> Patch:
     """A fault in what the backends do for a verb."""
 
     def replacement(right: Callable[..., Any]) -> Callable[..., Any]:
@@ -63,7 +63,7 @@ def hook(name: str, instead: Instead) -> Fault:
     return fault
 
 
-def advancing(instead: Instead) -> Fault:
+def advancing(instead: Instead) -> Patch:
     """A fault in the engine's step, called with a number of steps."""
 
     def fault(patch: Patcher) -> None:
@@ -80,7 +80,7 @@ def advancing(instead: Instead) -> Fault:
     return fault
 
 
-def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Fault:
+def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Patch:
     """Inputs that the engine takes for other numbers: changed before each verb, and back after.
 
     Rounding must not give it away: each step goes there and back, and forward gives back bits.
@@ -111,7 +111,7 @@ def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Fa
     return fault
 
 
-def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Fault:
+def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Patch:
     """A fault in the compiled model, and in all that `replace` makes of it.
 
     It is taken out while the facts of the Model are read, so that these do not give it away.
@@ -147,7 +147,7 @@ def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Faul
     return fault
 
 
-def scaled(factor: float, *arrays: Callable[[Any], Array]) -> Fault:
+def scaled(factor: float, *arrays: Callable[[Any], Array]) -> Patch:
     """A fault in some arrays of the compiled model, which are multiplied.
 
     By -1 or a power of two, so that undoing it gives back the same bits.
@@ -259,4 +259,4 @@ gains_doubled = scaled(
 motor_left_on = scaled(16, lambda raw: raw.dof_frictionloss)
 
 # Each stands above under its name.
-FAULTS: dict[str, Fault] = {name: globals()[name.replace("-", "_")] for name in MUTANTS}
+PATCHES: dict[str, Patch] = {name: globals()[name.replace("-", "_")] for name in FAULTS}

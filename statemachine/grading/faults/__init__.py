@@ -1,6 +1,6 @@
-"""Mutants: the arm with one seeded fault at a time, to test a student's tests.
+"""The arm with one seeded fault at a time, to test the tests of students.
 
-A test that no wrong arm fails says nothing about the right one. `faults` puts a fault into a
+A test that no wrong arm fails says nothing about the right one. `patches` puts a fault into a
 running process, `plugin` does it inside pytest, `run` starts pytest once for each fault.
 """
 
@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Mutant:
+class Fault:
     """One fault, as it is told.
 
     Attributes:
-        name: What `--only` takes; its fault is `faults.FAULTS[name]`.
+        name: What `--only` takes; its fault is patch is `patches.PATCHES[name]`.
         wrong: What is wrong, in a few words.
         hint: What nobody looked at, where it survives.
     """
@@ -25,79 +25,79 @@ class Mutant:
 
 
 # From what is read, over what forward and step do, to what a replay is worth.
-_MUTANTS = (
-    Mutant(
+_FAULTS = (
+    Fault(
         "xyzw",
         "quaternions read x y z w",
         "nothing compares a quaternion with a turn that you know by hand",
     ),
-    Mutant(
+    Fault(
         "com-for-frame",
         "xpos is the centre of mass",
         "nothing compares xpos of a link with a place from the model's file, or asks whether "
         "turning a joint leaves the origin of its own link where it is",
     ),
-    Mutant(
+    Fault(
         "joints-shifted",
         "numbers go to the next joint",
         "nothing turns one joint and asks whether the fingertip moves as that joint moves it",
     ),
-    Mutant(
+    Fault(
         "degrees",
         "angles are taken for degrees",
         "nothing writes a known angle into qpos and measures how far the arm turned",
     ),
-    Mutant(
+    Fault(
         "no-forward",
         "forward does nothing",
         "nothing writes qpos, calls forward, and asks whether the fingertip followed",
     ),
-    Mutant(
+    Fault(
         "forward-steps",
         "forward takes a step",
         "nothing asks whether forward leaves time, qpos and qvel as they were",
     ),
-    Mutant(
+    Fault(
         "step-and-forward",
         "step ends with a forward",
         "nothing asks to which moment the fingertip belongs that is read right after a step",
     ),
-    Mutant(
+    Fault(
         "one-step-short",
         "step(…, n) takes n − 1 steps",
         "nothing compares one call of n steps with n calls of one step; `time` does not show it",
     ),
-    Mutant(
+    Fault(
         "motor-left-on",
         "a motor resists every joint",
         "nothing turns the servos off (model.replace(actuation=False)) and lets the arm fall",
     ),
-    Mutant(
+    Fault(
         "gains-doubled",
         "servos pull twice as hard",
         "nothing looks at how far the arm sags under its own weight, or how hard a servo pulls",
     ),
-    Mutant(
+    Fault(
         "gravity-up",
         "gravity points up",
         "nothing lets something fall and asks where it went",
     ),
-    Mutant(
+    Fault(
         "spin-in-world",
         "a box spins about world axes",
         "nothing spins a box that is already turned, and asks about which axis it goes round",
     ),
-    Mutant(
+    Fault(
         "reset-keeps-ctrl",
         "reset keeps the old ctrl",
         "nothing writes ctrl, resets, and looks at ctrl",
     ),
-    Mutant(
+    Fault(
         "no-replay",
         "a hidden number moves ctrl",
         "nothing runs the same commands twice from the same start and asks for the same bits",
     ),
 )
-MUTANTS = {mutant.name: mutant for mutant in _MUTANTS}
+FAULTS = {fault.name: fault for fault in _FAULTS}
 FAULT = "STATEMACHINE_FAULT"  # the variable that names a fault to the plugin
 IMPORT = "the import of the file"  # where that failed, in place of a test's name

@@ -1,4 +1,4 @@
-"""A test file against the healthy arm, then against every mutant, each in a process of its own.
+"""A test file against the healthy arm, then against every faulty one, each in a process of its own.
 
 The tests and what records them share a process: tests that look into it can learn that there is
 a fault without looking at the arm, or write the record themselves.
@@ -33,7 +33,7 @@ from ...page import Figures
 from ...processes import checked_jobs, sandbox
 from ...processes.parallel import in_parallel, unwinding
 from ..recording import content
-from . import FAULT, IMPORT, MUTANTS, Mutant
+from . import FAULT, FAULTS, IMPORT, Fault
 
 _SECONDS = 60.0  # of computing, for the tests on the healthy arm
 _CLOCK = 300.0  # on the clock: the machine may be busy with others
@@ -49,9 +49,9 @@ _CHAINED = re.compile(r"^(?:The above exception was|During handling of the above
 _OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
 
-def trial_of(mutant: Mutant, caught_by: tuple[Figures, ...]) -> Figures:
-    """A mutant, the tests that caught it with what each said, and whether any did."""
-    return Figures(mutant=mutant, caught_by=caught_by, caught=bool(caught_by))
+def trial_of(fault: Fault, caught_by: tuple[Figures, ...]) -> Figures:
+    """A fault, the tests that caught it with what each said, and whether any did."""
+    return Figures(fault=fault, caught_by=caught_by, caught=bool(caught_by))
 
 
 def examination_of(
@@ -71,13 +71,13 @@ def examination_of(
         tests: Those that are not skipped.
         failures: Those that failed on the healthy arm, each test and in a line why; then there are
             no trials.
-        trials: One for each mutant.
+        trials: One for each fault.
 
     Returns:
-        The same; caught: how many mutants were caught; survivors: those that no test caught; idle:
+        The same; caught: how many faults were caught; missed: those that no test caught; idle:
         tests that caught none; holds: whether the tests pass on the healthy arm and catch all.
     """
-    survivors = tuple(trial.mutant for trial in trials if not trial.caught)
+    missed = tuple(trial.fault for trial in trials if not trial.caught)
     busy = {failure.test for trial in trials for failure in trial.caught_by}
     return Figures(
         file=file,
@@ -86,10 +86,10 @@ def examination_of(
         tests=tests,
         failures=failures,
         trials=trials,
-        caught=len(trials) - len(survivors),
-        survivors=survivors,
+        caught=len(trials) - len(missed),
+        missed=missed,
         idle=tuple(test for test in tests if test not in busy),
-        holds=not failures and not survivors,
+        holds=not failures and not missed,
     )
 
 
@@ -101,12 +101,12 @@ def examine(
     clock: float = _CLOCK,
     progress: Callable[[float], None] = lambda _fraction: None,
 ) -> Figures:
-    """Run a student's tests on the healthy arm and on every mutant.
+    """Run a student's tests on the healthy arm and on one with each of the faults.
 
     Args:
         file: Tests as pytest takes them.
         backend: What the fixture `model` is loaded on.
-        only: Names of mutants; none for all.
+        only: Names of faults; none for all.
         seconds: What the tests may compute on the healthy arm [s].
         clock: What they may take there on the clock, from when the arm is ready [s].
         progress: Told the fraction that is done.
@@ -117,14 +117,14 @@ def examine(
     Raises:
         ModelFileError: There is no such file.
         BadInputError: It cannot be imported, or there are no tests in it.
-        UnknownNameError: There is no such mutant or backend.
+        UnknownNameError: There is no such fault or backend.
         MissingEngineError: The engine, or pytest, is not here.
         EngineError: pytest did not come as far as the tests.
     """
     path = _test_file(file)
     for name in only:
-        check_name("mutant", name, MUTANTS)
-    mutants = [MUTANTS[name] for name in dict.fromkeys(only or MUTANTS)]
+        check_name("fault", name, FAULTS)
+    faults = [FAULTS[name] for name in dict.fromkeys(only or FAULTS)]
     version = _ready(backend)
     records: dict[str, _Record] = {}
     with unwinding():
@@ -137,9 +137,9 @@ def examine(
         if not healthy.failures:
             took = healthy.outcome
             patience = _TIMES * took.cpu + _AND, _TIMES * took.wall + _CLOCK_AND
-            stop, total = threading.Event(), len(mutants) + 1
+            stop, total = threading.Event(), len(faults) + 1
             records = in_parallel(
-                {m.name: partial(_run, path, backend, m.name, *patience, stop) for m in mutants},
+                {f.name: partial(_run, path, backend, f.name, *patience, stop) for f in faults},
                 checked_jobs(None),
                 stop.set,
                 lambda left: progress((total - left) / total),
@@ -150,16 +150,16 @@ def examine(
         engine_version=version,
         tests=healthy.tests,
         failures=_failures_of(healthy),
-        trials=tuple(trial_of(m, _failures_of(records[m.name])) for m in mutants if records),
+        trials=tuple(trial_of(f, _failures_of(records[f.name])) for f in faults if records),
     )
 
 
 def _test_file(file: str | os.PathLike[str]) -> Path:
     path = Path(file).absolute()
     if not path.is_file():
-        raise ModelFileError(f"no file {os.fspath(file)}: --mutants takes a file of tests")
+        raise ModelFileError(f"no file {os.fspath(file)}: --faults takes a file of tests")
     if path.suffix != ".py":
-        raise BadInputError(f"{path.name} is no Python file: --mutants takes a file of tests")
+        raise BadInputError(f"{path.name} is no Python file: --faults takes a file of tests")
     return path
 
 
@@ -175,7 +175,7 @@ def _ready(backend: str) -> str:
     require(backend)
     if importlib.util.find_spec("pytest") is None:
         raise MissingEngineError(
-            "pytest is not installed here: pip install 'statemachine-sim[mutants]'",
+            "pytest is not installed here: pip install 'statemachine-sim[faults]'",
             engine="pytest",
         )
     return engine_version(backend)

@@ -1,4 +1,4 @@
-"""`statemachine check --mutants`: faults that are really there, and tests judged by them."""
+"""`statemachine check --faults`: faults that are really there, and tests judged by them."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rich.cells import cell_len
 import statemachine as sm
 from statemachine import cli as command_line
 from statemachine.errors import BadInputError, EngineError
-from statemachine.grading.mutants import MUTANTS, Mutant, run
-from statemachine.grading.mutants.faults import FAULTS
-from statemachine.grading.mutants.run import examination_of, examine, trial_of
+from statemachine.grading.faults import FAULTS, Fault, run
+from statemachine.grading.faults.patches import PATCHES
+from statemachine.grading.faults.run import examination_of, examine, trial_of
 from statemachine.page import Figures
-from statemachine.report.grading import mutants_page
+from statemachine.report.grading import faults_page
 
 from .conftest import (
     ROOT,
@@ -64,17 +64,17 @@ def write(tmp_path: Path) -> Write:
 # The faults.
 
 
-def test_every_mutant_has_a_fault_and_a_test() -> None:
-    assert list(MUTANTS) == list(FAULTS) == list(WRITTEN_AGAINST)
+def test_every_fault_has_a_patch_and_a_test() -> None:
+    assert list(FAULTS) == list(PATCHES) == list(WRITTEN_AGAINST)
 
 
 @pytest.mark.slow
-def test_the_solution_passes_and_catches_every_mutant(backend: str) -> None:
+def test_the_solution_passes_and_catches_every_fault(backend: str) -> None:
     # A fault that changed nothing would survive here.
     found = examine(SOLUTION, backend)
     assert found.failures == ()
-    caught = {trial.mutant.name: {f.test for f in trial.caught_by} for trial in found.trials}
-    assert list(caught) == list(MUTANTS)
+    caught = {trial.fault.name: {f.test for f in trial.caught_by} for trial in found.trials}
+    assert list(caught) == list(FAULTS)
     for name, test in WRITTEN_AGAINST.items():
         assert test in caught[name], name
     assert_has(found, idle=(), holds=True)
@@ -91,14 +91,14 @@ def test_the_model_does_not_give_its_faults_away(
 
     healthy = facts()
     for name in ("gravity-up", "gains-doubled", "motor-left-on"):
-        FAULTS[name](monkeypatch)
+        PATCHES[name](monkeypatch)
     assert facts() == healthy
 
 
 def test_a_fault_in_the_model_is_in_its_variants_too(
     backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    FAULTS["gravity-up"](monkeypatch)
+    PATCHES["gravity-up"](monkeypatch)
     model = sm.load("so101/scene_box", backend=backend)
     for given, up in ((None, 9.81), ([0, 0, -1.62], 1.62)):
         variant = model.replace(timestep=0.002) if given is None else model.replace(gravity=given)
@@ -114,7 +114,7 @@ def test_a_fault_in_the_model_is_in_its_variants_too(
 def test_rounding_does_not_give_a_fault_away(
     name: str, backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    FAULTS[name](monkeypatch)
+    PATCHES[name](monkeypatch)
     model = sm.load("so101/scene_box", backend=backend)
     runs = []
     for calls, steps in ((1, 12), (12, 1)):
@@ -133,7 +133,7 @@ def test_rounding_does_not_give_a_fault_away(
 def test_the_short_step_keeps_the_clock_right(
     backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    FAULTS["one-step-short"](monkeypatch)
+    PATCHES["one-step-short"](monkeypatch)
     with opened(sm.load("so101", backend=backend), nstep=7) as (model, data):
         assert math.isclose(data.time, 7 * model.timestep)
 
@@ -142,16 +142,16 @@ def test_the_short_step_keeps_the_clock_right(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("plugin", [(), ("-p", "statemachine.grading.mutants.plugin")])
+@pytest.mark.parametrize("plugin", [(), ("-p", "statemachine.grading.faults.plugin")])
 def test_pytest_alone_runs_the_exercise(plugin: tuple[str, ...]) -> None:
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", *plugin, EXERCISE)
     of_python(*words, folder=EXERCISE.parent, code=0)
 
 
-def test_the_exercise_begins_with_survivors_and_an_idle_test() -> None:
+def test_the_exercise_begins_with_missed_faults_and_an_idle_test() -> None:
     found = examine(EXERCISE, only=("xyzw", "degrees", "no-forward"))
     assert_has(found, failures=(), idle=("test_the_clock",), caught=2, holds=False)
-    assert [mutant.name for mutant in found.survivors] == ["xyzw"]
+    assert [fault.name for fault in found.missed] == ["xyzw"]
 
 
 HANGS_OR_FALLS = """
@@ -275,7 +275,7 @@ def test_a(request):
     assert not any(word in ("--fault", "STATEMACHINE_FAULT", "xyzw", "degrees") for word in words)
 """,
     "modules": "import sys\nSEEN = set(sys.modules)\n"
-    "def test_a(): assert 'statemachine.grading.mutants.faults' in SEEN\n",
+    "def test_a(): assert 'statemachine.grading.faults.patches' in SEEN\n",
 }
 
 
@@ -310,7 +310,7 @@ def test_a_fault_that_cannot_be_put_in_is_not_caught(
     write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write("def test_x(): pass")
-    monkeypatch.setitem(MUTANTS, "unheard-of", Mutant("unheard-of", "", ""))
+    monkeypatch.setitem(FAULTS, "unheard-of", Fault("unheard-of", "", ""))
     refused(
         (EngineError, r"before the tests: .*unheard-of", lambda: examine(path, only=["unheard-of"]))
     )
@@ -341,14 +341,12 @@ def test_another_pytests_settings_do_not_disturb(
 def test_the_page_keeps_to_its_columns() -> None:
     name = "test_" + "a_name_that_goes_on_and_on_" * 4
     one = Figures(test=name, why="why")
-    trials = tuple(
-        trial_of(mutant, (one,) * (k % 3 * 6)) for k, mutant in enumerate(MUTANTS.values())
-    )
-    page = mutants_page(examination_of("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
+    trials = tuple(trial_of(fault, (one,) * (k % 3 * 6)) for k, fault in enumerate(FAULTS.values()))
+    page = faults_page(examination_of("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
     assert not page.holds
     text = shown(page)
     assert max(map(cell_len, text.splitlines())) <= 80
-    assert MUTANTS["xyzw"].hint in " ".join(text.split())
+    assert FAULTS["xyzw"].hint in " ".join(text.split())
 
 
 def test_without_pytest_it_says_what_to_install(
@@ -358,5 +356,5 @@ def test_without_pytest_it_says_what_to_install(
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *rest: None if name == "pytest" else right(name)
     )
-    assert command_line.main(["check", "--mutants", str(EXERCISE)]) == 3
-    assert "pip install 'statemachine-sim[mutants]'" in capsys.readouterr().err
+    assert command_line.main(["check", "--faults", str(EXERCISE)]) == 3
+    assert "pip install 'statemachine-sim[faults]'" in capsys.readouterr().err
