@@ -63,8 +63,8 @@ class _Parser(argparse.ArgumentParser):
             behind = sys.argv[sys.argv.index(flag) + 1 :] if flag in sys.argv else []
             if behind and behind[0] and behind[0] not in named:
                 message += f" (one that begins with a minus: {flag}={behind[0]})"
-            elif flag in named:
-                message += f": {flag} {named[flag].metavar or '|'.join(named[flag].choices or ())}"
+            elif flag in named and isinstance(metavar := named[flag].metavar, str):
+                message += f": {flag} {metavar}"
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
             known = _flags(_parser(COMMANDS), sys.argv[1:])

@@ -605,7 +605,7 @@ _LATER = "Go on later with: statemachine lesson --from "
             "10 of 10|Where to go next",
         ),
         (
-            *("--from time --record {tmp_path}/mine.json", [(_ASKED, "\x03")], {}),
+            *("--from time --record {tmp_path}/mine.json", [(_ASKED, "q\n")], {}),
             *(rf"{_LATER}time --record\s\S*mine\.json", "10 of 10"),
         ),
         (
@@ -769,7 +769,7 @@ def test_what_follows_the_path_is_shown_a_screenful_at_a_time(
     prompts: list[str] = []
     monkeypatch.setattr("builtins.input", lambda prompt: prompts.append(prompt) or "")
     monkeypatch.setattr(shutil, "get_terminal_size", lambda: os.terminal_size((80, 24)))
-    assert main(["lesson", "--from", "10"]) == 0
+    assert main(["lesson", "--from", "speed"]) == 0
     said = capsys.readouterr().out
     assert said.index("The fingertip, and an independent witness") < said.index("Where to go next")
     _, first, *others = prompts  # the lesson's own question comes first

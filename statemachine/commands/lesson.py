@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
+from itertools import dropwhile
 from pathlib import Path
 from typing import Any
 
@@ -110,8 +111,8 @@ def run(options: argparse.Namespace) -> int:
         size = write_pictures(page.blocks, Path(options.plot))
         print(f"wrote {options.plot} ({size / 1e3:.0f} kB)", file=sys.stderr)
     if any(values[part] for part in lesson.more) and not options.json:
-        parts = [isinstance(block, Heading) for block in page.blocks]
-        page = replace(page, blocks=page.blocks[parts.index(True) :])
+        shown = dropwhile(lambda block: not isinstance(block, Heading), page.blocks)
+        page = replace(page, blocks=list(shown))
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
     following = f"{PROGRAM} lesson {later[0]}" if later else "python exercises/step_loop.py"

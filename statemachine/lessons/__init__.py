@@ -128,7 +128,7 @@ LESSONS = {
                 ("--ctrl", "X,X,…", "command, one number an actuator [rad for a servo]"),
                 (
                     "--break",
-                    None,
+                    "extra-step|late-ctrl",
                     "make the second run differ: one step more, or the command one step late",
                     {"choices": ("extra-step", "late-ctrl")},
                 ),

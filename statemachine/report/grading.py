@@ -91,10 +91,7 @@ def faults_page(examination: Figures) -> Page:
         words={"what is wrong", "caught by"},
         emphasis=lambda trial: not trial.caught,
     )
-    failures, hints = (
-        examination.failures,
-        [(fault.name, fault.hint) for fault in examination.missed],
-    )
+    failures = examination.failures
     idle = examination.idle and len(examination.trials) > 1 and not failures
     return template.page(
         "faults",
@@ -103,9 +100,9 @@ def faults_page(examination: Figures) -> Page:
         backend=examination.backend,
         version=examination.engine_version,
         trials=None if failures else trials,
-        hints=[] if failures else [Text(f"{name}: {hint}.") for name, hint in hints],
+        hints=[Text(f"{fault.name}: {fault.hint}.") for fault in examination.missed],
         idle=", ".join(examination.idle) if idle else None,
-        healthy=None if failures else not hints,
+        healthy=None if failures else not examination.missed,
         caught=examination.caught,
         faults=count(len(examination.trials), "fault"),
         unhealthy=False if failures else None,
