@@ -454,7 +454,7 @@ def in_a_row(model: sm.Model, data: sm.Data) -> None:
 def another_python(name: str, rounds: int) -> list[Ratio]:
     """The installed release in a process of its own, against itself in this one.
 
-    The last lines are no ratios: what a call takes, with the tenth and the ninetieth percentile.
+    The last lines are not ratios: what a call takes, with the tenth and the ninetieth percentile.
     """
     release = f"mujoco=={mujoco.__version__}"
     releases.add(release)

@@ -28,7 +28,7 @@ html_title = f"statemachine {version}"
 html_static_path = ["_static"]
 html_css_files = ["cheat-sheet.css"]
 html_show_sourcelink = html_copy_source = False  # the sources are generated
-smartquotes = False  # --realtime is no dash
+smartquotes = False  # --realtime is not a dash
 exclude_patterns = ["_build"]
 
 

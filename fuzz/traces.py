@@ -102,7 +102,7 @@ def _cut(draw: random.Random, good: bytes, _trace: Trace) -> tuple[bytes, bool]:
 
 
 def _column(draw: random.Random, _good: bytes, trace: Trace) -> tuple[bytes, bool]:
-    """A column of another shape, kind or content, or an entry that is no array."""
+    """A column of another shape, kind or content, or an entry that is not an array."""
     name = draw.choice(list(trace.columns))
     array: Any = np.array(trace[name])
     odd = [

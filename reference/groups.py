@@ -113,7 +113,7 @@ def figures(group: str) -> dict[str, Figures]:
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
-            return json.loads(json.dumps(GROUPS[group]()), parse_constant=str)  # NaN is no JSON
+            return json.loads(json.dumps(GROUPS[group]()), parse_constant=str)  # NaN is not JSON
         finally:
             os.chdir(here)
 

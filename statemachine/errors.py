@@ -123,7 +123,7 @@ class UnsupportedError(StateMachineError, NotImplementedError):
 
 
 class TraceError(StateMachineError, ValueError):
-    """A file is no trace, or a trace does not fit what is asked of it."""
+    """A file is not a trace, or a trace does not fit what is asked of it."""
 
 
 class ReadOnlyError(StateMachineError, AttributeError):

@@ -58,7 +58,7 @@ class Kinematics:
     Raises:
         MissingEngineError: Pinocchio is not installed here.
         ModelError: Pinocchio cannot read this file, or would misread it.
-        BadInputError: `joint_names` are no names.
+        BadInputError: `joint_names` are not names.
     """
 
     def __init__(

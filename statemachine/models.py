@@ -35,7 +35,7 @@ from .errors import (
 # when it is first used, and keeps it in a folder of its own on this machine.
 
 _MENAGERIE, _DESCRIPTIONS = "menagerie:", "robot_descriptions:"
-_ANSWERS_WITHIN = 5.0  # s; a network that takes longer is none
+_ANSWERS_WITHIN = 5.0  # s; a slower network counts as no network
 _GITHUB = "https://github.com"
 # Git asks nobody, and gives up a transfer that stands still [bytes/s, s].
 _GIT = {
@@ -182,7 +182,7 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
         ModelFileError: The path or the menagerie folder is not there.
         UnknownNameError: No model has this name.
         MissingEngineError: The package of robots is not installed.
-        TypeError: It is no text and no path.
+        TypeError: It is not text and no path.
     """
     text = _as_text(name)
     if is_named(text) and (menagerie is None or ":" in text):

@@ -44,7 +44,7 @@ def version_of(name: str) -> str:
     if match is None:
         whole = f"{name}.0" if _NAME.fullmatch(f"{name}.0") else _EXAMPLE
         raise BadInputError(
-            f"{name!r} is no release of an engine, which has three numbers: type {whole}"
+            f"{name!r} is not a release of an engine, which has three numbers: type {whole}"
         )
     check_name("engine", match["engine"], [name for name, engine in ENGINES.items() if engine.runs])
     return match["version"]

@@ -34,7 +34,7 @@ _QUIET = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
-# What a browser has against drawing without a graphics card is no fault of a page.
+# What a browser has against drawing without a graphics card is not a fault of a page.
 _SLOW_CARD = ("GPU stall", "GL Driver Message", "software WebGL", "swiftshader")
 _LOCAL = ("127.0.0.1", "localhost", "::1")
 

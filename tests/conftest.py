@@ -314,7 +314,7 @@ def lesson_result(name: str, model: Model, **options: Any) -> Any:
 
 
 def shared(path: Path) -> Path:
-    """Data of the public model, which are no part of the project: skip without them."""
+    """Data of the public model, which are not part of the project: skip without them."""
     if not path.exists():
         reason = f"no {path.relative_to(SHARED.parent)} beside the checkout"
         if "shared" in REQUIRED:

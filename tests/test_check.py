@@ -167,7 +167,7 @@ def row(*values):
 NOTHING = {name: {'tuple': []} for name in ("memory", "live", "runs", "forwards", "ends")}
 NOTHING['changed'] = {'dict': []}
 """
-_NO_RECORD = r"what its process recorded is no record of a run \("
+_NO_RECORD = r"what its process recorded is not a record of a run \("
 _REPLACED_JUDGE = """
 from statemachine.grading import judges
 for name in judges.JUDGES:
@@ -426,7 +426,7 @@ def test_it_reaches_neither_us_nor_the_files(
         ("import os\n\nx = '\xe9'\n", "the file cannot be loaded: line 3: this is not UTF-8"),
         ("# -*- coding: latin-1 -*-\nx = '\xe9'\n", "the file has no function demo_gravity"),
         ("", "the file has no function demo_gravity"),
-        ("demo_gravity = 4\n", "demo_gravity is no function: int"),
+        ("demo_gravity = 4\n", "demo_gravity is not a function: int"),
         ("def demo_gravity(): pass\n", "too many positional arguments"),
         ("def demo_gravity(model, /, *, seconds): pass\n", "it is called with a model and 1 more"),
     ],

@@ -233,7 +233,7 @@ def test_a_roster_gives_every_student_a_row(
         encoding="utf-8-sig",
     )
     table = tmp_path / "t.csv"
-    for _ in range(2):  # a row without a file is no verdict on another one
+    for _ in range(2):  # a row without a file is not a verdict on another one
         main(["check", str(folder), "--roster", str(roster), "--csv", str(table)])
         rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
         found = {row["student"]: row for row in rows if row["student"]}
@@ -291,7 +291,7 @@ def test_tests_and_predictions_are_in_the_same_table(
         for name, tests, predictions in (
             ("ann", "13 of 14; not xyzw", "2 of 3"),  # counted, whatever the score says
             ("bob", "test_x fails on the arm without a fault",
-             "lesson.json is no record of predictions"),
+             "lesson.json is not a record of predictions"),
             ("cy", "13 of 14; not xyzw", ""),  # without the functions
             ("eve.py", "", ""),
         ):  # fmt: skip

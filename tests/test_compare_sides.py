@@ -154,7 +154,7 @@ def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
         (["so101", "timstep=1"], "no option named 'timstep'.*Did you mean 'timestep'"),
         (["timestep=1", "so101"], "timestep=1 stands before any side"),
         (["so101", "timestep="], "timestep= has no value"),
-        (["so101", "timestep=fast"], "timestep=fast is no value"),
+        (["so101", "timestep=fast"], "timestep=fast is not a value"),
         (["so101 timestep=1", "timestep=2"], "timestep is given twice"),
         (["so101@pybullet:users"], "'users'; known: engine"),
         (["no/such.xml"], "no/such.xml does not exist"),

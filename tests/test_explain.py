@@ -37,7 +37,7 @@ STILL = replace(SWING, controller=lambda _model, _seed: lambda _time, _data: [0.
 
 
 def shares(found: Explanation) -> dict[str, float]:
-    """The part of each cause; of one without any it is no number."""
+    """The part of each cause; of one without any it is not a number."""
     return {e.name: float("nan") if e.share is None else e.share for e in found.shares}
 
 

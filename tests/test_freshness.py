@@ -366,7 +366,7 @@ def test_results_are_records(box: Model, held: Data) -> None:
         (Gap(2.0, "vanishes", "a – b"), "2 vanish at a – b"),
         (Gap(2.5, "N·m", "j"), "2.5 N·m at j"),
         (Gap(1e-12, "m", "tip"), "below 1e-06 mm at tip"),
-        (Gap(None, "rad", ""), "all zero, which is no rotation"),
+        (Gap(None, "rad", ""), "all zero, which is not a rotation"),
     ],
 )
 def test_gaps_in_words(gap: Gap, text: str) -> None:
@@ -449,7 +449,7 @@ def test_a_watch_counts_writes_and_steps(box: Model) -> None:
         data.qpos[1] = 0.8
         data.ctrl[:] = 0.2
         data.ctrl[2] = 0.3
-        data.ctrl[2] = 0.3  # the same again is no change
+        data.ctrl[2] = 0.3  # the same again is not a change
         data.ctrl = np.full(box.nu, 0.1)
         assert row("xpos") == ("1 write ago", 0, 1)
         assert row("qfrc_actuator") == ("4 writes ago", 0, 4)
@@ -542,7 +542,7 @@ def test_a_watch_names_the_lines_that_read(box: Model) -> None:
 
 
 def test_a_watch_that_does_not_raise_never_does(model: Model) -> None:
-    """What is written is no number, which the program may still mend: no size, no error."""
+    """What is written is not a number, which the program may still mend: no size, no error."""
     with sm.make_data(model) as data, sm.watch_freshness(model, data) as watch:
         sm.forward(model, data)
         data.qpos[1] = np.nan

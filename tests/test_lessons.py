@@ -876,7 +876,7 @@ def test_the_first_answer_counts_and_a_session_is_gone_on_with(
 )
 def test_another_file_is_not_overwritten(tmp_path: Path, text: str) -> None:
     file = written(tmp_path / "mine.json", text)
-    refused((BadInputError, "no record of predictions", lambda: RecordedReader(file)))
+    refused((BadInputError, "not a record of predictions", lambda: RecordedReader(file)))
     assert file.read_text() == text
 
 

@@ -412,8 +412,8 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
             '<!DOCTYPE r [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]><robot name="r">&b;</robot>',
             "DOCTYPE",
         ),
-        ("<robot", "no XML"),
-        ("<mujoco/>", "no URDF"),
+        ("<robot", "not XML"),
+        ("<mujoco/>", "not a URDF"),
         ('<robot name="r"/>', "no <link>"),
         ('<robot name="r"><link name="a"/><link name="b"/></robot>', "2 links hang on nothing"),
         ('<robot name="r"><link name="a"/><link name="a"/></robot>', "two links are called 'a'"),
@@ -427,7 +427,7 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
         (
             '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
             '<child link="z"/></joint></robot>',
-            "'z', which is no link",
+            "'z', which is not a link",
         ),
         (
             '<robot name="r"><link name="a"><inertial><mass value="nan"/></inertial></link>'

@@ -184,7 +184,7 @@ def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) 
         sm.reset(model, data)
         with warnings.catch_warnings(action="error"):
             refused((EngineWarning, "", lambda: sm.step(model, data)))
-            sm.get_state(model, data)  # a warning is no trouble
+            sm.get_state(model, data)  # a warning is not trouble
 
 
 def test_a_data_that_raw_drove_to_nan_says_so_at_the_next_step() -> None:

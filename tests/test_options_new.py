@@ -63,7 +63,7 @@ def test_gains_are_of_servos_alone(tmp_path: Path, backend: str) -> None:
 @pytest.mark.parametrize(
     ("option", "value", "says"),
     [
-        ("kp", [1.0, 2.0], r"kp\[0\] is given for motor, which is no position"),
+        ("kp", [1.0, 2.0], r"kp\[0\] is given for motor, which is not a position"),
         ("kp", [np.nan, np.nan], r"kp\[0\] = nan"),
         ("mass", [1.0, 2.0], r"mass\[0\] \(world\) = 1 must be 0"),
         ("mass", [0.0, 0.0], r"mass\[1\] \(cart\) = 0 must be above 0"),

@@ -380,7 +380,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     assert answer(chaos).startswith("Nothing can be concluded: the gap is 2.58°, and the chaos")
     assert chaos.is_rounding
     assert answer(explanation_of(hold, negligible=1.0)).startswith("The two sides move alike")
-    # Where something cannot be brought to the same, a location is no explanation.
+    # Where something cannot be brought to the same, a location is not an explanation.
     refused = with_figures(located.found_in[0], share=1.0)
     row = Figures(name="shape of box", note="another size", share=None)
     assert located.is_explained

@@ -207,7 +207,7 @@ def test_files_are_named_too(folder: Path) -> None:
     assert [each.path for each in find([good, binary, good])] == [good, binary]
     refused(
         (BadInputError, "no file or folder", lambda: find([folder / "none"])),
-        (BadInputError, "is no model", lambda: find([folder / "notes.txt"])),
+        (BadInputError, "is not a model", lambda: find([folder / "notes.txt"])),
         (BadInputError, "no models", lambda: find([folder / "empty"])),
     )
 
@@ -319,7 +319,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path: Path, suffix: str) -> None:
     else:
         assert [row["file"] for row in json.loads(target.read_text())] == [ROW.file, "=c.xml"]
     target.write_text("a,b\n1,2\n" if suffix == ".csv" else '{"a": 1}')
-    refused((BadInputError, "is no table of models", lambda: read_table(target)))
+    refused((BadInputError, "is not a table of models", lambda: read_table(target)))
 
 
 def test_what_is_wrong() -> None:

@@ -142,7 +142,7 @@ def test_a_message_is_cut_and_keeps_its_ends(tmp_path: Path) -> None:
 
 
 def test_what_compiling_warns_of_is_said_and_leaves_no_file(backend: str, tmp_path: Path) -> None:
-    """MuJoCo takes the density for a mass that is no number, and says so in a log file."""
+    """MuJoCo takes the density for a mass that is not a number, and says so in a log file."""
     (tmp_path / "m.xml").write_text(_model(geom=' mass="nan"'))
     code = f"""
 import warnings

@@ -173,7 +173,7 @@ def test_what_a_reader_says_at_length_is_cut(box: Trace, tmp_path: Path) -> None
     content = bytearray(file.read_bytes())
     content[content.index(b"PK\x03\x04") + 27] |= 4  # of the length of the first name
     file.write_bytes(content)
-    assert len(str(refused((TraceError, "is no trace", lambda: read(file))))) < 300
+    assert len(str(refused((TraceError, "is not a trace", lambda: read(file))))) < 300
 
 
 def test_a_name_from_a_file_does_nothing_to_a_terminal(

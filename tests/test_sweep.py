@@ -507,7 +507,7 @@ def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> No
     (tmp_path / "cells").mkdir()
     refused(
         (BadInputError, r"holds cells and no sweep\.json", lambda: run_sweep(sweep, tmp_path)),
-        (BadInputError, r"is no sweep: it has no sweep\.json", lambda: read_manifest(tmp_path)),
+        (BadInputError, r"is not a sweep: it has no sweep\.json", lambda: read_manifest(tmp_path)),
     )
     for text in (
         whole[:200],

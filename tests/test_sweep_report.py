@@ -269,7 +269,7 @@ def fitted(
 
 def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
     (found,) = fitted(tmp_path / "s", best=0.61, least=0.1e-3).together
-    assert found.varied == "both"  # a parameter of a function is no side's own
+    assert found.varied == "both"  # a parameter of a function is not a side's own
     assert_has(
         the(found.fit), value=pytest.approx(0.61, abs=1e-3), gap=pytest.approx(0.1e-3, rel=1e-3)
     )

@@ -126,7 +126,7 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
             for header, says in [
                 ({"schema": 99}, "this version reads 1"),
                 ({"joints": ["a"]}, "entries"),
-                ({"provenance": {}}, "no header"),
+                ({"provenance": {}}, "not a header"),
                 ({"joints": ["gripper"] * 7}, "two joints of the trace are called 'gripper'"),
                 ({"jnt_qposadr": [12] * 7}, "no place in qpos"),
                 ({"jnt_type": [9] * 7}, "jnt_type of the trace names"),
@@ -157,7 +157,7 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
             for entries, says in [
                 ({"header": None}, "no header"),
                 ({"header": np.frombuffer(b"{}", dtype=np.uint8)}, "schema None"),
-                ({"header": np.frombuffer(b"\xff\xfe", dtype=np.uint8)}, "is no trace"),
+                ({"header": np.frombuffer(b"\xff\xfe", dtype=np.uint8)}, "is not a trace"),
                 ({"qpos": np.zeros((3, 3))}, "shape"),
                 ({"qpos": np.array(["a"])}, "not numbers"),
                 ({"qpos": np.array([{}], dtype=object)}, "not numbers"),
@@ -168,15 +168,15 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
                 ({"contact_geom": put(999)}, "geom that is not there"),
                 ({"contact_dist": None}, "contacts only"),
                 ({"speed": np.zeros(3)}, "no column 'speed'"),
-                ({"qpos": b"hello"}, "is no trace"),  # what is no array
+                ({"qpos": b"hello"}, "is not a trace"),  # what is not an array
                 ({"/notes.txt": b"hello"}, ""),
                 ({"/header": b"{}"}, ""),  # beside header.npy
-                ({"header": np.frombuffer(b"[" * 100_000, dtype=np.uint8)}, "no header"),
+                ({"header": np.frombuffer(b"[" * 100_000, dtype=np.uint8)}, "not a header"),
                 ({"time": claim(10**14)}, "shape"),
                 ({"qpos": claim(10**12)}, "shape"),
                 ({"qpos": claim(0, 10**18)}, "shape"),
-                ({"qpos": claim(21, 13)}, "is no trace"),  # and nothing after it
-                ({"qpos": b"\x93NUMPY\x01\x00\x10\x00__import__('os')"}, "is no trace"),
+                ({"qpos": claim(21, 13)}, "is not a trace"),  # and nothing after it
+                ({"qpos": b"\x93NUMPY\x01\x00\x10\x00__import__('os')"}, "is not a trace"),
                 ({"qpos": b"\x93NUMPY\x09\x00\x10\x00"}, "npy version"),
                 ({"time": put(0.005, 2)}, "time does not go on after row 1"),
                 # Numbers that no run gives.

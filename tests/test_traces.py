@@ -345,7 +345,7 @@ def test_what_is_no_trace_at_all(tmp_path: Path, box: Trace) -> None:
     for name, content in (("empty", b""), ("text", b"hello"), ("half", good[: len(good) // 2])):
         for suffix in (".npz", ".parquet"):
             (tmp_path / f"{name}{suffix}").write_bytes(content)
-            says[f"{name}{suffix}"] = "is no trace"
+            says[f"{name}{suffix}"] = "is not a trace"
     wrong = BadInputError, TraceError
     refused(*((wrong, words, partial(read, tmp_path / name)) for name, words in says.items()))
 

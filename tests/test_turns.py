@@ -108,7 +108,7 @@ def _in_each_step(data: sm.Data, act: Callable[[], object]) -> None:
 def test_a_hook_may_use_what_its_own_data_offers(
     mujoco_arm: sm.Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A backend's hook, a callback, a signal handler: the same thread is no second one."""
+    """A backend's hook, a callback, a signal handler: the same thread is not a second one."""
     seen: list[object] = []
     with sm.make_data(mujoco_arm) as data:
         _in_each_step(data, lambda: seen.append((data.site_xpos, sm.get_state(mujoco_arm, data))))

@@ -241,7 +241,7 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
                     np.testing.assert_allclose(handle.wxyz, data.xquat[body], atol=1e-5)
                     placed += 1
             assert placed == 2 * 9
-            # A keyframe's commands are shown rounded; what is shown is no command.
+            # A keyframe's commands are shown rounded; what is shown is not a command.
             time.sleep(0.2)
             assert front.commands() == []
             for part in drawing.parts:

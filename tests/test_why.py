@@ -72,7 +72,7 @@ def test_an_integrator_is_chosen_on_the_side_that_has_several(tmp_path: Path) ->
 
 
 def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
-    """Of another engine with a heavier arm: what stills the arm closes the gap, and is no cause."""
+    """Another engine, a heavier arm: what stills the arm closes the gap, and is not a cause."""
     with registered("hidden", "tests.hidden_world:load"):
         two = sm.load("so101/scene", backend="hidden")
         two.raw.body_mass[:] *= 1.3  # which no compiled model tells

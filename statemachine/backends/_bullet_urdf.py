@@ -134,7 +134,7 @@ class Names:
     """What bodies, joints and sites are called in a URDF, each name once.
 
     MuJoCo lets a joint and a body, or two things without names, go by one name; a URDF
-    that does is no file to some readers and the end of the process to others.
+    that does is not a file to some readers and the end of the process to others.
 
     Attributes:
         links: Of each body's link; joints: of each joint; tips: of each site's link.

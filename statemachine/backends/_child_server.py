@@ -141,7 +141,7 @@ def end_with(pipe) -> None:
 def main() -> None:
     """Answer until there is nobody to ask."""
     source, out = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what an engine prints is no answer
+    os.dup2(2, 1)  # what an engine prints is not an answer
     if hasattr(select, "poll"):
         threading.Thread(target=end_with, args=(source,), daemon=True).start()
     server = Answerer(SimpleNamespace(**runpy.run_path(sys.argv[1])))

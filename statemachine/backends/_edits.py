@@ -48,7 +48,7 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
         raw: The compiled model; stays as it is.
         options: actuation, contacts, limits: bool; gravity: (3,) [m/s²]; armature [kg·m² or
             kg], damping [N·m·s/rad or N·s/m], frictionloss [N·m or N]: (nv,); mass: (nbody,)
-            [kg]; friction: (ngeom,); kp, kv: (nu,), NaN of what is no position servo;
+            [kg]; friction: (ngeom,); kp, kv: (nu,), NaN of what is not a position servo;
             latency: (nu,) [s]. All may have one more axis in front, with a value for each
             world. Others are ignored.
 

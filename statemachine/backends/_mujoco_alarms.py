@@ -90,7 +90,7 @@ def pass_on(texts: list[str], stacklevel: int) -> None:
 
 
 class AlarmError(Exception):
-    """MuJoCo found an entry that is no number: the first, if that is known, and when [s]."""
+    """MuJoCo found an entry that is not a number: the first, if that is known, and when [s]."""
 
     def __init__(self, quantity: str, index: int | None, time: float) -> None:
         super().__init__(quantity, index, time)

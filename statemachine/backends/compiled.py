@@ -128,9 +128,9 @@ def contacts_at_start(raw: mujoco.MjModel) -> tuple[Ints, Array]:
 
 
 def check_numbers(raw: mujoco.MjModel, name: str) -> None:
-    """Raise ModelError if a number of a compiled model is none, or has an impossible sign.
+    """Raise ModelError if an entry of a compiled model is NaN, or has an impossible sign.
 
-    So it does for a name that is no text.
+    So it does for a name that is not text.
 
     Args:
         raw: The compiled model.
@@ -181,7 +181,7 @@ def spec_with_packages(path: Path) -> mujoco.MjSpec | None:
 
 
 def _problems(raw: mujoco.MjModel) -> Iterator[str]:
-    """What of a compiled model is no number, or has a sign that it cannot have."""
+    """What of a compiled model is not a number, or has a sign that it cannot have."""
     if not raw.opt.timestep > 0:
         yield f"timestep is {raw.opt.timestep:g}, and must be above 0"
     for name in dir(raw.opt):

@@ -347,7 +347,7 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     only = starts[0]
 
     # MuJoCo takes a zero quaternion for the identity without a word. One whose first number
-    # is not zero is none, which is the cheapest look; others are looked at again.
+    # is not zero is not zero, which is the cheapest test; others are looked at again.
     def checked(engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1) -> None:
         for start in starts:
             if low < qpos[start] < high:

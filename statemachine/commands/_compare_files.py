@@ -53,7 +53,7 @@ def checked(options: argparse.Namespace) -> Any:
     """What draws the film, before anything runs; None where none is asked for.
 
     Raises:
-        BadInputError: A file has another suffix or cannot be written, or a figure is none.
+        BadInputError: A file has another suffix or cannot be written, or a figure is invalid.
         MissingEngineError: An extra is missing, or nothing here can draw a film.
     """
     from ..runs.whole import check_place

@@ -202,7 +202,7 @@ def notes_on(left: Trace, right: Trace, common: Common, of_quantities: Iterable[
             (
                 header.rewritten,
                 f"{label}: in {header.rewritten} rows the state was written, by the "
-                "controller; that is no part of the commands",
+                "controller; that is not part of the commands",
             ),
             (
                 header.single,

@@ -229,7 +229,7 @@ def _solid(pair: Pair) -> BodyPair:
 
 
 def _led(left: Model, right: Model, given: Mapping[str, str]) -> list[BodyPair]:
-    """The mocap bodies: no joint moves them, but they are no part of the world; by name.
+    """The mocap bodies: no joint moves them, but they are not part of the world; by name.
 
     Those without a name in both are one where as many others come before them.
     """

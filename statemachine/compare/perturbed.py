@@ -48,7 +48,7 @@ def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
     """What words like "0.1mm" and "0.1deg" say.
 
     Raises:
-        BadInputError: A word is none, or a length or an angle is given twice.
+        BadInputError: A word is invalid, or a length or an angle is given twice.
     """
     sizes: dict[str, float] = {}
     for word in words:

@@ -126,7 +126,7 @@ def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
     curves = []
     if kind is JointType.FREE:
         curves.append(_curve(f"{name}, position", "body", time, *(side[:, :3] for side in values)))
-    with np.errstate(invalid="ignore"):  # all zero is no rotation: NaN, which never agrees
+    with np.errstate(invalid="ignore"):  # all zero is not a rotation: NaN, which never agrees
         turned = (
             matrix_from_quat(q[:, -4:] / np.linalg.norm(q[:, -4:], axis=1, keepdims=True))
             for q in values

@@ -199,7 +199,7 @@ def _side(word: str, menagerie: str | None) -> Side:
     elif not Path(word).exists():
         _refuse_mistyped(word)
     side = Side(file, engine, "engine" if defaults == "engine" else "model", {}, menagerie)
-    side.path  # noqa: B018  (raises for what is no file)
+    side.path  # noqa: B018  (raises for what is not a file)
     return side
 
 
@@ -240,7 +240,8 @@ def _option(text: str) -> tuple[str, Any]:
         numbers = [float(number) for number in given.split(",")]
     except ValueError:
         raise BadInputError(
-            f"{name}={shown(given)[1:-1]} is no value: numbers, with commas between, or on or off"
+            f"{name}={shown(given)[1:-1]} is not a value: give numbers, with commas between, on or "
+            "off"
         ) from None
     if len(numbers) > 1:
         return name, numbers

@@ -186,7 +186,7 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
     Raises:
         UnknownNameError: No such experiment or backend.
         MissingEngineError: An engine is missing, and nothing was recorded of this.
-        TraceError: A file is no trace.
+        TraceError: A file is not a trace.
         StateMachineError: A side cannot be loaded, or cannot do what was asked.
     """
     request = Request((request,)) if isinstance(request, str) else request
@@ -197,7 +197,7 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
             return _opened(request, progress)
         if request.what[0] not in SCENARIOS and Path(request.what[0]).is_file():
             raise BadInputError(
-                f"{request.what[0]!r} is no trace: a trace ends in .npz or .parquet"
+                f"{request.what[0]!r} is not a trace: a trace ends in .npz or .parquet"
             )
         for name in request.backends:
             check_backend("backend", name)
@@ -255,7 +255,7 @@ def _opened(request: Request, progress: Progress) -> SidesRun:
     for word in request.what:
         if not is_trace(word):
             hint = " (an experiment runs on both engines alone)" if word in SCENARIOS else ""
-            raise BadInputError(f"{word!r} is no trace{hint}: a trace ends in .npz or .parquet")
+            raise BadInputError(f"{word!r} is not a trace{hint}: a trace ends in .npz or .parquet")
     traces = [read(word) for word in request.what]
     both = len(traces) == 2
     _refuse_of_run(

@@ -128,7 +128,7 @@ class HiddenState:
 
     Attributes:
         ways: Ways to save, by name.
-        changes: Changes of what is no position or velocity, by what they change.
+        changes: Changes of what is not a position or velocity, by what they change.
         let_pass: Makes everything pass through everything.
         best: All that can be read and written.
     """

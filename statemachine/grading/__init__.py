@@ -30,7 +30,7 @@ def answers_in(file: Path) -> dict[str, dict[str, Any]]:
             raise ValueError("an answer is neither right nor wrong")
     except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise BadInputError(
-            f"{file.name} is there and is no record of predictions ({error}): name another file"
+            f"{file.name} is there and is not a record of predictions ({error}): name another file"
         ) from None
     return answers
 
@@ -40,5 +40,5 @@ def score(file: Path) -> str:
     try:
         answers = answers_in(file).values()
     except BadInputError:
-        return f"{file.name} is no record of predictions"
+        return f"{file.name} is not a record of predictions"
     return f"{sum(answer['right'] for answer in answers)} of {len(answers)}"

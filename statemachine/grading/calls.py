@@ -73,7 +73,7 @@ def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function
     function: Any = names.get(name)
     refuse(
         (function is None, f"the file has no function {name}"),
-        (not callable(function), f"{name} is no function: {type(function).__name__}"),
+        (not callable(function), f"{name} is not a function: {type(function).__name__}"),
         error=FaultError,
     )
     takes, why = misfit(function, None, *arguments)

@@ -111,7 +111,7 @@ def run(
         folder: One of which everything belongs to the file; without, what it names beside it.
 
     Raises:
-        BadInputError: There is no such file, or it is no Python file.
+        BadInputError: There is no such file, or it is not a Python file.
         UnknownNameError: There is no such backend.
         MissingEngineError: Its engine is not installed here.
     """
@@ -177,7 +177,7 @@ class ExerciseJudge(ExitStack):
                 names beside it.
 
         Raises:
-            BadInputError: There is no such file, or it is no Python file.
+            BadInputError: There is no such file, or it is not a Python file.
         """
         path = _python_file(Path(file))
         folder = Path(tempfile.mkdtemp(dir=self._folder))
@@ -255,7 +255,7 @@ def _without_answers(copy: _Copy, name: str, recording: FunctionRecording) -> Ju
     outcome = recording.outcome
     known = recording.broken or (recording.began and outcome.end != "clock")
     if recording.broken:
-        text = f"what its process recorded is no record of a run ({recording.broken})"
+        text = f"what its process recorded is not a record of a run ({recording.broken})"
     elif not recording.began:
         text = (
             f"nothing could be judged: the judge itself {outcome.how}. Your code was "
@@ -280,7 +280,7 @@ def _python_file(path: Path) -> Path:
     refuse(
         (folder, f"{path.name} is a folder: name the student's file in it"),
         (not file, f"there is no file {path.name}"),
-        (path.suffix != ".py", f"{path.name} is no Python file: its name does not end in .py"),
+        (path.suffix != ".py", f"{path.name} is not a Python file: its name does not end in .py"),
     )
     try:
         with path.open("rb") as file:
@@ -291,7 +291,7 @@ def _python_file(path: Path) -> Path:
     refuse(
         (
             len(content) > LARGEST or b"\0" in content,
-            f"{path.name} is no Python file, or far too large for one",
+            f"{path.name} is not a Python file, or far too large for one",
         ),
         (
             tests,

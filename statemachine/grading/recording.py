@@ -31,7 +31,7 @@ _CHILD = (
     "import sys; sys.path.insert(0, sys.argv[2]); "
     "from statemachine.grading.guard import main; main(sys.argv[1])"
 )
-# What a program needs to start; the rest is none of a student's business.
+# What a program needs to start; the rest does not concern a student.
 _KEPT = (
     "PATH", "SYSTEMROOT", "LANG", "LC_ALL",
     "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHOME", "CONDA_PREFIX",
@@ -58,7 +58,7 @@ class FunctionRecording:
         forbidden: What the student's code tried and may not do.
         reads: Names of the files that it opened and that are not its own; see `guard.Guard`.
         trace: What its fault handler wrote.
-        broken: Why the record is none, if it is none.
+        broken: Why the record is invalid, if it is.
     """
 
     outcome: sandbox.ProcessOutcome
@@ -136,7 +136,7 @@ def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
     """Take a line; one without the number is what somebody else wrote, and none.
 
     Raises:
-        ValueError, KeyError, TypeError, RecursionError: It is no line of a record.
+        ValueError, KeyError, TypeError, RecursionError: It is not a line of a record.
     """
     if nonce.encode() not in line[:100]:
         return
@@ -166,7 +166,7 @@ def _text(value: Any) -> str:
 
 
 def content(file: Path, most: int) -> bytes:
-    """The first bytes of a file; of what is no plain file (a link, a pipe), none."""
+    """The first bytes of a file; of what is not a plain file (a link, a pipe), none."""
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
     try:
         with open(os.open(file, flags | getattr(os, "O_BINARY", 0)), "rb") as opened:

@@ -130,7 +130,7 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
         Raises:
             UnknownNameError: There is no such task, backend or render mode.
             MissingEngineError: The engine is not installed here.
-            BadInputError: `frame_skip` is no whole number of at least 1.
+            BadInputError: `frame_skip` is not a whole number of at least 1.
         """
         self.task = make_task(task, backend, frame_skip)
         self.model, self.data = self.task.model, make_data(self.task.model)

@@ -69,7 +69,7 @@ class Task(ABC):
         Raises:
             UnknownNameError: There is no such backend.
             MissingEngineError: Its engine is not installed here.
-            BadInputError: `frame_skip` is no whole number of at least 1.
+            BadInputError: `frame_skip` is not a whole number of at least 1.
         """
         self.frame_skip = as_count(frame_skip, "frame_skip")
         self.model: Model = load(self.scene, backend=backend)
@@ -97,7 +97,7 @@ class Task(ABC):
         return np.concatenate([qpos, qvel, tip, target, way], axis=1)
 
     def outside(self, observations: Array) -> NDArray[np.bool_]:
-        """(n,) Which are no observations of this task: an engine has lost the scene there."""
+        """(n,) Which are not observations of this task: an engine has lost the scene there."""
         inside = (observations >= self.low) & (observations <= self.high)  # NaN is not
         return np.logical_not(inside.all(axis=1))
 

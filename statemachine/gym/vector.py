@@ -65,7 +65,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         Raises:
             UnknownNameError: There is no such task, backend, mode of reset or of rendering.
             MissingEngineError: The engine is not installed here.
-            BadInputError: A number is no whole number of at least 1.
+            BadInputError: A number is not a whole number of at least 1.
         """
         modes = [mode.value for mode in AutoresetMode]
         if not isinstance(autoreset_mode, AutoresetMode):
@@ -107,7 +107,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
             options: "reset_mask" is (n,) bools.
 
         Raises:
-            BadInputError: There are not as many seeds, or mask is no such array.
+            BadInputError: There are not as many seeds, or the mask is invalid.
         """
         mask = np.ones(self.num_envs, dtype=np.bool_)
         if options and "reset_mask" in options:

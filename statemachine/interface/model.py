@@ -40,8 +40,8 @@ class Model(ABC):
         actuator_ctrlrange, actuator_forcerange: (nu, 2), infinite where unlimited.
         actuator_names: (nu,) of each number of ctrl; an actuator that takes several has its
             name in all of them, as "hip.position" and "hip.velocity".
-        actuator_kp, actuator_kv: (nu,) gains of a position servo, NaN if it is none.
-        actuator_gain: (nu,) force of a motor for a ctrl of 1, NaN if it is none.
+        actuator_kp, actuator_kv: (nu,) gains of a position servo, NaN for other actuators.
+        actuator_gain: (nu,) force of a motor for a ctrl of 1, NaN for other actuators.
         actuator_gear: (nu,) what that force is multiplied by on the joint, and the joint's
             position where a servo compares it with ctrl.
         actuator_delay: (nu,) how late each number of ctrl acts [s], in whole engine steps.
@@ -228,7 +228,7 @@ class Model(ABC):
                 raise self._zero_quaternion(joint, start)
 
     def _zero_quaternion(self, joint: int, start: int) -> BadInputError:
-        """The error for a quaternion of a joint that is no rotation."""
+        """The error for a quaternion of a joint that is not a rotation."""
         return BadInputError(
             f"qpos[{start}:{start + 4}], the quaternion of joint {self.joint_names[joint]!r}, "
             "is zero: it names no rotation; the identity is 1 0 0 0"

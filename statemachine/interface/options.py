@@ -134,7 +134,7 @@ def check_state(
         layout: Of the States of the Data.
 
     Raises:
-        TypeError: It is no State.
+        TypeError: It is not a State.
         ForeignStateError: It has another layout.
         BadInputError: It holds a number that is not finite.
     """
@@ -277,7 +277,7 @@ def _gain(of: Any, name: str, value: Any) -> Array:
         given[~servo] = np.nan
     for k in np.flatnonzero(~servo & ~np.isnan(given))[:1].tolist():
         raise BadInputError(
-            f"{name}[{k}] is given for {of.actuator_names[k] or f'actuator {k}'}, which is no "
+            f"{name}[{k}] is given for {of.actuator_names[k] or f'actuator {k}'}, which is not a "
             f"position servo: it wants NaN there, as actuator_{name} has"
         )
     as_vector(given[servo], (int(servo.sum()),), name)  # finite

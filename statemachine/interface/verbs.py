@@ -46,7 +46,7 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
     Raises:
         ForeignDataError: `data` was made by another Model.
         BusyDataError: Another thread is using `data`.
-        BadInputError: `nstep` is no whole number, or an input is not a number. In
+        BadInputError: `nstep` is not a whole number, or an input is not a number. In
             the second case the Data may have moved: it then refuses all but
             `reset` and `set_state`. A ctrl that is infinite, written in place, is
             clamped to its range like any other that lies beyond it, by every verb;
@@ -188,7 +188,7 @@ def _overwrite(data: Data, verb: str, change: Callable[[Any], None], to: Any) ->
 
 
 def _check_inputs(model: Model, data: Data) -> None:
-    """Raise BadInputError for the first entry that acts and is no finite number."""
+    """Raise BadInputError for the first entry that acts and is not a finite number."""
     for name in INPUTS:
         check_entries(model._acting(name, getattr(data, name)), name, model._coordinate_name)
 

@@ -41,7 +41,7 @@ class Worlds(Closable, ABC):
     and belong to the state before the last engine step or to that of the last `forward`, as
     in a Data.
 
-    What would raise in one Data while it steps (it diverges, a number of its input is none)
+    What would raise in one Data while it steps (it diverges, an entry of its input is NaN)
     ends this world only: it is told of by a DivergedWarning, listed in `diverged` and left out
     of every call until `reset` or `set_state`. The others go on.
 
@@ -217,7 +217,7 @@ class Worlds(Closable, ABC):
         return number
 
     def _check_time(self, ids: Ints) -> None:
-        """Raise BadInputError for the first of these worlds whose time is no finite number."""
+        """Raise BadInputError for the first of these worlds whose time is not a finite number."""
         for world in ids[~np.isfinite(self.time[ids])][:1].tolist():
             raise BadInputError(
                 f"time[{world}] = {self.time[world]} is not a finite number",
@@ -227,7 +227,7 @@ class Worlds(Closable, ABC):
             )
 
     def _check_inputs(self, ids: Ints) -> None:
-        """Raise BadInputError for the first entry of these worlds that is no finite number."""
+        """Raise BadInputError for the first entry of these worlds that is not a finite number."""
         for name in INPUTS:
             rows = self.model._acting(name, getattr(self, name)[ids])
             if not np.abs(rows).max(initial=0.0) <= HUGE:  # NaN fails it, too
@@ -244,7 +244,7 @@ class Worlds(Closable, ABC):
         errors: dict[int, BadInputError] = {}
         for joint, start in self.model._quaternions:
             quats = qpos[:, start : start + 4]
-            # One whose first number is not zero is none, which is the cheapest look.
+            # If the first number is not zero the quaternion is not zero: the cheapest test.
             for row in np.flatnonzero(np.abs(quats[:, 0]) < TINY).tolist():
                 if quats[row].dot(quats[row]) < TINY * TINY:
                     error = self.model._zero_quaternion(joint, start)

@@ -1,7 +1,7 @@
 """The certificate: places on an engine against Pinocchio's, over many poses.
 
 Frame definitions come first. Two files may give one name to two frames, and then
-every pose differs by the same offset; that is no disagreement about kinematics, and
+every pose differs by the same offset; that is not a disagreement about kinematics, and
 it is refused instead of being measured.
 """
 
@@ -29,7 +29,7 @@ from ..witness import labels
 from ._robot import Tip, tips_of
 
 _MOST = 1_000_000
-_WIDE = 100.0  # a range beyond this [m or rad] is no limit
+_WIDE = 100.0  # a range beyond this [m or rad] is not a limit
 _TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
 _SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
 
@@ -81,7 +81,7 @@ def certify(
         MissingEngineError: Pinocchio is not installed here.
         ModelError: Pinocchio cannot read `witness`.
         UnknownNameError: No such frame.
-        BadInputError: `poses` or `seed` is no whole number in range, `witness` has joints
+        BadInputError: `poses` or `seed` is not a whole number in range, `witness` has joints
             that the model has not, or nothing moves.
     """
     wanted = as_count(poses, "poses")

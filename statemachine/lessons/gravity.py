@@ -47,7 +47,7 @@ def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The same seconds with the servos on and off; ctrl is never written."""
     at = coordinate(model, options["joint"])
-    seconds = steps_in(model, options["seconds"]) * model.timestep  # refuses what is no time
+    seconds = steps_in(model, options["seconds"]) * model.timestep  # refuses what is not a time
     loop, nstep = stepping_loop(model, milestones(seconds), options["seconds"])
     in_degrees = "np.degrees(data.qpos[slot]).round(3)", "import numpy as np\n"
     in_millimetres = "(1000 * data.qpos[slot]).round(2)", ""

@@ -29,7 +29,9 @@ ASKED: dict[str, dict[str, Any]] = {
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """None: the code of the lessons has been shown."""
     if not is_the_arm(model):
-        raise BadInputError(f"these questions are about the SO-101, and {model.path.name} is none")
+        raise BadInputError(
+            f"these questions are about the SO-101, and {model.path.name} is another robot"
+        )
     return ""
 
 

@@ -62,7 +62,7 @@ class Gap:
 
     Attributes:
         size: The largest difference [unit], of a vector its length; None where one of the two
-            is no value, as a rotation that is all zero.
+            is not a value, as a rotation that is all zero.
         unit: SI unit; of contacts also "appears" and "vanishes", whose sizes are how many there
             are now and were not, and the other way round.
         where: The body, site, joint or contact that differs most; "" if it has no name.
@@ -85,7 +85,7 @@ class Gap:
 
     def __str__(self) -> str:
         if self.size is None:
-            text = "all zero, which is no rotation"
+            text = "all zero, which is not a rotation"
         elif self.unit in ("appears", "vanishes"):
             text = f"1 {self.unit}"
             if self.size > 1:
@@ -182,13 +182,13 @@ def joint_gap(
 
 
 def largest(sizes: Array) -> tuple[float, int]:
-    """The largest of some sizes (n,), and its place; what is no number is larger than all."""
+    """The largest of some sizes (n,), and its place; what is not a number is larger than all."""
     place = int(np.argmax(sizes))  # the first NaN, if there is one
     return float(sizes[place]), place
 
 
 def largest_or_inf(sizes: Array) -> float:
-    """The largest of some sizes; infinite if one is no number, as of a run that diverged."""
+    """The largest of some sizes; infinite if one is not a number, as of a run that diverged."""
     return float(np.where(np.isnan(sizes), np.inf, sizes).max(initial=0.0))
 
 

@@ -138,7 +138,7 @@ _SUFFIXES = (
 
 
 def amount(text: str) -> tuple[float, str]:
-    """A size above zero [SI] and its SI unit, of words like "0.5deg"; NaN where it is none."""
+    """A size above zero [SI] and its SI unit, of words like "0.5deg"; NaN for other words."""
     for suffix, factor, unit in _SUFFIXES:
         if text.endswith(suffix):
             try:
@@ -153,7 +153,7 @@ def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
     """Tolerances [SI] by kind, from words like "joint=0.5deg", "tip=2mm", "energy=0.01J".
 
     Raises:
-        BadInputError: A word is none.
+        BadInputError: A word is invalid.
         UnknownNameError: There is no such kind of quantity.
     """
     tolerances = {}

@@ -173,7 +173,7 @@ def record(code: str, engine: str) -> Figures:
     """Run code in a fresh namespace and record the calls that it makes to an engine.
 
     What is recorded are calls of functions in the engine's Python module, of methods of its
-    objects, and of the other engines that its backend calls; reading an array is no call. A call
+    objects, and of the other engines that its backend calls; reading an array is not a call. A call
     that another one makes inside the engine is not seen.
 
     Args:

@@ -37,7 +37,7 @@ from ..page import Figures
 from ..rotations import times
 from .stale_rows import Freshness, Row, gaps, same
 
-# The inputs that each is computed from; a write to another is no reason why it is stale.
+# The inputs that each is computed from; a write to another is not a reason why it is stale.
 DEPEND = dict.fromkeys(DERIVED, INPUTS) | {"contacts": INPUTS}
 DEPEND |= dict.fromkeys(POSES, INPUTS[:1])
 DEPEND |= dict.fromkeys(("qfrc_bias", "qfrc_passive"), INPUTS[:2])
@@ -102,7 +102,7 @@ def row(
         name: Of `DERIVED`, or "contacts".
         age: How old it is, if it is not of now.
         held: What the Data says.
-        now: What `forward` would compute; None where the present state is no state.
+        now: What `forward` would compute; None where the present state is not a state.
     """
     if now is not None and same(held, now):
         return Row(name, True, 0, 0, "now", ())

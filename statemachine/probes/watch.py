@@ -154,7 +154,7 @@ class Watch:
         self._stale[key] = replace(known, count=known.count + 1, gaps=worst)
 
     def _state(self) -> State | None:
-        """The present state; None where what was written is no number: there is no now."""
+        """The present state; None where what was written is not a number: there is no now."""
         try:
             return get_state(self._model, self._data)
         except BadInputError:

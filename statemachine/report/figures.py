@@ -61,7 +61,7 @@ def check_suffix(path: Path) -> str:
     """The form of a figure's file, "svg", "png" or "pdf".
 
     Raises:
-        BadInputError: It is no figure.
+        BadInputError: It is not a figure.
         MissingEngineError: matplotlib is not installed.
     """
     suffix = path.suffix.lower()

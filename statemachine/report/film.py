@@ -228,7 +228,7 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
     A trace without poses has them from its qpos.
 
     Raises:
-        TraceError: The model has other bodies than the trace, or a pose is no number.
+        TraceError: The model has other bodies than the trace, or a pose is not a number.
     """
     if tuple(model.body_names) != trace.header.bodies:
         raise TraceError(

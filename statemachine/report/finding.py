@@ -121,7 +121,7 @@ def _in_the_end(comparison: Comparison) -> str:
     """What of the motion is still apart, as a mean over the end, and whether it still changes."""
     motion = [a for a in comparison.agreements if QUANTITIES[a.kind].moves]
     differ = [a for a in motion if a.verdict == "differs"]
-    known = [a for a in differ if a.settled >= 0]  # what is no number is on neither side
+    known = [a for a in differ if a.settled >= 0]  # what is not a number is on neither side
     over = window(comparison)
     if not known:
         return ENDS["within"].format(window=over) if motion and not differ else ""
@@ -189,7 +189,7 @@ def subject(
 def leading(comparison: Comparison) -> Agreement:
     """The quantity farthest beyond its tolerance: a coordinate, of which --why speaks, if any is.
 
-    Else one of the motion, as the fingertip; else any. What is no number comes last.
+    Else one of the motion, as the fingertip; else any. What is not a number comes last.
     """
     beyond = [a for a in comparison.agreements if a.verdict != "agrees"]
     own = [a for a in beyond if QUANTITIES[a.kind].own]

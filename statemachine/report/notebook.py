@@ -111,7 +111,7 @@ def lesson(name: str, backend: str = DEFAULT, prediction: str = "", **options: A
     Raises:
         UnknownNameError: There is no such lesson, backend or option.
         MissingEngineError: The engine is not installed here.
-        BadInputError: A prediction is no letter of its question.
+        BadInputError: A prediction is not a letter of its question.
     """
     check_name("lesson", name, LESSONS)
     known = LESSONS[name].defaults

@@ -131,7 +131,7 @@ class RecordedReader(Reader):
             lesson: Whose questions are asked first.
 
         Raises:
-            BadInputError: The file is there and is no record of predictions.
+            BadInputError: The file is there and is not a record of predictions.
         """
         super().__init__(lesson)
         self._file = file
@@ -178,7 +178,7 @@ class RecordedReader(Reader):
 
 
 def _forget_typed_ahead() -> None:
-    """Drop what was typed before there was a question: it is no answer to it."""
+    """Drop what was typed before there was a question: it is not an answer to it."""
     if not sys.stdin.isatty():
         return
     if sys.platform == "win32":

@@ -303,7 +303,7 @@ _PACE = 0.1  # seconds between two pictures of it
 def progress(what: str) -> Iterator[Callable[[float], None]]:
     """A function to call with the fraction done; a bar appears if it takes long.
 
-    Nothing is shown where standard error is no terminal, and nothing stays behind.
+    Nothing is shown where standard error is not a terminal, and nothing stays behind.
     """
     if not sys.stderr.isatty():
         yield lambda _fraction: None

@@ -324,7 +324,7 @@ def _values(row: Figures) -> tuple[str, str]:
 
 
 def _relative(figure: tuple[str, object, object]) -> float:
-    """How far two values are apart, as a part of the larger; 0 where that is no number."""
+    """How far two values are apart, as a part of the larger; 0 where that is not a number."""
     try:
         left, right = (np.array(value, dtype=float) for value in figure[1:])
         size = max(float(np.linalg.norm(left)), float(np.linalg.norm(right)))

@@ -50,7 +50,7 @@ __all__ = [
 
 _ROOTS = (DEFAULT, "robot")  # of MJCF, whose root is called after its engine, and of URDF
 _BINARY = ".mjb"
-_START = 65536  # bytes in which a file that is no XML may say what it was meant to be
+_START = 65536  # bytes in which a file that is not XML may say what it was meant to be
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def find(paths: Sequence[str | os.PathLike[str]]) -> list[ModelFile]:
     files: dict[Path, tuple[str, Path]] = {}  # what each is called, and where it was found
     for given in map(Path, paths):
         is_file = given.is_file()
-        wrong_end = f"{given} is no model: it does not end in {', '.join(SUFFIXES)}"
+        wrong_end = f"{given} is not a model: it does not end in {', '.join(SUFFIXES)}"
         refuse(
             (not is_file and not given.is_dir(), f"there is no file or folder {given}"),
             (is_file and given.suffix.lower() not in SUFFIXES, wrong_end),
@@ -114,7 +114,7 @@ def _below(folder: Path) -> Iterator[Path]:
 
 
 def _root(file: Path) -> str:
-    """The name of a file's root element; of one that is no XML, what it begins to be; or ""."""
+    """The name of a file's root element; of one that is not XML, what it begins to be; or ""."""
     try:
         for _, element in ElementTree.iterparse(file, events=("start",)):
             return element.tag
@@ -128,7 +128,7 @@ def _root(file: Path) -> str:
 
 
 def _has_bodies(file: Path) -> bool:
-    """Whether a body is in an MJCF, or in what it includes; one that is no XML may have."""
+    """Whether a body is in an MJCF, or in what it includes; one that is not XML may have."""
     try:
         return any(
             element.tag in ("body", "attach", "replicate", "composite", "flexcomp")
@@ -174,7 +174,7 @@ def examine_all(
         progress: Told the fraction that is done.
 
     Raises:
-        BadInputError: `seconds`, `jobs` or `seed` is no such number, or `table` is there and no
+        BadInputError: `seconds`, `jobs` or `seed` is invalid, or `table` is there and no
             such table.
         MissingEngineError: The default engine is not installed here.
     """

@@ -221,7 +221,7 @@ class Survey:
     Attributes:
         default: The backend that the others are compared with.
         models: One row each, in the order of the files.
-        parts: Files that are no models of their own but parts of others.
+        parts: Files that are not models of their own but parts of others.
         made_with: Versions and settings.
     """
 
@@ -273,7 +273,7 @@ def read_table(target: Path) -> dict[tuple[str, str, str], ExaminedModel]:
         rows = [_built(ExaminedModel, row) for row in plain]
     except (OSError, ValueError, TypeError, KeyError, AttributeError, csv.Error) as error:
         raise BadInputError(
-            f"{target.name} is there and is no table of models ({type(error).__name__}): name "
+            f"{target.name} is there and is not a table of models ({type(error).__name__}): name "
             "another file, or remove it"
         ) from None
     return {(row.file, row.sha256, row.made_with): row for row in rows}

@@ -116,7 +116,7 @@ def function_scenario(
 
     Raises:
         BadInputError: There is no such file or function, or the file fails; the controller
-            raises it where the function fails, or returns what is no ctrl.
+            raises it where the function fails, or returns what is not ctrl.
     """
     path, name = _place(spec)
     given = dict(parameters or {})

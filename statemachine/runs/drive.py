@@ -85,7 +85,7 @@ def drive(
         and derived arrays are of the state in which the step before began.
 
     Raises:
-        BadInputError: The controller gave what is no ctrl.
+        BadInputError: The controller gave what is not ctrl.
         DivergedError: The engine diverged in a step.
     """
     ctrl = data.ctrl

@@ -65,7 +65,7 @@ def read(path: str | os.PathLike[str]) -> Trace:
     file has a checksum of each array.
 
     Raises:
-        TraceError: The file is not there, or is no trace, or is damaged.
+        TraceError: The file is not there, or is not a trace, or is damaged.
         MissingEngineError: Parquet, and pyarrow is not installed.
     """
     source = _known(path)
@@ -81,9 +81,9 @@ def read(path: str | os.PathLike[str]) -> Trace:
         raise TraceError(f"{source.name}: does not fit into the memory that is free") from None
     except MissingEngineError:
         raise
-    except Exception as error:  # bytes that are no trace may raise anything in those who read them
+    except Exception as error:  # bytes that are not trace may raise anything in those who read them
         reason = (str(error) or type(error).__name__).splitlines()[0][:200]
-        raise TraceError(f"{source.name} is no trace: {reason}") from None
+        raise TraceError(f"{source.name} is not a trace: {reason}") from None
 
 
 def shipped_names() -> list[str]:

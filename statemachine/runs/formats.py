@@ -44,7 +44,7 @@ def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
     with zipfile.ZipFile(path) as archive:
         entries = _entries(archive)
         if "header" not in entries:
-            raise TraceError("has no header: it is no trace")
+            raise TraceError("has no header: it is not a trace")
         header = _read_header(archive, entries.pop("header"))
         described = {name: _describe(archive, entry) for name, entry in entries.items()}
         for name, (_, kind) in described.items():
@@ -64,7 +64,7 @@ def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     for entry in archive.infolist():
         name = entry.filename.removesuffix(".npy")
         refuse(
-            (name == entry.filename, f"holds {name[:40]!r}, which is no array"),
+            (name == entry.filename, f"holds {name[:40]!r}, which is not an array"),
             # Where a damaged list of contents hides its next entries.
             (entry.comment or entry.extra, "has a damaged list of contents"),
             (name in entries, f"holds two arrays {name[:40]!r}"),
@@ -91,7 +91,7 @@ def _read_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
     shape, kind = _describe(archive, entry)
     size = math.prod(shape)
     refuse(
-        (kind != np.uint8 or len(shape) != 1, "has a header that is no text: it is no trace"),
+        (kind != np.uint8 or len(shape) != 1, "has a header that is not text: it is not a trace"),
         (size > _HEADER_MOST, f"has a header of {size:,} bytes; at most {_HEADER_MOST:,}"),
         error=TraceError,
     )
@@ -126,7 +126,7 @@ def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
     with parquet.ParquetFile(path) as file:
         known = (file.metadata.metadata or {}).get(_KEY)
         if known is None:
-            raise TraceError("has no header: it is no trace")
+            raise TraceError("has no header: it is not a trace")
         digest, text = known[:_DIGITS].decode(), known[_DIGITS:].decode()
         header = Header.from_json(text)
         check_size(_unfolded_size(file.metadata, header), path)

@@ -225,7 +225,7 @@ class Header:
         """The header that `as_json` wrote.
 
         Raises:
-            TraceError: It is none, or of a schema that this version does not know.
+            TraceError: It is not a header, or of a schema that this version does not know.
         """
         try:
             facts = json.loads(text)
@@ -239,7 +239,7 @@ class Header:
         except TraceError:
             raise
         except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as error:
-            raise TraceError(f"this is no header of a trace: {error}") from None
+            raise TraceError(f"this is not a header of a trace: {error}") from None
         return header
 
     @property
@@ -289,7 +289,7 @@ def _frozen(value: Any) -> Any:
 def _text(value: Any) -> bool:
     if not isinstance(value, str) or len(value) > _LONGEST:
         return False
-    # Half of a surrogate pair is no text: it can be written nowhere.
+    # Half of a surrogate pair is not text: it can be written nowhere.
     return not any("\ud800" <= character <= "\udfff" for character in value)
 
 

@@ -84,7 +84,7 @@ def record(
         the rows until then, and `header.ended` says why.
 
     Raises:
-        BadInputError: The controller gave something that is no ctrl, or `seconds` is no time.
+        BadInputError: The controller gave something that is not ctrl, or `seconds` is not a time.
         EngineError: The repetition did not end in the same bits.
     """
     if state is not None and keyframe is not None:
@@ -200,7 +200,7 @@ def _run(
     for name, array in inputs.items():
         # A step finds what is not finite itself, but the last row has no step.
         if not np.isfinite(array[-1]).all():
-            raise BadInputError(f"the controller left {name} with an entry that is no number")
+            raise BadInputError(f"the controller left {name} with an entry that is not a number")
     progress(1.0)
     return inputs, ended
 

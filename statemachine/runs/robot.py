@@ -44,7 +44,7 @@ def scalar_joint(model: Model, name: str) -> tuple[int, int]:
 
 
 def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
-    """A full ctrl (nu,) from values; the error says how many there should be, or which is none."""
+    """A full ctrl (nu,) from values; the error says how many are needed, or which is invalid."""
     array = np.array(list(values), dtype=np.float64)
     if array.shape != (model.nu,):
         raise BadInputError(

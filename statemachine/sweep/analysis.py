@@ -172,7 +172,7 @@ def _together(
 ) -> tuple[Figures, ...]:
     """The fit of each parameter that is asked for, else of the one that counts most."""
     chosen = [vary for vary in data.design.factors if vary.label in asked]
-    if not asked:  # not the timestep, which is no property of the robot
+    if not asked:  # not the timestep, which is not a property of the robot
         chosen = [
             vary
             for vary in ranked(data.design, shares)

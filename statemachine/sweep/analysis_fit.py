@@ -37,7 +37,7 @@ def fit_curves(
         levels: (k,) values of the parameter, increasing.
         left: (c, k, m, d) curves of the one side; (c, 1, m, d) where it keeps its own value.
         right: (c, k, m, d) of the other. NaN where there is no run.
-        seeds: (c,) that of each curve: the curves of a seed are no independent figures.
+        seeds: (c,) that of each curve: the curves of a seed are not independent figures.
 
     Returns:
         None if there are fewer than three values or no whole curve; else

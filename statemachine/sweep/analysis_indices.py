@@ -144,7 +144,7 @@ def _rank(data: SweepData, centre: Array) -> Figures | None:
             rho = float(_stats().spearmanr(values, centre[known]).statistic)
             shares[:, k] = np.nan_to_num(rho) ** 2
     note = (
-        "The design is none that indices can be computed from: run it with --indices. These are "
+        "Indices cannot be computed from this design: run it with --indices. These are "
         "squares of Spearman's rank correlation, and see only what goes up or down."
     )
     return _result("rank", labels, shares, int(known.sum()), [], "", [note]) if labels else None

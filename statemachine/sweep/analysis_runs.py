@@ -155,7 +155,7 @@ def _nearest(data: SweepData, chosen: Ints) -> Ints:
     places = np.zeros((len(data.points), len(data.design.factors)))
     for k, vary in enumerate(data.design.factors):
         values = data.values(vary.label)
-        # What is no number counts by its place in the list.
+        # What is not a number counts by its place in the list.
         values = np.array(values if vary.numeric else [*map(vary.values.index, values)])
         places[:, k] = (values - values.min()) / (np.ptp(values) or 1.0)
     return np.array([((places[chosen] - place) ** 2).sum(axis=1).argmin() for place in places])

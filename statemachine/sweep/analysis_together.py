@@ -20,7 +20,7 @@ Varied = Literal["right", "both"]
 MOST_REFERENCES = 24  # runs of the left side at the model's own value
 CHECKED = 4  # pairs of runs at a value
 REFINED = 9  # values that are run where a check contradicts the fit
-_LESS = 0.9  # of the gap before: what is above it is no improvement
+_LESS = 0.9  # of the gap before: what is above it is not an improvement
 _NEAR = 0.5  # of the measured gap: a prediction that is farther off is contradicted
 
 

@@ -90,7 +90,7 @@ class Vary:
         return f"vary.{self.label}"
 
     def unit_on(self, joints: Collection[int] = (JointType.HINGE, JointType.SLIDE)) -> str:
-        """What it is in on joints of some `JointType`s; "" of what is no number or has none."""
+        """What it is in on joints of some `JointType`s; "" of what is not a number or has none."""
         if self.times or self.kind == "parameter" or self.name not in UNITS:
             return ""
         hinge, slide = UNITS[self.name]
@@ -133,7 +133,7 @@ def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
         words: As typed behind `--vary`.
 
     Raises:
-        BadInputError: A word is none, or two of them vary the same.
+        BadInputError: A word is invalid, or two of them vary the same.
     """
     factors = tuple(map(_parsed, words))
     labels = [vary.label for vary in factors]
@@ -158,7 +158,7 @@ def with_kinds(
 
     Raises:
         UnknownNameError: There is nothing of this name.
-        BadInputError: What is typed is none for what it is.
+        BadInputError: What is typed is no value of that factor.
     """
     return tuple(replace(vary, kind=_kind(vary, options, parameters)) for vary in factors)
 
@@ -219,7 +219,7 @@ def _value(word: str) -> tuple[Value, bool]:
         number = float(word[:-1] if times else word)
     except ValueError:
         return word, False
-    refuse((not math.isfinite(number), f"{word} is no finite number"))
+    refuse((not math.isfinite(number), f"{word} is not a finite number"))
     return number + 0.0, times  # no negative zero
 
 
@@ -347,7 +347,7 @@ class Design:
 def _sobol(width: int, count: int, seed: int) -> Array:
     """(count, width) points in the unit cube, of a scrambled Sobol sequence."""
     engine = require_qmc().Sobol(width, scramble=True, rng=np.random.default_rng(seed))
-    with warnings.catch_warnings():  # of a number that is no power of two: said when it is asked
+    with warnings.catch_warnings():  # of a number that is not a power of two: said when it is asked
         warnings.simplefilter("ignore")
         return engine.random(count)
 

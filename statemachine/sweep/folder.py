@@ -60,7 +60,7 @@ def check_folder(folder: Path) -> None:
     """Make the folder, or refuse it where it is something else.
 
     Raises:
-        BadInputError: It holds what is no sweep.
+        BadInputError: It holds what is not a sweep.
         OSError: It cannot be made.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -83,7 +83,7 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
         if manifest["schema"] == MANIFEST_VERSION:
             design_of(manifest)
     except (FileNotFoundError, NotADirectoryError):
-        raise BadInputError(f"{folder} is no sweep: it has no {MANIFEST}") from None
+        raise BadInputError(f"{folder} is not a sweep: it has no {MANIFEST}") from None
     except (ValueError, KeyError, TypeError):
         raise BadInputError(
             f"{path} is damaged, and without it nobody knows what the cells are of: put back a "

@@ -37,11 +37,11 @@ _LOOKED_AT = 1000  # values of a factor; of more, the ends
 def prepared(sweep: Sweep) -> PreparedSweep:
     """Check a sweep: names, values, models, engines.
 
-    What one backend alone refuses is no error: its cells will be rows that say so.
+    What one backend alone refuses is not an error: its cells will be rows that say so.
 
     Raises:
         UnknownNameError: No such experiment, backend, option, joint, …
-        BadInputError: A value is none, or the request contradicts itself.
+        BadInputError: A value is invalid, or the request contradicts itself.
         MissingEngineError: An engine or a package is missing.
         StateMachineError: A model cannot be loaded on any backend.
     """
@@ -105,7 +105,7 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     if design.sampled:
         require_qmc()
     if no_power:
-        said.append(f"{sweep.samples} samples are no power of two: a Sobol sequence wants one")
+        said.append(f"{sweep.samples} samples are not a power of two: a Sobol sequence wants one")
     if cells > _MANY:
         said.append(f"{cells:,} cells")
     for vary in factors:

@@ -57,7 +57,7 @@ _MOST = 20_000  # rows of a file
 
 
 def known(figure: Any) -> float | None:
-    """A figure; None where it is no finite number."""
+    """A figure; None where it is not a finite number."""
     return float(figure) if math.isfinite(figure) else None
 
 
@@ -139,7 +139,7 @@ def counted(folder: Path) -> Iterator[tuple[str, str]]:
     """Id of every cell that the dataset has, and "done" or the class of its error.
 
     Raises:
-        BadInputError: A file is none of the dataset.
+        BadInputError: A file does not belong to the dataset.
     """
     for part in _parts(folder):
         for row in _read(part, ["cell", "status", "error_class"]).to_pylist():

@@ -82,7 +82,7 @@ class Door:
     def _cookies(self, headers: Any, port: int) -> list[str]:
         tokens = []
         for header in headers.get_all("Cookie"):
-            with suppress(CookieError, KeyError):  # it is none, or has not ours
+            with suppress(CookieError, KeyError):  # it is invalid, or has no token of ours
                 tokens.append(SimpleCookie(header)[_name(port)].value)
         return tokens
 
@@ -121,7 +121,7 @@ def free_port(host: str, port: int) -> int:
     """The first free port from this one on; 0 stands for any.
 
     Raises:
-        BadInputError: It is no port, the host is no address of this machine, or all near it
+        BadInputError: It is not a port, the host is not an address of this machine, or all near it
             are taken.
     """
     refuse(
@@ -134,7 +134,7 @@ def free_port(host: str, port: int) -> int:
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
     except (OSError, UnicodeError) as error:
-        raise BadInputError(f"host {host!r} is no address: {error}") from None
+        raise BadInputError(f"host {host!r} is not an address: {error}") from None
     last: OSError | None = None
     for candidate in range(port, min(port + _PORTS, 65536)):
         try:

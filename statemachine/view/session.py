@@ -170,7 +170,7 @@ class Session(ABC):
         """Set an actuator, by number, to a value [its own unit].
 
         Raises:
-            BadInputError: There is no such slider, or the value is no number.
+            BadInputError: There is no such slider, or the value is not a number.
         """
         raise BadInputError("a recording has no sliders: nothing runs here")
 
@@ -178,7 +178,7 @@ class Session(ABC):
         """Go to a time [s].
 
         Raises:
-            BadInputError: It is no number, or this is no recording.
+            BadInputError: It is not a number, or this is not a recording.
         """
         raise BadInputError("only a recording can go to a time")
 

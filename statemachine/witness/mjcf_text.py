@@ -107,7 +107,7 @@ def parse(path: Path) -> Element:
     """The root element of a file.
 
     Raises:
-        ModelError: It is no XML.
+        ModelError: It is not XML.
     """
     try:
         return ElementTree.parse(path).getroot()
@@ -119,7 +119,7 @@ def with_includes(root: Element, path: Path) -> tuple[Element, int]:
     """A file with each <include> replaced by what it names, and how many there were.
 
     Raises:
-        ModelError: An included file is not there, is no XML, or is included twice.
+        ModelError: An included file is not there, is not XML, or is included twice.
     """
     seen: list[Path] = []
 

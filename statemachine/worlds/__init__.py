@@ -98,7 +98,7 @@ def draw(
 
     A world's values depend on the seed, its number and the option alone: not on `n`, nor on
     what else is drawn. An entry that is zero stays zero (a body without mass), and one that is
-    NaN stays NaN (the gains of what is no servo).
+    NaN stays NaN (the gains of what is not a servo).
 
     Args:
         model: The Model, whose values are multiplied.
@@ -114,8 +114,8 @@ def draw(
         (n, 3) [m/s²], latency (n, nu) [s].
 
     Raises:
-        UnknownNameError: An option is none that can be drawn.
-        BadInputError: `n`, `seed` or a range is no such value.
+        UnknownNameError: An option cannot be drawn.
+        BadInputError: `n`, `seed` or a range is invalid.
     """
     if not isinstance(model, Model):
         raise TypeError(f"draw wants a Model, from statemachine.load; got {kind_of(model)}")

@@ -30,7 +30,7 @@ from ._worker import ANSWER_MOST, Answer, SharedBlock, WorldsProcess, end_all, l
 
 _PATIENCE = 2.0  # seconds in which a process has to end a step that was interrupted
 _SCRATCH = 1 << 24  # bytes for what belongs to a command, at least
-_WORDS = 1 << 16  # of these, for what is no array of a record
+_WORDS = 1 << 16  # of these, for what is not an array of a record
 _STATES = ANSWER_MOST // 4  # bytes of States in an exchange
 _PAGE = 4096
 # Worlds that pay for a process, where the number of these is not given: to wake one takes as long

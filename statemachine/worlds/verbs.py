@@ -49,7 +49,7 @@ def make_worlds(
 
     Raises:
         TypeError: `model` is not a Model.
-        BadInputError: `n`, `workers` or an option is no such value.
+        BadInputError: `n`, `workers` or an option is invalid.
         UnknownNameError: `derived` has a name that is not of `BATCHED`.
         UnsupportedError: The backend has no such option.
     """
@@ -84,7 +84,7 @@ def step(
             engine whose worlds are in processes both are one exchange.
 
     Raises:
-        BadInputError: `nstep` or `ids` is no such value.
+        BadInputError: `nstep` or `ids` is invalid.
         BusyDataError: Another thread is using `worlds`, or they are another process's.
         ClosedDataError: `worlds` are closed.
     """
@@ -101,7 +101,7 @@ def forward(worlds: Worlds, *, ids: ArrayLike | None = None) -> None:
         ids: As in `step`.
 
     Raises:
-        BadInputError: An input is not finite, or `ids` is no such value; nothing is changed.
+        BadInputError: An input is not finite, or `ids` is invalid; nothing is changed.
         BusyDataError, ClosedDataError: As in `step`.
     """
     _admit(worlds)
@@ -166,7 +166,7 @@ def get_states(worlds: Worlds, ids: ArrayLike | None = None) -> dict[int, State]
         ids: As in `step`.
 
     Raises:
-        BadInputError: An input is not finite, or `ids` is no such value.
+        BadInputError: An input is not finite, or `ids` is invalid.
         BusyDataError, ClosedDataError: As in `step`.
     """
     _admit(worlds)
@@ -236,7 +236,7 @@ def record(
 
     Raises:
         UnknownNameError: There is no such field, or these Worlds do not keep it.
-        BadInputError: `nstep`, `every` or `ctrl` is no such value; nothing is changed then.
+        BadInputError: `nstep`, `every` or `ctrl` is invalid; nothing is changed then.
         BusyDataError, ClosedDataError: As in `step`.
     """
     _admit(worlds)

@@ -101,7 +101,7 @@ class Ledger:
             figure: What of it.
             values: `left` and `right` of the difference, SI units; None where a file does not say.
             unit: Theirs.
-            size: How far they are apart, in `unit`; None where that is no number.
+            size: How far they are apart, in `unit`; None where that is not a number.
             share: How much it matters, from 0 to 1; of what, each comparing function says.
             effect: What it does, as far as that was computed; "{share}" in it is its share.
             matters: Whether it makes the two readings differ; else it is said for the record.

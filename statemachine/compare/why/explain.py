@@ -303,7 +303,7 @@ def _shares(
         unit: Of the first figure.
         share: Its part of the gap (Shapley value); below zero where it hides others; None where it
             cannot be brought to the same, or no set of causes with it could be run.
-        error: Standard error of the share; 0 where it is no estimate.
+        error: Standard error of the share; 0 where it is not an estimate.
         alone: The part that it takes away as the only one; last: after all others.
         note: Why there is no share, or what else is to be said.
         place: Where the right's file says it; None where that was not found.

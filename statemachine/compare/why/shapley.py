@@ -98,7 +98,7 @@ def shapley(
 
     Returns:
         method: How the parts of the gap were computed.
-        share: By cause; error: its standard error, 0 where it is no estimate.
+        share: By cause; error: its standard error, 0 where it is not an estimate.
         alone: What it takes away if it is the only one, None where that cannot be, or be run.
         last: What it takes away if it comes after all others, None as for `alone`.
         orders: How many orders were drawn.

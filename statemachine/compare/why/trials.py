@@ -106,7 +106,7 @@ class Trials:
         ran: Callable[[], None],
         jobs: int | None = None,
     ) -> None:
-        checked_jobs(jobs)  # refuses what is no number of them
+        checked_jobs(jobs)  # refuses what is not a number of them
         options = dict(scenario.options)
         self._own = _own_settings(models, options)
         left, right = (model.replace(**options) if options else model for model in models)

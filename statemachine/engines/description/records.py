@@ -156,7 +156,7 @@ class Actuator:
         joint: Its name; empty where it drives something else.
         kind: position, velocity, motor, or general.
         kp, kv: Gains of a position servo.
-        gain: Force for each unit of ctrl, where it is no position servo.
+        gain: Force for each unit of ctrl, where it is not a position servo.
         gear: Joint force for each unit of its own.
         ctrlrange, forcerange: None where unlimited.
     """

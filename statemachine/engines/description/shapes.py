@@ -43,7 +43,9 @@ def read_mesh(name: str, folder: Path) -> tuple[Array | None, str]:
     except (OSError, ValueError, IndexError) as error:
         return None, f"cannot be read ({error})"
     if not len(triangles) or not np.isfinite(triangles).all():
-        return None, "has no triangles" if not len(triangles) else "has figures that are no numbers"
+        return None, "has no triangles" if not len(
+            triangles
+        ) else "has figures that are not numbers"
     return triangles, ""
 
 

@@ -46,7 +46,7 @@ def read(path: Path) -> Robot:
     """The description in a URDF file.
 
     Raises:
-        ModelError: It is no URDF, or its figures make no sense; in one line.
+        ModelError: It is not a URDF, or its figures make no sense; in one line.
     """
     try:
         return _Reader(path).robot()
@@ -64,11 +64,11 @@ def _parse(path: Path) -> Element:
     except ModelError:
         raise
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise ModelError(f"it is no XML: {error}") from None
+        raise ModelError(f"it is not XML: {error}") from None
     refuse(
         (
             root.tag != "robot",
-            f"it is no URDF: its root element is <{root.tag}>, not <robot>",
+            f"it is not a URDF: its root element is <{root.tag}>, not <robot>",
         ),
         (
             any("xacro" in element.tag for element in root.iter()),
@@ -197,7 +197,7 @@ def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
     element = joint.find(tag)
     link = "" if element is None else element.get("link", "")
     if link not in links:
-        what = f"a {tag} {link!r}, which is no link" if link else f"no {tag}"
+        what = f"a {tag} {link!r}, which is not a link" if link else f"no {tag}"
         raise ModelError(f"joint {_name(joint)!r} has {what}")
     return link
 

@@ -80,7 +80,7 @@ class Geoms:
             return
         values: list[tuple[Any, ...]] = [("type", *kinds)] if kinds[0] != kinds[1] else []
         if values and not {*kinds} <= shapes.PRIMITIVES.keys():
-            why = "one of them is no primitive, and cannot become the other"
+            why = "one of them is not a primitive, and cannot become the other"
             yield sides.tell("shape", "geom", a, values, refused=why)
             return
         if kinds[0] == "hfield":

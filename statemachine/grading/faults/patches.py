@@ -212,7 +212,7 @@ _hidden = random.Random(1)  # outside of every State
 
 @advancing
 def no_replay(data: Data, right: Callable[[int], None], nstep: int) -> None:
-    """Something that decides the future and is no part of the State."""
+    """Something that decides the future and is not part of the State."""
     ctrl = data.ctrl.copy()
     data.ctrl[:] += 1e-9 * _hidden.random()
     try:

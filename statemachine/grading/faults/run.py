@@ -159,7 +159,7 @@ def _test_file(file: str | os.PathLike[str]) -> Path:
     if not path.is_file():
         raise ModelFileError(f"no file {os.fspath(file)}: --faults takes a file of tests")
     if path.suffix != ".py":
-        raise BadInputError(f"{path.name} is no Python file: --faults takes a file of tests")
+        raise BadInputError(f"{path.name} is not a Python file: --faults takes a file of tests")
     return path
 
 
@@ -183,7 +183,7 @@ def _ready(backend: str) -> str:
 
 @dataclass(frozen=True)
 class _Record:
-    """What one run of pytest came to; tests that were skipped are no tests."""
+    """What one run of pytest came to; tests that were skipped are not tests."""
 
     outcome: sandbox.ProcessOutcome
     tests: tuple[str, ...]

@@ -233,7 +233,7 @@ def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) ->
     return (
         f"you took {marks[k] - marks[k - 1]} steps from {k - 1} s to {k} s, where a second has "
         f"{fall.marks[1]}: after {before} data.time is {float(fall.time[before])!r}, since "
-        f"adding up {world.model.timestep:g} rounds each time. A sum of time is no counter of "
+        f"adding up {world.model.timestep:g} rounds each time. A sum of time is not a counter of "
         "steps: count them, round(1 / model.timestep)"
     )
 

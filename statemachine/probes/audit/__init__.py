@@ -46,7 +46,7 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
         holds: Whether every promise is kept.
 
     Raises:
-        BadInputError: `steps` or `seed` is no such number, or nothing in the model moves.
+        BadInputError: `steps` or `seed` is invalid, or nothing in the model moves.
     """
     nstep = as_count(steps, "steps")
     refuse(

@@ -113,7 +113,7 @@ step = question(
 
 @question(
     "You reset: what is still there?",
-    "An episode that starts with something of the last one is no repetition. What a reset "
+    "An episode that starts with something of the last one is not a repetition. What a reset "
     "leaves alone has to be set by hand.",
 )
 def reset(still_there: Mapping[str, Mapping[str, bool]]) -> Iterator[EngineAnswer]:
@@ -154,7 +154,7 @@ def save(back: Mapping[str, Mapping[str, bool]] | float) -> Iterator[EngineAnswe
 @question(
     "You set a run back in which boxes fall on each other: is its future the same?",
     "A replay that is almost the same is another run a few contacts later. 'Exact' is what "
-    "these few trials showed, bit by bit: it is no promise for another scene.",
+    "these few trials showed, bit by bit: it is not a promise for another scene.",
     (0.3, 0.4, 0.5, 0.6, 0.7),  # when the boxes have met, a trial each [s]
     200,  # steps of the futures
 )

@@ -102,7 +102,7 @@ def _bone(end: Array, thick: float) -> tuple[Any, Any]:
 
 
 def unit_quat(quat: Array) -> Array:
-    """Quaternions (..., 4) of unit length; of what is no rotation, the one that turns nothing."""
+    """Quaternions (..., 4) of unit length; the identity for what is not a rotation."""
     quat = np.nan_to_num(quat)
     length = np.linalg.norm(quat, axis=-1, keepdims=True)
     return np.where(length > 0, quat / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])

@@ -106,7 +106,7 @@ def check_target(path: str | Path) -> Path:
     """Where a report is to be written, checked before anything is run.
 
     Raises:
-        BadInputError: It is no name of a page, or see `check_place`.
+        BadInputError: It is not a name of a page, or see `check_place`.
     """
     target = Path(path)
     if target.suffix.lower() not in SUFFIXES:
