@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Literal
+from weakref import proxy
 
 import mujoco
 import numpy as np
@@ -249,7 +250,7 @@ class Ghost(World):
     """The true robot in a client that is never stepped: kinematics and dynamics of its joints."""
 
     def __init__(self, plan: Plan) -> None:
-        super().__init__(plan, "ghost")
+        super().__init__(proxy(plan), "ghost")  # a Plan has its ghost: no circle keeps both
         self._known: dict[bool, list[tuple[Array, Array]]] = {}  # of the sites, and of the bodies
         self._known_at, self._rest = b"?", np.zeros(plan.raw.nv)
 

@@ -10,8 +10,9 @@ it: their faces are then where they belong, and their edges are rounded.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from typing import Any
+from weakref import proxy
 
 import mujoco
 import numpy as np
@@ -54,7 +55,6 @@ class Plan:
         names: What everything is called in a URDF.
         ghost: See `_bullet_driven`; None until it is needed.
         described: Gives the text and the files of a tree of bodies; see `_describe`.
-        driven: Tells whether a law drives a tree; see `_has_law`.
     """
 
     def __init__(self, raw: mujoco.MjModel) -> None:
@@ -62,13 +62,13 @@ class Plan:
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
         self.ghost: Any = None
-        self.described = cache(self._describe)
-        self.driven = cache(self._has_law)
+        # Weakly: a Plan in no circle is dropped at once, and with it its ghost, which is a world.
+        self.described = cache(partial(Plan._describe, proxy(self)))
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> Any:
         return Plan, (self.raw,)
 
-    def _has_law(self, root: int) -> bool:
+    def driven(self, root: int) -> bool:
         """Whether more than gravity and contact moves a tree: all but one free body by itself."""
         raw = self.raw
         bodies = urdf.tree(raw, root)

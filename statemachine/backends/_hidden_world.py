@@ -213,6 +213,7 @@ def derived_by(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
     for name in ("contacts", *DERIVED):
         if name not in world.untold:
             read(name)
+    del read  # which knows itself, and the world: a circle that would keep it
     return values
 
 
