@@ -342,7 +342,7 @@ def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def _memory_is_given_back() -> Iterator[None]:
-    """What PyBullet has freed stays with C's allocator: the slow tests of a process grew to 3 GB."""
+    """What PyBullet freed stays with C's allocator: with the slow tests a process grew to 3 GB."""
     yield
     gc.collect()
     if sys.platform == "linux":
