@@ -162,10 +162,8 @@ def test_every_kind_of_joint(zoo: Any, zoo_urdf: Path, pinocchio: None) -> None:
     # A URDF starts at its root link; the pose of the root in the world is not part of it.
     turn, place = matrix_from_quat(zoo.raw.body_quat[1]), zoo.raw.body_pos[1]
     random, tips = np.random.default_rng(1), urdf.Names(zoo.raw).tips
-    with sm.make_data(zoo) as data:
-        for _ in range(10):
-            data.qpos = random.uniform(-1, 1, zoo.nq)
-            sm.forward(zoo, data)
+    for qpos in random.uniform(-1, 1, (10, zoo.nq)):
+        with opened(zoo, qpos=qpos, derived=True) as (_, data):
             for site in range(zoo.nsite):
                 pose = witness.pose(data.qpos, tips[site], "body")
                 assert np.abs(place + turn @ pose.pos - data.site_xpos[site]).max() < 1e-12

@@ -11,7 +11,7 @@ import pytest
 import statemachine as sm
 from statemachine.runs.robot import TARGET
 
-from .conftest import path
+from .conftest import opened, path
 from .rendering import overlaps_of_silhouettes
 
 Golden = Callable[[str], np.ndarray]
@@ -31,10 +31,8 @@ def test_fingertip_at_200_poses(mujoco_arm: sm.Model, golden: Golden) -> None:
     tip = mujoco_arm.site_id("gripperframe")
     positions = _columns(table, "x_m", "y_m", "z_m")
     matrices = _columns(table, *(f"R{i}{j}" for i in range(3) for j in range(3)))
-    with sm.make_data(mujoco_arm) as data:
-        for qpos, position, matrix in zip(angles(table), positions, matrices, strict=True):
-            data.qpos = qpos
-            sm.forward(mujoco_arm, data)
+    for qpos, position, matrix in zip(angles(table), positions, matrices, strict=True):
+        with opened(mujoco_arm, qpos=qpos, derived=True) as (_, data):
             assert np.abs(data.site_xpos[tip] - position).max() < 1e-12
             assert np.abs(data.site_xmat[tip] - matrix).max() < 1e-12
 

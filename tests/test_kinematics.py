@@ -273,10 +273,8 @@ def _poses_agree(model: sm.Model, kinematics: sm.Kinematics) -> float:
     worst = 0.0
     sites, bodies = kinematics.site_names, kinematics.body_names
     assert (len(sites), len(bodies)) == (model.nsite, model.nbody)
-    with sm.make_data(model) as data:
-        for seed in range(4):
-            data.qpos = np.random.default_rng(seed).normal(size=model.nq)
-            sm.forward(model, data)
+    for qpos in np.random.default_rng(0).normal(size=(4, model.nq)):
+        with opened(model, qpos=qpos, derived=True) as (_, data):
             kinds: Any = (
                 ("site", sites, data.site_xpos, data.site_xmat),
                 ("body", bodies, data.xpos, matrix_from_quat(data.xquat)),
@@ -440,10 +438,8 @@ def test_a_urdf_with_a_floating_link_and_meshes_elsewhere(tmp_path: Path) -> Non
     own = sm.Kinematics(_write(tmp_path, text.format(mesh), "m.urdf"), model.joint_names)
     (said,) = own.prepared
     assert "floating joints" in said
-    with sm.make_data(model) as data:
-        for seed in range(4):
-            data.qpos = np.random.default_rng(seed).normal(size=model.nq)
-            sm.forward(model, data)
+    for qpos in np.random.default_rng(0).normal(size=(4, model.nq)):
+        with opened(model, qpos=qpos, derived=True) as (_, data):
             for name in "bcd":
                 gap = own.pose(data.qpos, name, "body").pos - data.xpos[model.body_id(name)]
                 assert np.abs(gap).max() < 1e-12

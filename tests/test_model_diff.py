@@ -23,7 +23,7 @@ from statemachine.models import models_dir
 from statemachine.page import Figures
 from statemachine.rotations import angle_between
 
-from .conftest import assert_has, refused, written, written_all
+from .conftest import assert_has, opened, refused, written, written_all
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -267,15 +267,11 @@ def test_references_of_joints_and_several_on_one_body(tmp_path: Path) -> None:
       <site name="tip" pos="0.3 0.2 0.1"/></body></worldbody></mujoco>"""
     path = written(tmp_path / "many.xml", text)
     tree, model = GroupTree(read(path)), load(path)
-    from statemachine import forward, make_data
-
-    data = make_data(model)
+    number, place = tree.frames["tip"]
     for qpos in np.random.default_rng(1).uniform(-1, 1, (10, 3)):
-        data.qpos = qpos
-        forward(model, data)
         poses = tree.poses(dict(zip(model.joint_names, qpos, strict=True)))
-        number, place = tree.frames["tip"]
-        assert np.linalg.norm((poses[number] @ place).pos - data.site_xpos[0]) < 1e-15
+        with opened(model, qpos=qpos, derived=True) as (_, data):
+            assert np.linalg.norm((poses[number] @ place).pos - data.site_xpos[0]) < 1e-15
 
 
 def test_other_frames_of_links_are_no_difference_of_the_robot(tmp_path: Path) -> None:

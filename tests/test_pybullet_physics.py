@@ -137,10 +137,7 @@ def test_names_that_a_urdf_would_have_twice(tmp_path: Path, names: str) -> None:
     """Two joints of one name end the process when PyBullet reads them."""
     inside = names.replace("{g}", '<geom size=".05"/>').replace("{long}", "n" * 5000)
     _, model = both(tmp_path, f"<body>{inside}</body>")
-    with sm.make_data(model) as data:
-        data.qpos[0] = 0.3
-        sm.step(model, data, 3)
-        assert np.isfinite(data.qpos).all()
+    assert np.isfinite(after(model, 3, qpos=0.3)).all()
 
 
 def test_more_than_it_can_tell_of_is_refused(tmp_path: Path) -> None:
@@ -264,8 +261,7 @@ def test_a_hull_is_as_large_as_its_shape(
     body = f'{FLOOR}<body pos="0 0 .09"><{joint}/><geom {geom}/>{beside}</body>'
     depths = []
     for model in both(tmp_path, body, rest=HULLS):
-        with sm.make_data(model) as data:
-            sm.forward(model, data)
+        with opened(model, derived=True) as (_, data):
             depths.append(float(data.contacts.dist.min()))
     off = 0.0023 * 0.2 if "ellipsoid" in geom else 1e-6  # what an ellipsoid's warning says
     if "euler" in geom or "moved" in geom:  # on a corner, which is rounded; a face is exact

@@ -44,20 +44,15 @@ def test_it_is_of_the_lesson_s_model_and_says_what_is_to_be_seen(name: str) -> N
         assert cli._options(words).run
 
 
-def test_they_show_what_they_say(mujoco_scene: sm.Model) -> None:
+@pytest.mark.usefixtures("pinocchio")
+def test_they_show_what_they_say() -> None:
     lift = 1  # shoulder_lift in qpos
     limp, held = PICTURES["gravity"].poses()
     assert limp[-1, lift] > 0.4
     assert abs(held[:, lift]).max() < 0.001
-    before, after = PICTURES["forward"].poses()
-    tip = mujoco_scene.site_id("gripperframe")
-    with sm.make_data(mujoco_scene) as data:
-        places = []
-        for row in (before[0], after[0]):
-            data.qpos[:] = row
-            sm.forward(mujoco_scene, data)
-            places.append(data.site_xpos[tip].copy())
-    assert np.linalg.norm(places[1] - places[0]) == pytest.approx(9.95e-3, abs=5e-6)
+    rows = np.concatenate(PICTURES["forward"].poses())
+    tips = sm.Kinematics("so101").poses(rows, "gripperframe").pos
+    assert np.linalg.norm(tips[1] - tips[0]) == pytest.approx(9.95e-3, abs=5e-6)
     one, two = PICTURES["replay"].poses()
     assert np.array_equal(one, two)
     assert np.ptp(one[:, 0]) > 0.2
