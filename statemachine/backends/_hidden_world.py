@@ -207,7 +207,7 @@ def derived_by(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
         if name in POSES and name not in values:
             values.update(world.kinematics(moment.qpos, name))
         if name not in values:
-            values.update(world.derive(name, moment, read))
+            values.update(world.derive(name, moment, read))  # noqa: F821 (until `del read`)
         return values[name]
 
     for name in ("contacts", *DERIVED):
