@@ -538,7 +538,8 @@ def _at_a_terminal(
         environment.pop(name, None)
     process = subprocess.Popen(
         [sys.executable, "-m", "statemachine", *words],
-        stdin=theirs, stdout=theirs, stderr=theirs, env=environment, close_fds=True,
+        stdin=theirs, stdout=theirs, stderr=theirs, env=environment, start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # noqa: PLW1509 (for Ctrl-C)
     )  # fmt: skip
     os.close(theirs)
     seen, answered, waiting, deadline = "", 0, list(typed), time.monotonic() + 60
@@ -563,7 +564,7 @@ def _at_a_terminal(
         process.kill()
         process.wait()
         os.close(ours)
-    assert not waiting, seen
+    assert (waiting, time.monotonic() < deadline) == ([], True), seen  # it ended by itself
     return re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", seen)
 
 
@@ -695,7 +696,7 @@ def test_the_six_questions_are_counted() -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_a_long_question_is_wrapped() -> None:
-    seen = _at_a_terminal("lesson", "hold", typed=[("Your prediction", "\n")], columns=50)
+    seen = _at_a_terminal("lesson", "hold", typed=[("Your prediction", "\n")] * 2, columns=50)
     asked = seen[seen.index("Before you read on") : seen.index("Your prediction")].splitlines()
     assert max(map(len, asked)) <= 50
     assert len(asked) > 4
