@@ -63,7 +63,9 @@ class Simulation:
         return np.concatenate([self.data.qpos, self.data.qvel, self.data.qacc_warmstart])
 
     def command(self, ctrl):
-        self.data.ctrl[:] = ctrl
+        data, nu = self.data, len(self.data.ctrl)
+        data.ctrl[:] = ctrl[:nu]
+        data.mocap_pos.flat, data.mocap_quat.flat = np.split(ctrl[nu:], [data.mocap_pos.size])
 
     def advance(self, steps, fastest):
         for k in range(1, steps + 1):

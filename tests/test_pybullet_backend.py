@@ -191,7 +191,7 @@ REFUSED = {
     "actuator of a free joint": _world(f'<body><freejoint name="f"/>{_G}</body>')
     + '<actuator><motor name="jet" joint="f" gear="1 0 0 0 0 0"/></actuator>',
     "actuator dynamics": _JOINT
-    + '<actuator><muscle name="lag" joint="j" lengthrange="0 1"/></actuator>',
+    + '<actuator><general name="lag" joint="j" dyntype="user" actdim="1"/></actuator>',
     "actuator gain": f'{_JOINT}<actuator><general name="odd" joint="j" gaintype="affine" '
     'gainprm="1 1 1"/></actuator>',
     "stiffness of a free joint": _world(

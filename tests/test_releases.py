@@ -253,6 +253,7 @@ def pushed(model: Any, key: int | None = None) -> np.ndarray:
         for _ in range(20):
             sm.step(heavy, data)
             data.qvel[0] += 0.1
+            data.mocap_pos[:, 2] += 0.001
         return data.qpos.copy()
 
 

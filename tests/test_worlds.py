@@ -366,7 +366,7 @@ def test_what_a_file_may_have(tmp_path: Path, flag: str, substeps: int) -> None:
     with worlds_of(model, 5, workers=3) as worlds:
         live(worlds, [model] * 5, 28)
         with started(model) as data:
-            data.raw.mocap_pos[0] = [0.2, 0.1, 0.9]
+            data.mocap_pos[0] = [0.2, 0.1, 0.9]
             many.set_state(worlds, 4, sm.get_state(model, data))
             many.step(worlds, 30)
             sm.step(model, data, 30)

@@ -1,8 +1,8 @@
 """MuJoCo's soft constraints of one tree of joints, as rows that the law of the tree solves.
 
-Those of joints the law has itself. Here are tendons that are linear sums of joints, and equality
-constraints: of joints, of tendons, and of two places, one of which may stand still [MuJoCo's
-manual, chapter Computation, section Constraint model].
+Those of joints the law has itself. Here are tendons and equality constraints: of joints, of
+tendons, and of two places, one of which may be where no joint moves it [MuJoCo's manual, chapter
+Computation, section Constraint model].
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from ..interface import Array
 from ..rotations import INVERSE, matrix_from_quat, times
 from . import _dense as dense
-from ._bullet_plan import PLACES, SITE, ends_of, linear_sum
+from ._bullet_plan import PLACES, SITE, ends_of, linear_sum, movers
 from ._bullet_world import Tree, World
 
 _TINY = 1e-300  # for a power that is too small for a float
@@ -86,31 +86,43 @@ def _related(raw: mujoco.MjModel, dofs: Any) -> Any:
 
 
 class Tendons:
-    """The tendons of a tree that are linear sums of its joints.
+    """The tendons of a tree.
+
+    Some are linear sums of its joints. The path of one that goes through space is MuJoCo's own
+    function of the positions: its length and moment change with each step.
 
     Attributes:
         ids: MuJoCo's numbers of them.
+        bent: Places of those that go through space.
         moments: By number, the moment (n,) of each.
-        armature, damping: (t,).
+        armature, damping: (t,), of those that are linear sums.
         near: (n, n) the pairs of degrees of freedom of which one carries the other: MuJoCo's
             matrices have no room for others.
         stiff, limited, rubs: Whether any has a spring, a limit, dry friction.
     """
 
-    def __init__(self, raw: mujoco.MjModel, tree: Tree, off: Mapping[str, bool]) -> None:
-        self.moments = dict[int, Array]()
-        for tendon in range(raw.ntendon):
+    def __init__(
+        self, raw: mujoco.MjModel, world: World, tree: Tree, off: Mapping[str, bool]
+    ) -> None:
+        self._raw, self._world, self._tree = raw, world, tree
+        owners = [set(raw.body_rootid[movers(raw, tendon)]) for tendon in range(raw.ntendon)]
+        self.ids = ids = [tendon for tendon, roots in enumerate(owners) if roots == {tree.root}]
+        self._moment = np.zeros((len(ids), len(tree.dofs)))
+        self.moments = dict(zip(ids, self._moment, strict=True))
+        self.bent = list[int]()
+        for place, (tendon, moment) in enumerate(self.moments.items()):
             joints, factors = linear_sum(raw, tendon)
-            if set(raw.body_rootid[raw.jnt_bodyid[joints]]) == {tree.root}:
-                self.moments[tendon] = moment = np.zeros(len(tree.dofs))
-                for dof, factor in zip(raw.jnt_dofadr[joints], factors, strict=True):
-                    moment[tree.dofs == dof] += factor
-        self.ids = ids = list(self.moments)
-        self._moment = np.array([*self.moments.values()]).reshape(len(ids), len(tree.dofs))
+            for dof, factor in zip(raw.jnt_dofadr[joints], factors, strict=True):
+                moment[tree.dofs == dof] += factor
+            if not len(joints):
+                self.bent.append(place)
         self._across = self._moment.T.copy()
         self.near = _related(raw, tree.dofs)
         self.armature = raw.tendon_armature[ids]
         self.damping = raw.tendon_damping[ids] * (not off["damper"])
+        self._bent_damping = np.zeros(len(ids))
+        self._bent_damping[self.bent] = self.damping[self.bent]
+        self.damping[self.bent] = 0
         self._stiffness = raw.tendon_stiffness[ids] * (not off["spring"])
         self._slack = raw.tendon_lengthspring[ids].T
         self.stiff = bool(self._stiffness.any())
@@ -125,20 +137,45 @@ class Tendons:
         self._range = bounds_of(raw.tendon_range[ids] + margin, fenced)
         self._stop = soft(raw.tendon_solref_lim[ids], raw.tendon_solimp_lim[ids], weight, shortest)
 
+    def bend(self, q: Sequence[float]) -> Array:
+        """Take the paths of those that go through space, where the tree's qpos are q.
+
+        Returns:
+            What they damp (n, n).
+        """
+        raw, data = self._raw, self._world.still
+        data.qpos[self._tree.qpos] = q
+        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon):
+            stage(raw, data)
+        for place in self.bent:
+            start, count = raw.ten_J_rowadr[self.ids[place]], raw.ten_J_rownnz[self.ids[place]]
+            row = np.zeros(raw.nv)
+            row[raw.ten_J_colind[start : start + count]] = data.ten_J[start : start + count]
+            self._moment[place] = row[self._tree.dofs]
+        self._across = self._moment.T.copy()
+        return self.squared(self._bent_damping)
+
+    def lengths(self, angles: Array) -> Array:
+        """(t,), as they are at the positions of the last `bend`."""
+        lengths = dense.times(self._moment, angles)
+        for place in self.bent:
+            lengths[place] = self._world.still.ten_length[self.ids[place]]
+        return lengths
+
     def squared(self, weight: Array) -> Array:
         """Jᵀ·W·J (n, n) of weights (t,)."""
         return dense.product(self._across * weight, self._moment)
 
     def spring_force(self, angles: Array) -> Array:
         """(n,) what springs do where they are beyond their slack."""
-        length = dense.times(self._moment, angles)
+        length = self.lengths(angles)
         slack = np.minimum(np.maximum(length, self._slack[0]), self._slack[1])
         return dense.times(self._across, self._stiffness * (slack - length))
 
     def stops(self, angles: Array, speed: Array) -> list[SoftRow]:
         """Rows of the limits that tendons are beyond."""
         rows = []
-        length, rate = dense.times(self._moment, angles), dense.times(self._moment, speed)
+        length, rate = self.lengths(angles), dense.times(self._moment, speed)
         for k, (low, high) in enumerate(zip(*self._range, strict=True)):
             for side, gap in ((1.0, length[k] - low), (-1.0, high - length[k])):
                 if gap < 0:
@@ -235,7 +272,11 @@ class Equalities:
         points, quats = [], []
         moves, spins, drifts = np.zeros((2, 6, n)), np.zeros((2, 4)), np.zeros((2, 6))
         for k, place in enumerate(places):
-            (where,), (quat,) = place.still or self._world.body_poses(tree, [place.body])
+            if place.still:
+                still = self._world.still
+                where, quat = still.xpos[place.body], still.xquat[place.body]
+            else:
+                (where,), (quat,) = self._world.body_poses(tree, [place.body])
             turn = matrix_from_quat(quat)
             point = where + dense.times(turn, place.offset)
             points.append(point)
@@ -285,7 +326,7 @@ class TiedPlace:
     Attributes:
         body: MuJoCo's id of the body.
         offset, quat: (3,) and (4,) where in the body.
-        still: xpos (1, 3) and xquat (1, 4) of the body, if it never moves.
+        still: Whether no joint moves the body.
     """
 
     def __init__(self, raw: mujoco.MjModel, eq: int, side: int, body: int) -> None:
@@ -299,11 +340,7 @@ class TiedPlace:
             self.offset = data[first : first + 3]
             if weld and not side:
                 self.quat = data[6:10]
-        self.still: tuple[Array, Array] | None = None
-        if raw.body_treeid[body] < 0:
-            still = mujoco.MjData(raw)
-            mujoco.mj_kinematics(raw, still)
-            self.still = still.xpos[[body]], still.xquat[[body]]
+        self.still = bool(raw.body_treeid[body] < 0)
 
 
 def shortest_time(raw: mujoco.MjModel, off: Mapping[str, bool]) -> float:

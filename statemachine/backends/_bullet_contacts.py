@@ -30,7 +30,7 @@ _CLOSE = 0.01  # a friction is the model's if it is within this part of it
 
 @dataclass(frozen=True)
 class Solid:
-    """What touches as one: geoms of a body that meet the same, or one plane of the world.
+    """What touches as one: geoms of a body that meet the same, or one plane.
 
     Attributes:
         part: A body's solids, numbered.
@@ -151,7 +151,7 @@ def _solids(
 ) -> list[Solid]:
     """Geoms of a body that meet the same are one solid."""
     planes = touching & (raw.geom_type == PLANE)
-    solids = [Solid(0, (g,), True) for g in np.flatnonzero(planes).tolist()]
+    solids = [Solid(int(raw.geom_bodyid[g]), (int(g),), True) for g in np.flatnonzero(planes)]
     for body in range(raw.nbody):
         alike: dict[bytes, list[int]] = {}
         for geom in np.flatnonzero(touching & ~planes & (raw.geom_bodyid == body)).tolist():

@@ -50,7 +50,7 @@ class DrivenWorld(HiddenWorld):
         """
         raw = plan.raw
         self._plan, self._kind, self._acts = plan, kind, acts
-        self._nq, self._nv = int(raw.nq), int(raw.nv)
+        self._nq, self._nv, self._nu = int(raw.nq), int(raw.nv), int(raw.nu)
         self.timestep, self.qpos0 = float(raw.opt.timestep), raw.qpos0
         self.raw = world = World(plan, kind)
         trees = [tree for tree in world.trees if tree.driven]
@@ -67,7 +67,7 @@ class DrivenWorld(HiddenWorld):
                 self.kept_memory = ("act",)
         # Whether the arrays of one arm, in their order, are those of the whole model.
         self._alone = not self._free and [type(tree.qpos) for tree in trees] == [slice]
-        self._driven = False
+        self._driven, self._placed = False, None
         for act in acts:
             act(world)
 
@@ -78,6 +78,7 @@ class DrivenWorld(HiddenWorld):
             self._driven = False
         place = self.raw.put if self._kind == "engine" else self.raw.place
         place(qpos, qvel)
+        self._placed = qpos, qvel, memory
         for arm in self._arms:
             arm.place(qpos, qvel, *(part[arm.tree.qvel] for part in memory[:2]))
             if len(memory) > 2:
@@ -85,13 +86,15 @@ class DrivenWorld(HiddenWorld):
         self._act = memory[2:]
 
     def command(self, ctrl: Array) -> None:
-        """To every arm."""
+        """To every arm; what was placed already, it places again where a mocap body moves."""
+        if len(ctrl) > self._nu and self.raw.lead(ctrl[self._nu :]) and self._placed:
+            self.place(*self._placed)
         for arm in self._arms:
             arm.command(ctrl)
 
     def step(self, afresh: bool = False) -> None:
         """Drive every arm, and let the engine go on."""
-        self._driven = True  # torques add up until a step takes them
+        self._driven, self._placed = True, None  # torques add up until a step takes them
         for arm in self._arms:
             arm.drive(afresh)
         pb.stepSimulation(self.raw.client)
@@ -159,9 +162,12 @@ class DrivenWorld(HiddenWorld):
         self.step(afresh=True)
         self.read()
 
-    def kinematics(self, qpos: Array, name: str) -> dict[str, Array]:
+    def kinematics(self, moment: Moment, name: str) -> dict[str, Array]:
         """By the engine's own, in a world that is never stepped."""
-        return ghost_of(self._plan).poses(qpos, name)
+        with HiddenWorld.lock:
+            ghost = ghost_of(self._plan)
+            ghost.lead(moment.ctrl[self._nu :])
+            return ghost.poses(moment.qpos, name)
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
         """Contacts, which the step found before it moved; or accelerations and forces."""
@@ -254,13 +260,6 @@ class Ghost(World):
         self._known: dict[bool, list[tuple[Array, Array]]] = {}  # of the sites, and of the bodies
         self._known_at, self._rest = b"?", np.zeros(plan.raw.nv)
 
-    @cached_property
-    def still(self) -> tuple[Array, Array, Array, Array]:
-        """xpos, xquat, site_xpos and site_xmat of what never moves."""
-        data = mujoco.MjData(self._raw)
-        mujoco.mj_kinematics(self._raw, data)
-        return data.xpos, data.xquat, data.site_xpos, data.site_xmat
-
     def poses(self, qpos: Array, name: str) -> dict[str, Array]:
         """Poses of bodies, or of sites, by the engine's own forward kinematics.
 
@@ -274,7 +273,7 @@ class Ghost(World):
         if name in ("site_xpos", "site_xmat"):
             return {name: self._sites(qpos, name)}
         raw = self._raw
-        xpos, xquat = (array.copy() for array in self.still[:2])
+        xpos, xquat = self.still.xpos.copy(), self.still.xquat.copy()
         for tree, centres in zip(self.trees, self._states(qpos), strict=True):
             bodies = list(tree.links)
             xpos[bodies], xquat[bodies] = self.frames(bodies, *centres)
@@ -286,7 +285,7 @@ class Ghost(World):
 
     def _sites(self, qpos: Array, name: str) -> Array:
         """site_xpos or site_xmat."""
-        raw, values = self._raw, self.still[POSES.index(name)].copy()
+        raw, values = self._raw, np.array(getattr(self.still, name))
         placed = name == "site_xpos"
         for tree, (where, turned) in zip(self.trees, self._states(qpos, True), strict=True):
             values[list(tree.tips)] = (

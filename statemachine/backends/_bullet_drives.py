@@ -1,15 +1,17 @@
 """What acts on one tree of joints: MuJoCo's actuators, and what acts on each of its bodies.
 
 The force of an actuator is clip(gain·u + b₀ + b₁·length + b₂·speed), where u is the command or what
-an activation has come to, and length = moment·q [MuJoCo's manual, chapter Computation, section
-Actuation model]. On bodies acts the medium around them, MuJoCo's model of boxes of the bodies'
-inertia [section Fluid forces], and what carries their weight. PyBullet knows none of it.
+an activation has come to, and length = moment·q or that of a path through space [MuJoCo's manual,
+chapter Computation, section Actuation model]. A muscle's curves are MuJoCo's own functions. On
+bodies acts the medium around them, MuJoCo's model of boxes of the bodies' inertia [section Fluid
+forces], and what carries their weight. PyBullet knows none of it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -24,8 +26,16 @@ from .compiled import gravity
 
 _OFF, _DYN = mujoco.mjtDisableBit, mujoco.mjtDyn
 DYNAMICS = [
-    int(kind) for kind in (_DYN.mjDYN_INTEGRATOR, _DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT)
+    int(kind)
+    for kind in (
+        _DYN.mjDYN_INTEGRATOR,
+        _DYN.mjDYN_FILTER,
+        _DYN.mjDYN_FILTEREXACT,
+        _DYN.mjDYN_MUSCLE,
+    )
 ]
+MUSCLE = int(mujoco.mjtGain.mjGAIN_MUSCLE)
+_NUDGE = 1e-5  # [m/s] of speed, for the slope of a muscle's gain: pieces of parabolas
 
 
 class Drives:
@@ -70,16 +80,24 @@ class Drives:
         self._across = self._gear.T.copy()
         # What has no slope where its joint is beyond its range: MuJoCo asks by joints.
         self._on_joints = np.abs(self._across) * ~on_tendon[ids, None]
+        self._tendons, self._later = tendons, later
+        # Of what pulls on a path through space: its column, gear and tendon.
+        self._paths = [
+            (
+                column,
+                float(raw.actuator_gear[raw.actuator_outadr[a], 0]),
+                tendons.ids.index(target[a]),
+            )
+            for column, a in enumerate(ids)
+            if on_tendon[a] and tendons.ids.index(target[a]) in tendons.bent
+        ]
         affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
+        self._bias = bias
         feedback = [bias[:, k, None] * self._across for k in (1, 2)]
         self.feedback = np.column_stack([*feedback, bias[:, 0]])
-        self._slope, self._near, self._inertia = (
-            -later * self._gear * bias[:, 2],
-            tendons.near,
-            inertia,
-        )
+        self._slope, self._inertia = -later * self._gear * bias[:, 2], inertia
         self._unsaturated = self._with_slope(np.ones(len(ids)))
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = bounds_of(raw.actuator_forcerange[ids], limited)
@@ -101,33 +119,71 @@ class Drives:
             raw.actuator_actrange[own], raw.actuator_actlimited[own].astype(bool)
         )
         self._early = raw.actuator_actearly[own].astype(bool)
+        # Of each muscle: its column, its place in act, and how its gain, its bias and act change.
+        self._muscles = list[tuple[int, int, Any, Any, Any]]()
+        for slot, (column, a) in enumerate(zip(stateful.tolist(), own, strict=True)):
+            if raw.actuator_gaintype[a] == MUSCLE:
+                known = {"lengthrange": raw.actuator_lengthrange[a], "acc0": raw.actuator_acc0[a]}
+                gain = partial(mujoco.mju_muscleGain, prm=raw.actuator_gainprm[a, :9], **known)
+                rest = partial(mujoco.mju_muscleBias, prm=raw.actuator_biasprm[a, :9], **known)
+                grow = partial(mujoco.mju_muscleDynamics, prm=raw.actuator_dynprm[a, :3])
+                self._muscles.append((column, slot, gain, rest, grow))
+        self._timestep = h
 
     def _with_slope(self, free: Array) -> Array:
         """Both inertias, with the slope of the actuators that are not at their limit."""
         inertias = self._inertia.copy()
-        inertias[1] += dense.product(self._slope * free, self._across) * self._near
+        inertias[1] += dense.product(self._slope * free, self._across) * self._tendons.near
         return inertias
 
     def command(self, ctrl: Array) -> None:
         """Take a new command (nu,) of the whole model, within range."""
         self._ctrl = ctrl[self._ids]
-        self._aim = self._gain * self._ctrl
 
     def pass_step(self) -> None:
         """What activations come to in a step, they are now."""
         if len(self.places):
             self.act = self._next
 
-    def forces(self, feedback: Array) -> tuple[Array, Array]:
-        """The generalised force (n,) at a feedback (m,), and both inertias (2, n, n) with it."""
-        aim = self._aim
+    def _bend(self, angles: Array, speed: Array, acting: Array) -> Array:
+        """The feedback (m,) where lengths or gains are curves; the gains and slopes with it."""
+        lengths = self._tendons.lengths(angles)
+        for column, gear, tendon in self._paths:
+            self._gear[:, column] = gear * self._tendons.moments[self._tendons.ids[tendon]]
+        self._across = self._gear.T.copy()
+        length, rate = dense.times(self._across, angles), dense.times(self._across, speed)
+        for column, gear, tendon in self._paths:
+            length[column] = gear * lengths[tendon]
+        least, per_length, damping = self._bias.T.copy()
+        feedback = least + per_length * length + damping * rate
+        for k, _, gain, rest, _ in self._muscles:
+            at, moving = float(length[k]), float(rate[k])
+            self._gain[k], feedback[k] = gain(at, moving), rest(at)
+            rise = gain(at, moving + _NUDGE) - gain(at, moving - _NUDGE)
+            damping[k] = rise / (2 * _NUDGE) * acting[k]
+        self._slope = -self._later * self._gear * damping
+        self._unsaturated = self._with_slope(np.ones(len(damping)))
+        return feedback
+
+    def forces(self, feedback: Array, angles: Array, speed: Array) -> tuple[Array, Array]:
+        """The generalised force (n,), and both inertias (2, n, n) with the slopes in it.
+
+        Args:
+            feedback: (m,) what `feedback` of the class gives.
+            angles: (n,) positions.
+            speed: (n,) velocities.
+        """
+        acting = self._ctrl
         if len(self.places):
-            step = self._gains[0] * self._ctrl[self._stateful] + self._gains[1] * self.act
+            step = self._gains[0] * acting[self._stateful] + self._gains[1] * self.act
+            for k, slot, _, _, grow in self._muscles:
+                step[slot] = self._timestep * grow(float(acting[k]), float(self.act[slot]))
             self._next = np.clip(self.act + step, *self._act_range)
-            aim = aim.copy()
-            acting = np.where(self._early, self._next, self.act)
-            aim[self._stateful] = self._gain[self._stateful] * acting
-        wanted = feedback + aim
+            acting = acting.copy()
+            acting[self._stateful] = np.where(self._early, self._next, self.act)
+        if self._paths or self._muscles:
+            feedback = self._bend(angles, speed, acting)
+        wanted = feedback + self._gain * acting
         force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
         actuator = force if self._straight else dense.times(self._gear, force)
         inertia = self._unsaturated

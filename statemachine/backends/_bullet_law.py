@@ -84,7 +84,7 @@ class Law:
         damped_later = 0.0 if euler and off["eulerdamp"] else h
         # MuJoCo's implicitfast takes the gyroscopic force of what cannot bend at once.
         self._whirls = tree.free and len(dofs) == 6 and not euler
-        self._tendons = tendons = Tendons(raw, tree, off)
+        self._tendons = tendons = Tendons(raw, world, tree, off)
         # The inertia that constraints feel, and the one that velocities are found with.
         self._inertia = np.array([np.diag(armature), np.diag(armature + damped_later * damping)])
         if len(tendons.ids):
@@ -200,7 +200,12 @@ class Law:
         q, speed = self._angles, x[n:-1]
         linear = dense.times(self._linear, x)
         passive, damped = linear[:n], linear[n : 2 * n]
-        actuator, inertia = self.drives.forces(linear[2 * n :])
+        slope = self._tendons.bend(self._q) if self._tendons.bent else None
+        actuator, inertia = self.drives.forces(linear[2 * n :], x[:n], speed)
+        if slope is not None:
+            passive = passive - dense.times(slope, speed)
+            slope = self._later * slope * self._tendons.near
+            inertia = np.array([inertia[0], inertia[1] + slope])
         if self._medium.bodies:
             drag, slope = self._medium.forces(self._q, speed)
             passive = passive + drag

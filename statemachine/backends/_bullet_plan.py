@@ -30,6 +30,7 @@ _YIELDS = 0.02
 # PyBullet has room for 128 numbers of a tree, and of a position for 7 of its base; from 122 joints
 # on what it tells is wrong, and from 127 links on it has no such tree.
 MOST_LINKS = 120
+_WRAP = mujoco.mjtWrap
 _EQ, SITE = mujoco.mjtEq, int(mujoco.mjtObj.mjOBJ_SITE)
 _SUMS, PLACES = (_EQ.mjEQ_JOINT, _EQ.mjEQ_TENDON), (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD)
 
@@ -77,7 +78,9 @@ class Plan:
         own = slice(raw.body_dofadr[root], raw.body_dofadr[root] + 6)
         laws = raw.dof_armature, raw.dof_damping, raw.dof_frictionloss
         medium = raw.opt.density or raw.opt.viscosity or raw.body_gravcomp[root]
-        tied = root in raw.body_rootid[[b for eq in range(raw.neq) for b in ends_of(raw, eq)]]
+        ends = [b for eq in range(raw.neq) for b in ends_of(raw, eq)]
+        ends += [b for tendon in range(raw.ntendon) for b in movers(raw, tendon)]
+        tied = root in raw.body_rootid[ends]
         return bool(medium or tied or any(law[own].any() for law in laws))
 
     @cached_property
@@ -87,6 +90,13 @@ class Plan:
         As inertia of the links; see `Dialect` and `_bullet_law`.
         """
         return _padding(self.raw)
+
+    @cached_property
+    def still(self) -> mujoco.MjData:
+        """Where everything is in the file."""
+        data = mujoco.MjData(self.raw)
+        mujoco.mj_kinematics(self.raw, data)
+        return data
 
     @cached_property
     def softness(self) -> float:
@@ -203,9 +213,23 @@ def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array
 def linear_sum(raw: mujoco.MjModel, tendon: int) -> tuple[Any, Array]:
     """Joints and factors (k,) of a tendon's length; none of one that goes through space."""
     part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
-    if (raw.wrap_type[part] != int(mujoco.mjtWrap.mjWRAP_JOINT)).any():
+    if (raw.wrap_type[part] != int(_WRAP.mjWRAP_JOINT)).any():
         return [], np.zeros(0)
     return raw.wrap_objid[part], raw.wrap_prm[part]
+
+
+def movers(raw: mujoco.MjModel, tendon: int) -> list[int]:
+    """The bodies whose joints change the length of a tendon."""
+    part = slice(raw.tendon_adr[tendon], raw.tendon_adr[tendon] + raw.tendon_num[tendon])
+    by_kind = {
+        _WRAP.mjWRAP_JOINT: raw.jnt_bodyid,
+        _WRAP.mjWRAP_SITE: raw.site_bodyid,
+        _WRAP.mjWRAP_SPHERE: raw.geom_bodyid,
+        _WRAP.mjWRAP_CYLINDER: raw.geom_bodyid,
+    }
+    parts = zip(raw.wrap_type[part].tolist(), raw.wrap_objid[part], strict=True)
+    bodies = [int(by_kind[_WRAP(kind)][at]) for kind, at in parts if _WRAP(kind) in by_kind]
+    return [body for body in bodies if raw.body_treeid[body] >= 0]
 
 
 def ends_of(raw: mujoco.MjModel, eq: int) -> list[int]:

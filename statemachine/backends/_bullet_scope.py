@@ -12,8 +12,18 @@ from ..errors import UnsupportedError
 from ..interface import Array, JointType
 from ..measures.text import few
 from ._bullet_contacts import NO_CONTACT, PLANE, damping_ratios
-from ._bullet_drives import DYNAMICS, in_force
-from ._bullet_plan import ELLIPSOID, HULLS, MARGIN, MOST_LINKS, Plan, ends_of, linear_sum, roughness
+from ._bullet_drives import DYNAMICS, MUSCLE, in_force
+from ._bullet_plan import (
+    ELLIPSOID,
+    HULLS,
+    MARGIN,
+    MOST_LINKS,
+    Plan,
+    ends_of,
+    linear_sum,
+    movers,
+    roughness,
+)
 from ._bullet_urdf import roots
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
@@ -111,8 +121,10 @@ def _of_bodies(plan: Plan) -> Rows:
     for root in roots(plan.raw):
         large[root] = plan.links(root) > MOST_LINKS
     much = f"has more than {MOST_LINKS} joints and rigid parts"
+    led = (plan.raw.body_mocapid[plan.raw.body_rootid] >= 0) & (plan.raw.body_jntnum > 0)
     return [
         ("body", "a tree of so many parts", large, much),
+        ("body", "a joint on a mocap body", led, "has it"),
     ]
 
 
@@ -128,6 +140,14 @@ def _of_actuators(raw: mujoco.MjModel) -> Rows:
     between = (raw.actuator_delay != 0) & (raw.actuator_history[:, 1] != 0)
     straight = raw.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED)
     straight &= np.isin(raw.actuator_biastype, _AFFINE)
+    of_muscles = np.array(
+        [
+            raw.actuator_gaintype == MUSCLE,
+            raw.actuator_biastype == int(mujoco.mjtBias.mjBIAS_MUSCLE),
+            raw.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_MUSCLE),
+        ]
+    )
+    straight = np.where(of_muscles.any(axis=0), of_muscles.all(axis=0), straight)
     stateful = ~np.isin(raw.actuator_dyntype, [int(mujoco.mjtDyn.mjDYN_NONE), *DYNAMICS])
     name, says = "actuator", "has it: give it to the joint"
     return [
@@ -147,11 +167,10 @@ def _of_actuators(raw: mujoco.MjModel) -> Rows:
 
 def _of_ties(raw: mujoco.MjModel) -> Rows:
     """Tendons and equality constraints: what goes through space, and what ties two trees."""
-    spatial, several = np.zeros((2, raw.ntendon), dtype=bool)
+    heavy, several = np.zeros((2, raw.ntendon), dtype=bool)
     for tendon in range(raw.ntendon):
-        bodies = raw.jnt_bodyid[linear_sum(raw, tendon)[0]]
-        spatial[tendon] = not len(bodies)
-        several[tendon] = len(set(raw.body_rootid[bodies])) > 1
+        heavy[tendon] = raw.tendon_armature[tendon] and not len(linear_sum(raw, tendon)[0])
+        several[tendon] = len(set(raw.body_rootid[movers(raw, tendon)])) > 1
     poly = raw.tendon_stiffnesspoly.any(axis=1) | raw.tendon_dampingpoly.any(axis=1)
     strange, apart = np.zeros((2, raw.neq), dtype=bool)
     for eq in np.flatnonzero(raw.eq_active0).tolist():
@@ -159,7 +178,7 @@ def _of_ties(raw: mujoco.MjModel) -> Rows:
         strange[eq] = not bodies
         apart[eq] = len({int(raw.body_rootid[b]) for b in bodies if raw.body_treeid[b] >= 0}) > 1
     return [
-        ("tendon", "spatial tendon", spatial, "goes through space"),
+        ("tendon", "armature of a spatial tendon", heavy, "has it"),
         ("tendon", "tendon between trees", several, "is of joints of several trees"),
         ("tendon", "nonlinear tendon", poly, "has a spring or damper that is not linear"),
         ("tendon", "force range of a tendon", raw.tendon_actfrclimited.astype(bool), "has one"),
@@ -172,9 +191,11 @@ def _of_geoms(plan: Plan) -> Rows:
     raw, touching = plan.raw, plan.surfaces.touching
     wet = bool(raw.opt.density or raw.opt.viscosity) & (raw.geom_fluid[:, 0] > 0)
     strange = touching & ~np.isin(raw.geom_type, _SOLIDS)
-    planes = touching & (raw.geom_type == PLANE) & (raw.geom_bodyid > 0)
+    bodies = raw.geom_bodyid
+    moved = (raw.body_treeid[bodies] >= 0) | (raw.body_mocapid[raw.body_rootid[bodies]] >= 0)
+    planes = touching & (raw.geom_type == PLANE) & moved
     rows = [
-        ("geom", "plane on a body", planes, "is not the world's own"),
+        ("geom", "plane on a body", planes, "is on one that moves"),
         ("geom", "fluid around an ellipsoid", wet, "has it"),
     ]
     for kind in np.unique(raw.geom_type[strange]).tolist():
@@ -210,7 +231,6 @@ def ignored(plan: Plan) -> list[str]:
         "the second friction of a pair": touches and np.ptp(slide, axis=1).any(),
         "the second rolling friction of a pair": touches and np.ptp(roll, axis=1).any(),
         "solref, solimp or solreffriction of a pair": touches and _own_softness(raw),
-        "the mocap pose of a keyframe": _moves_mocap(raw),
     }
     sentences += [f"{what} has no effect" for what, there in settings.items() if there]
     if raw.jnt_springyield.any():
@@ -242,15 +262,6 @@ def _own_softness(raw: mujoco.MjModel) -> bool:
     """Whether a pair of geoms has a softness of its own."""
     own = (raw.pair_solref != _SOLREF).any() or (raw.pair_solimp != _SOLIMP).any()
     return bool(own or raw.pair_solreffriction.any())
-
-
-def _moves_mocap(raw: mujoco.MjModel) -> bool:
-    """Whether a keyframe has a mocap body elsewhere than where the file has it."""
-    bodies = np.flatnonzero(raw.body_mocapid >= 0)
-    bodies = bodies[np.argsort(raw.body_mocapid[bodies])]
-    where = raw.key_mpos - raw.body_pos[bodies].ravel()
-    turned = raw.key_mquat - raw.body_quat[bodies].ravel()
-    return bool((np.abs(np.hstack([where, turned])) > 1e-9).any())
 
 
 def _bounces(plan: Plan) -> list[str]:

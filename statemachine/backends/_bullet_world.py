@@ -9,9 +9,12 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Iterator, Sequence
+from copy import copy
+from functools import cached_property
 from itertools import chain
 from typing import Any, Literal
 
+import mujoco
 import numpy as np
 
 from ..installed import silence
@@ -130,7 +133,8 @@ class World:
         self._gravity = gravity(raw).tolist()
         pb.setGravity(*self._gravity, self.client)
         self.trees: list[Tree] = []
-        self._planes: dict[int, int] = {}  # PyBullet's body of each plane of the world
+        self._led = b""  # what `lead` was told last
+        self._planes: dict[int, int] = {}  # PyBullet's body of each plane
         for root in (0, *urdf.roots(raw)):
             if plan.driven(root) or kind != "ghost":
                 self._load(root, kind)
@@ -195,6 +199,29 @@ class World:
         """Whether the client was given back; its number may be another's by now."""
         return not self._end.alive
 
+    @cached_property
+    def still(self) -> mujoco.MjData:
+        """Where bodies and sites are that no joint moves; those on mocap bodies as they are led."""
+        return copy(self._plan.still)
+
+    def lead(self, poses: Array) -> bool:
+        """Put the mocap bodies (7·n,) where `HiddenWorld.command` wants them; whether one moved."""
+        raw, still = self._raw, self.still
+        if poses.tobytes() == self._led:
+            return False
+        self._led = poses.tobytes()
+        still.mocap_pos.flat, still.mocap_quat.flat = np.split(poses, [3 * raw.nmocap])
+        mujoco.mj_kinematics(raw, still)
+        for number, tree in enumerate(self.trees):
+            if raw.body_mocapid[tree.root] >= 0:
+                # The base is a link without mass at the world's origin, and carries the body.
+                turn = quat_times(still.xquat[tree.root], raw.body_quat[tree.root] * INVERSE)
+                shift = dense.times(matrix_from_quat(turn), raw.body_pos[tree.root])
+                pose = (still.xpos[tree.root] - shift).tolist(), xyzw_from_wxyz(turn).tolist()
+                self._homes[number] = tree.body, pose
+                pb.resetBasePositionAndOrientation(tree.body, *pose, self.client)
+        return True
+
     def _load(self, root: int, kind: str) -> None:
         raw = self._raw
         text, files = self._plan.described(root, kind)
@@ -225,16 +252,16 @@ class World:
             )
 
     def _add_planes(self) -> None:
-        raw = self._raw
         for solid in self._surfaces.solids:
             if solid.plane:
-                (geom,) = solid.geoms
+                (geom,), quat = solid.geoms, np.zeros(4)
+                mujoco.mju_mat2Quat(quat, self._plan.still.geom_xmat[geom])
                 shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=self.client)
                 self._planes[geom] = pb.createMultiBody(
                     0,
                     shape,
-                    basePosition=raw.geom_pos[geom].tolist(),
-                    baseOrientation=xyzw_from_wxyz(raw.geom_quat[geom]).tolist(),
+                    basePosition=self._plan.still.geom_xpos[geom].tolist(),
+                    baseOrientation=xyzw_from_wxyz(quat).tolist(),
                     physicsClientId=self.client,
                 )
 

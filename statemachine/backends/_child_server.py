@@ -11,7 +11,8 @@ only, and imports nothing of this package. Its argument is a file that knows the
   of those that a write into qpos or qvel leaves as they are, `untold` names of derived arrays that
   it does not tell.
   `place(vector)` takes qpos, qvel and the memory in a row, so that nothing of before is left;
-  `state()` gives the same vector; `command(ctrl)` takes a command. `advance(steps, fastest)` takes
+  `state()` gives the same vector; `command(ctrl)` takes a command,
+  where the poses of mocap bodies follow ctrl. `advance(steps, fastest)` takes
   engine steps, up to one after which a position is beyond 1e10 or a velocity beyond `fastest`, and
   returns how many. `forward()` derives of the present. `derived(vector)` gives what is derived,
   of the moment that the last step started from or of the present after `forward`, which it is told

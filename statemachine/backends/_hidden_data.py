@@ -13,7 +13,19 @@ from typing import Any
 import numpy as np
 
 from ..errors import DivergedError, EngineError
-from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Ints, Keyframe, Model, State
+from ..interface import (
+    DERIVED,
+    INPUTS,
+    MOCAP,
+    POSES,
+    Array,
+    Contacts,
+    Data,
+    Ints,
+    Keyframe,
+    Model,
+    State,
+)
 from ..interface.options import HUGE, check_entries, check_writable, engine_steps, unsupported
 from ._hidden_world import HiddenWorld, LookAhead, Memory, Moment, bounded
 
@@ -51,7 +63,8 @@ class Machine:
     A step is all of it or nothing, also when it is interrupted. A write is seen by its bytes.
 
     Attributes:
-        qpos, qvel, ctrl: The Data's arrays.
+        qpos, qvel, ctrl, mocap_pos, mocap_quat: The Data's arrays.
+        wires: The last three in a row: what is commanded.
         time: Simulated time [s].
         given: (steps, nu) the commands of the last engine steps, the newest last: as many as
             the longest latency takes.
@@ -66,7 +79,9 @@ class Machine:
         self._fastest = float(self._bounds[1].min(initial=HUGE))
         self.world = model._open_world()
         self.qpos, self.qvel = np.zeros(model.nq), np.zeros(model.nv)
-        self.ctrl = np.zeros(model.nu)
+        self.wires = np.zeros(model.nu + 7 * model.nmocap)
+        self.ctrl, places, turns = np.split(self.wires, [model.nu, model.nu + 3 * model.nmocap])
+        self.mocap_pos, self.mocap_quat = places.reshape(-1, 3), turns.reshape(-1, 4)
         self._delay_steps = np.rint(model.actuator_delay / self.world.timestep).astype(np.int64)
         self._longest_delay = int(self._delay_steps.max(initial=0))
         self._used = False
@@ -75,10 +90,13 @@ class Machine:
     def reset(self, key: int | None) -> None:
         """Be in the default state, or in a keyframe's."""
         silent, still = np.zeros(len(self.ctrl)), np.zeros(len(self.qvel))
-        default = Keyframe("", 0.0, self.world.qpos0, still, silent)
-        frame = default if key is None else self._model.keyframes[key]
-        start = Moment(frame.qpos, frame.qvel, frame.ctrl, self.world.memory_at(key))
-        before = frame.ctrl if self._model._holds_start else silent
+        model, qpos0 = self._model, self.world.qpos0
+        led = model.mocap_pos0, model.mocap_quat0
+        default = Keyframe("", 0.0, qpos0, still, silent, *led)
+        frame = default if key is None else model.keyframes[key]
+        wires = np.concatenate([frame.ctrl, frame.mocap_pos.ravel(), frame.mocap_quat.ravel()])
+        start = Moment(frame.qpos, frame.qvel, wires, self.world.memory_at(key))
+        before = frame.ctrl if model._holds_start else silent
         self.restart(frame.time, start, np.tile(before, (self._longest_delay, 1)))
 
     def restart(self, time: float, start: Moment, given: Array) -> None:
@@ -86,14 +104,14 @@ class Machine:
 
         Args:
             time: Of the state [s].
-            start: The state; its ctrl is that of the Data.
+            start: The state; its ctrl is what the Data's wires are.
             given: The commands before it; see `given` of the class.
         """
         if self._used:
             self.world = self.world.renewed()
             self._used = False
         self.time = time
-        self.qpos[:], self.qvel[:], self.ctrl[:] = start.qpos, start.qvel, start.ctrl
+        self.qpos[:], self.qvel[:], self.wires[:] = start.qpos, start.qvel, start.ctrl
         self.given = given
         self._place(start.memory)
         self._command()
@@ -112,14 +130,20 @@ class Machine:
     def _command(self) -> None:
         """Take the command as it is now, and pass on what acts."""
         self._commanded = b"?"  # until the world has taken it
-        self._ctrl = self.ctrl.copy()
+        self._ctrl, commanded = self.ctrl.copy(), self.wires.tobytes()
         self._pass_on(self.given)
-        self._commanded = self._ctrl.tobytes()
+        self._commanded = commanded
 
     def _pass_on(self, given: Array) -> None:
         """Tell the world the command that acts in its next step."""
-        self._acting = self._model._acting("ctrl", acting(self._ctrl, given, self._delay_steps))
+        self._acting = self._acts(self._ctrl, given)
         self.world.command(self._acting)
+
+    def _acts(self, ctrl: Array, given: Array) -> Array:
+        """What acts in a step: a command, late where there is a latency, and the mocap bodies."""
+        wires = self.wires.copy()
+        wires[: len(ctrl)] = self._model._acting("ctrl", acting(ctrl, given, self._delay_steps))
+        return wires
 
     def run(self, _model: None, _data: None, nstep: int = 1) -> None:
         """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
@@ -127,9 +151,11 @@ class Machine:
         check_writable(self.qpos, "qpos")
         check_writable(self.qvel, "qvel")
         world = self.world
-        if self.ctrl.tobytes() != self._commanded:
+        if self.wires.tobytes() != self._commanded:
             acting = self._model._acting("ctrl", self.ctrl)
             check_entries(acting, "ctrl", self._model._coordinate_name)
+            for name in MOCAP:
+                check_entries(getattr(self, name).ravel(), name)
             self._command()
         written = self._written
         if written:
@@ -223,7 +249,7 @@ class Machine:
     def present(self) -> Moment:
         """All that decides the next engine step, with the command that acts in it."""
         memory = self._remembered(self._written)
-        ctrl = self._model._acting("ctrl", acting(self.ctrl, self.given, self._delay_steps))
+        ctrl = self._acts(self.ctrl, self.given)
         return Moment(self.qpos.copy(), self.qvel.copy(), ctrl, memory)
 
     def forward(self) -> None:
@@ -244,7 +270,7 @@ class Machine:
         moment = self.moment
         if moment is None:
             return _nothing(self._model)
-        if name in POSES and (poses := self.world.kinematics(moment.qpos, name)):
+        if name in POSES and (poses := self.world.kinematics(moment, name)):
             return poses
         if self._world_knows_moment:  # the world is still where the step that ends there left it
             return self.world.derive(name, moment, self.derive)
@@ -273,11 +299,13 @@ class HiddenData(Data):
     def __init__(self, model: HiddenModel) -> None:
         self._machine = machine = Machine(model)
         sizes = {"time": 1, "qpos": model.nq, "qvel": model.nv, "ctrl": model.nu}
+        if model.nmocap:
+            sizes |= {"mocap_pos": 3 * model.nmocap, "mocap_quat": 4 * model.nmocap}
         layout = (*sizes.items(), *machine.world.memory_layout)
         if machine.given.size:
             layout = (*layout, ("given", machine.given.size))
         self._layout = model._with_fingerprint(layout)
-        inputs = {name: getattr(machine, name) for name in INPUTS}
+        inputs = {name: getattr(machine, name) for name in (*INPUTS, *MOCAP)}
         super().__init__(model, machine.run, inputs)
 
     @property
@@ -314,7 +342,7 @@ class HiddenData(Data):
 
     def _get_state(self) -> State:
         now = self._machine.present()
-        inputs = [self._machine.time], now.qpos, now.qvel, self._machine.ctrl
+        inputs = [self._machine.time], now.qpos, now.qvel, self._machine.wires
         parts = [*inputs, *now.memory, self._machine.given.ravel()]
         blob = np.concatenate(parts).tobytes()
         model, (fingerprint, layout) = self._home, self._layout
@@ -325,7 +353,9 @@ class HiddenData(Data):
             check_entries(self._home._acting(name, state[name]), name, self._home._coordinate_name)
         self._home._check_quaternions(state["qpos"])
         memory = [state[name] for name, _ in self._machine.world.memory_layout]
-        start = Moment(state["qpos"], state["qvel"], state["ctrl"], memory)
+        led = [state[name] for name, _ in self._layout[1] if name in MOCAP]
+        wires = np.concatenate([state["ctrl"], *led])
+        start = Moment(state["qpos"], state["qvel"], wires, memory)
         given = self._machine.given
         if given.size:
             given = state["given"].reshape(given.shape)

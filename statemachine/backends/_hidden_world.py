@@ -29,7 +29,8 @@ class Moment:
     """All that what is derived at one moment depends on.
 
     Attributes:
-        qpos, qvel, ctrl: (nq,), (nv,) and (nu,), as in a Data.
+        qpos, qvel: (nq,) and (nv,), as in a Data.
+        ctrl: What `command` takes.
         memory: What the world knew of the step before; see `HiddenWorld.memory`.
     """
 
@@ -83,6 +84,8 @@ class HiddenWorld(ABC):
     def command(self, ctrl: Array) -> None:
         """Take a command (nu,) [unit of the actuator] that is in force until the next one.
 
+        Where mocap bodies are follows it (7·nmocap,): mocap_pos, then mocap_quat, as written.
+
         A latency (`Model.actuator_delay`) has passed already: the Data keeps what is on its way.
         It is within its range, where the Model says that the engine clamps it.
         """
@@ -122,8 +125,8 @@ class HiddenWorld(ABC):
         self.command(moment.ctrl)
         self.step()
 
-    def kinematics(self, qpos: Array, name: str) -> Mapping[str, Array]:
-        """`name` of `records.POSES` at `qpos` (nq,), where that needs no step.
+    def kinematics(self, moment: Moment, name: str) -> Mapping[str, Array]:
+        """`name` of `records.POSES` at a moment, where that needs no step.
 
         And what comes with it. Empty by default: `derive` gives it.
         """
@@ -205,7 +208,7 @@ def derived_by(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
 
     def read(name: str) -> Any:
         if name in POSES and name not in values:
-            values.update(world.kinematics(moment.qpos, name))
+            values.update(world.kinematics(moment, name))
         if name not in values:
             values.update(world.derive(name, moment, read))  # noqa: F821 (until `del read`)
         return values[name]

@@ -16,10 +16,7 @@ POSES = ("xpos", "xquat", "site_xpos", "site_xmat")
 FORCES = ("qacc", "qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
 _KINDS = mujoco.mjtConstraint
 # What a state is, by prefix and name.
-STATE = (
-    *(("", "qpos"), ("", "qvel"), ("qacc_", "warmstart")),
-    *(("", "act"), ("", "mocap_pos"), ("", "mocap_quat")),
-)
+STATE = ("", "qpos"), ("", "qvel"), ("qacc_", "warmstart"), ("", "act")
 KINDS = {"disable": mujoco.mjtDisableBit, "enable": mujoco.mjtEnableBit}
 SPLIT = {"mjDSBL_PASSIVE": ("mjDSBL_SPRING", "mjDSBL_DAMPER")}  # flags that became two later
 _ALL = mujoco.mjtWarning
@@ -61,8 +58,10 @@ class Simulation:
         return np.concatenate(self.parts)
 
     def command(self, ctrl) -> None:
-        """Take a command."""
-        self.data.ctrl[:] = ctrl
+        """Take a command: ctrl, then where mocap bodies are."""
+        data, nu = self.data, self.model.nu
+        self.wires, data.ctrl[:] = ctrl, ctrl[:nu]
+        data.mocap_pos.flat, data.mocap_quat.flat = np.split(ctrl[nu:], [3 * self.model.nmocap])
 
     def advance(self, steps: int, fastest: float) -> int:
         """Take engine steps up to one after which a coordinate is beyond its bound; how many.
@@ -72,12 +71,12 @@ class Simulation:
         """
         model, data = self.model, self.data
         if steps > 1:
-            start, ctrl = self.state(), data.ctrl.copy()
+            start = self.state()
             mujoco.mj_step(model, data, steps)
             if self._near(fastest) and not self.warned():
                 return steps
             self.place(start)
-            self.command(ctrl)
+            self.command(self.wires)
         for k in range(1, steps + 1):
             mujoco.mj_step(model, data)
             if self.warned():

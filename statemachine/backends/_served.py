@@ -222,16 +222,8 @@ class ServedWorld(HiddenWorld):
         return self._state[qpos], self._state[qvel]
 
     def memory_at(self, key: int | None) -> Memory:
-        compiled, mocap = self._compiled, self._compiled.body_mocapid >= 0
-        start = {"mocap_pos": compiled.body_pos[mocap], "mocap_quat": compiled.body_quat[mocap]}
-        if key is not None:
-            start = {
-                "act": compiled.key_act[key],
-                "mocap_pos": compiled.key_mpos[key],
-                "mocap_quat": compiled.key_mquat[key],
-            }
         return tuple(
-            np.ravel(start.get(name, zeros))
+            zeros if key is None or name != "act" else self._compiled.key_act[key]
             for (name, _), zeros in zip(self.memory_layout, super().memory_at(key), strict=True)
         )
 

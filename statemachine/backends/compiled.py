@@ -297,6 +297,7 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
         "njnt": m.njnt,
         "nsite": m.nsite,
         "ngeom": m.ngeom,
+        "nmocap": m.nmocap,
         "body_names": tuple(m.body(i).name for i in range(m.nbody)),
         "joint_names": tuple(m.joint(i).name for i in range(m.njnt)),
         "site_names": tuple(m.site(i).name for i in range(m.nsite)),
@@ -329,9 +330,17 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
         "site_bodyid": m.site_bodyid.astype(np.int64),
         "site_pos": m.site_pos,
         "site_quat": m.site_quat,
+        "mocap_pos0": m.body_pos[m.body_mocapid >= 0],
+        "mocap_quat0": m.body_quat[m.body_mocapid >= 0],
         "keyframes": tuple(
             Keyframe(
-                m.key(i).name, float(m.key_time[i]), m.key_qpos[i], m.key_qvel[i], m.key_ctrl[i]
+                m.key(i).name,
+                float(m.key_time[i]),
+                m.key_qpos[i],
+                m.key_qvel[i],
+                m.key_ctrl[i],
+                m.key_mpos[i].reshape(-1, 3),
+                m.key_mquat[i].reshape(-1, 4),
             )
             for i in range(m.nkey)
         ),

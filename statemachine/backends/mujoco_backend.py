@@ -20,6 +20,7 @@ from ..interface import (
     BEHAVIOURS,
     FORCES,
     INPUTS,
+    MOCAP,
     OPTIONS,
     POSES,
     Array,
@@ -245,7 +246,7 @@ class MujocoData(Data):
             view.setflags(write=False)
         self._views, self._alarms = views, alarms
         self._layout = _layout(model, model.raw.nhistory)
-        inputs = {name: getattr(raw, name).view() for name in INPUTS}
+        inputs = {name: getattr(raw, name).view() for name in (*INPUTS, *MOCAP)}
         super().__init__(
             model,
             _transition(model, raw),

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..backends import load
 from ..errors import StateMachineError, TraceError
-from ..interface import Array, Data, Model
+from ..interface import MOCAP, Array, Data, Model
 from ..runs import SideStart, Trace, model_file, start_of
 from ..runs.recorder import layout_of
 from ..runs.scenarios import Controller
@@ -87,15 +87,24 @@ def translated(trace: Trace, matched: Matched, start: tuple[Array, Array, Array]
             counterpart of.
     """
     recorded = SideStart(trace.qpos, trace.qvel, trace.ctrl)
-    return replace_layout(trace, matched.right, *matched.start(recorded, SideStart(*start)))
+    poses = {"mocap_pos": matched.right.mocap_pos0, "mocap_quat": matched.right.mocap_quat0}
+    led = {
+        name: matched.moved(name, trace[name].reshape(len(trace), -1), pose.ravel())
+        for name, pose in poses.items()
+        if name in trace
+    }
+    return replace_layout(trace, matched.right, *matched.start(recorded, SideStart(*start)), led)
 
 
 def for_left(trace: Trace, model: Model, request: Request) -> Trace:
     """A trace as one of the left's Model; matched by the model that it was recorded with."""
     header = trace.header
     own = layout_of(model)
-    if all(getattr(header, name) == own[name] for name in ("joints", "actuators", "jnt_type")):
-        return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl)
+    if all(
+        getattr(header, name) == own[name] for name in ("joints", "actuators", "jnt_type", "nmocap")
+    ):
+        led = {name: trace[name] for name in MOCAP if name in trace}
+        return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl, led)
     try:
         file, _ = model_file(header, request.menagerie, request.what[0])
         matched = match_models(load(file), model, request.names)
@@ -132,10 +141,14 @@ def commands_alike(theirs: Trace, right: Trace) -> bool:
     return np.array_equal(theirs.ctrl[rows[used]], right.ctrl[used])
 
 
-def replace_layout(trace: Trace, model: Model, qpos: Array, qvel: Array, ctrl: Array) -> Trace:
+def replace_layout(
+    trace: Trace, model: Model, qpos: Array, qvel: Array, ctrl: Array, led: Mapping[str, Array]
+) -> Trace:
     """A run as if it were one of another Model: states and commands, and nothing derived."""
     columns = {"time": trace.time, "qpos": qpos, "qvel": qvel, "ctrl": ctrl}
-    return Trace(replace(trace.header, **layout_of(model)), columns)
+    header = replace(trace.header, **layout_of(model))
+    poses = {name: led[name].reshape(len(trace), *header.shape(name)) for name in led}
+    return Trace(header, columns | poses)
 
 
 def with_bodies_of(trace: Trace, model: Model) -> Trace:

@@ -15,7 +15,19 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError, DivergedError, UnsupportedError
-from ..interface import Array, Data, Model, State, get_state, make_data, reset, set_state, step
+from ..interface import (
+    INPUTS,
+    MOCAP,
+    Array,
+    Data,
+    Model,
+    State,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
 from ..page import Figures
 from ..runs import Rerun
 from ..runs.drive import Progress, silent
@@ -73,7 +85,7 @@ def one_step(
     trace = rerun.record(derive=False)
     rows = len(trace) - 1
     every = max(1, -(-rows // moments))
-    inputs = {name: trace[name] for name in ("time", "qpos", "qvel", "ctrl")}
+    inputs = {name: trace[name] for name in ("time", *INPUTS, *MOCAP) if name in trace}
     primed, failed = "", False
     times: list[float] = []
     readings: list[tuple[StepReading, StepReading, StepReading]] = []

@@ -16,12 +16,13 @@ from numpy.typing import ArrayLike
 from ..errors import ClosedDataError, DivergedError, ReadOnlyError
 from .model import Model
 from .options import as_scalar, as_vector, check_writable
-from .records import INPUTS, Array, Contacts, State, read_only
+from .records import INPUTS, MOCAP, Array, Contacts, State, read_only
 from .turns import Closable, Turn, alone, refuse_unless_held
 
 # By name, so that type checkers take the inputs for the descriptors below.
+_WRITABLE = (*INPUTS, *MOCAP)
 _ENGINE = ("_advance", "_raw_model", "_raw", "_warned", "_told")
-_SLOTS = ("__weakref__", "_home", "_turn", "_trouble", *_ENGINE, *INPUTS)
+_SLOTS = ("__weakref__", "_home", "_turn", "_trouble", *_ENGINE, *_WRITABLE)
 
 if TYPE_CHECKING:
 
@@ -41,10 +42,10 @@ if TYPE_CHECKING:
 class Data(Closable, ABC):
     """Everything that changes: the state, the command, and what follows from them.
 
-    The inputs `qpos`, `qvel` and `ctrl` are writable in place, and the same arrays for the whole
-    life of the Data; `data.ctrl = x` copies in. An assignment is checked before anything changes.
-    NumPy's in-place operators (`data.ctrl *= x`) write first: what they leave is checked then,
-    and by the verbs.
+    The inputs `qpos`, `qvel` and `ctrl`, and where mocap bodies are, are writable in place, and the
+    same arrays for the whole life of the Data; `data.ctrl = x` copies in. An assignment is checked
+    before anything changes. NumPy's in-place operators (`data.ctrl *= x`) write first: what they
+    leave is checked then, and by the verbs.
 
     All else is derived and read-only. It belongs to the state before the last engine
     step, or to that of the last `forward`; a write to an input changes none of it.
@@ -62,6 +63,9 @@ class Data(Closable, ABC):
             then angular in body axes.
         ctrl: (nu,) commands [unit of the actuator]. What acts is each clamped to its range,
             an infinite one too; the array and a State keep what was written.
+        mocap_pos: (nmocap, 3) positions of the bodies that the file calls mocap, in the order of
+            the bodies [m]. Nothing moves them but who writes; none on an engine without them.
+        mocap_quat: (nmocap, 4) their orientations, wxyz; normalised before they act.
         time: Simulated time [s].
     """
 
@@ -79,6 +83,8 @@ class Data(Closable, ABC):
         qpos = _Input()
         qvel = _Input()
         ctrl = _Input()
+        mocap_pos = _Input()
+        mocap_quat = _Input()
         time = _Time()
     else:
 
@@ -101,7 +107,8 @@ class Data(Closable, ABC):
             model: The Model that makes this Data.
             advance: The engine's own step, called with the two of `engine` and, for more
                 than one step, their number. (Bound to them it would cost 0.5 % of a step.)
-            inputs: The arrays qpos, qvel and ctrl, the same for the whole life.
+            inputs: The arrays qpos, qvel, ctrl, mocap_pos and mocap_quat, the same for the whole
+                life.
             warnings: Two things of the engine's; when they differ after a step, the verb
                 calls `_attend`.
             engine: The engine's model and data, or whatever `advance` takes first.
@@ -110,7 +117,7 @@ class Data(Closable, ABC):
         self._turn = Turn(self)
         self._raw_model, self._raw = engine
         self._warned, self._told = warnings
-        for name in INPUTS:
+        for name in _WRITABLE:
             super().__setattr__(name, inputs[name])
         self._recover()
 
@@ -196,7 +203,7 @@ class Data(Closable, ABC):
 
     def _shut(self) -> None:
         self._give_up("closed")
-        for name in INPUTS:
+        for name in _WRITABLE:
             # The last values stay readable, apart from the engine's memory, which a view
             # would keep alive; a view that the caller kept can no longer be written into.
             view = getattr(self, name)
@@ -207,7 +214,7 @@ class Data(Closable, ABC):
         self._close()
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name in INPUTS:
+        if name in _WRITABLE:
             self._refuse_if_troubled()
             self._check_writable()
             target = getattr(self, name)
@@ -226,7 +233,7 @@ class Data(Closable, ABC):
             )
         else:
             raise ReadOnlyError(
-                f"a Data has no attribute {name!r}; its inputs are qpos, qvel, ctrl"
+                f"a Data has no attribute {name!r}; its inputs are {', '.join(_WRITABLE)}"
             )
 
     def __reduce__(self) -> NoReturn:
@@ -247,7 +254,7 @@ class Data(Closable, ABC):
 
     def _check_writable(self) -> None:
         """Raise ReadOnlyError where the caller made an input read-only."""
-        for name in INPUTS:
+        for name in _WRITABLE:
             check_writable(getattr(self, name), name)
 
     def _give_up(self, why: str) -> None:

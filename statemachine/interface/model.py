@@ -32,7 +32,7 @@ class Model(ABC):
         substeps: Engine steps that one `step` takes.
         gravity: (3,) [m/s²], as the engine has it.
         nq, nv, nu: Lengths of qpos, qvel and ctrl.
-        nbody, njnt, nsite, ngeom: Counts; body 0 is the world.
+        nbody, njnt, nsite, ngeom, nmocap: Counts; body 0 is the world.
         jnt_type: (njnt,) `JointType`.
         jnt_qposadr, jnt_dofadr: (njnt,) where each joint starts in qpos and qvel.
         jnt_limited: (njnt,) bool; jnt_range: (njnt, 2) [rad or m].
@@ -50,6 +50,7 @@ class Model(ABC):
         geom_friction: (ngeom, 3) sliding, torsional [m] and rolling [m] friction of each geom.
         body_parentid: (nbody,) the body that carries each body; the world carries itself.
         jnt_bodyid, geom_bodyid, site_bodyid: The body of each joint, geom and site.
+        mocap_pos0, mocap_quat0: (nmocap, 3) [m] and (nmocap, 4) wxyz, where the file has them.
         site_pos, site_quat: (nsite, 3) [m] and (nsite, 4) wxyz, in that body's frame.
         keyframes: The states that the file names.
     """
@@ -69,6 +70,7 @@ class Model(ABC):
     njnt: int
     nsite: int
     ngeom: int
+    nmocap: int
     body_names: tuple[str, ...]
     joint_names: tuple[str, ...]
     site_names: tuple[str, ...]
@@ -98,6 +100,8 @@ class Model(ABC):
     site_bodyid: Ints
     site_pos: Array
     site_quat: Array
+    mocap_pos0: Array
+    mocap_quat0: Array
     keyframes: tuple[Keyframe, ...]
 
     _holds_start = False  # whether the commands before a keyframe were that of the keyframe

@@ -15,6 +15,7 @@ from ..errors import unknown_name
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 INPUTS = ("qpos", "qvel", "ctrl")
+MOCAP = ("mocap_pos", "mocap_quat")  # further inputs: where the mocap bodies of a model are
 # What is derived from them, as far as it is one array; contacts are several.
 POSES = ("xpos", "xquat", "site_xpos", "site_xmat")
 FORCES = ("qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
@@ -121,21 +122,23 @@ class Capabilities:
 
 @dataclass(frozen=True, eq=False)
 class Keyframe:
-    """A state that a model's file names; arrays are read-only."""
+    """A state that a model's file names; arrays are read-only, their shapes those of a Data."""
 
     name: str
     time: float
     qpos: Array
     qvel: Array
     ctrl: Array
+    mocap_pos: Array
+    mocap_quat: Array
 
     def __post_init__(self) -> None:
-        for name in INPUTS:
+        for name in (*INPUTS, *MOCAP):
             vars(self)[name] = read_only(getattr(self, name))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A pickle forgets that an array was read-only; making it anew does not.
-        return Keyframe, (self.name, self.time, self.qpos, self.qvel, self.ctrl)
+        return Keyframe, tuple(vars(self).values())
 
 
 @dataclass(frozen=True, eq=False, repr=False)

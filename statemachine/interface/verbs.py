@@ -14,7 +14,7 @@ from ..errors import BadInputError, ForeignDataError
 from .data import Data
 from .model import Model
 from .options import as_count, check_entries, check_state, kind_of
-from .records import INPUTS, State
+from .records import INPUTS, MOCAP, State
 from .turns import HOLDERS, alone
 
 _ONE = 1
@@ -189,7 +189,7 @@ def _overwrite(data: Data, verb: str, change: Callable[[Any], None], to: Any) ->
 
 def _check_inputs(model: Model, data: Data) -> None:
     """Raise BadInputError for the first entry that acts and is not a finite number."""
-    for name in INPUTS:
+    for name in (*INPUTS, *MOCAP):
         check_entries(model._acting(name, getattr(data, name)), name, model._coordinate_name)
 
 

@@ -21,14 +21,14 @@ from ..errors import (
 from ..processes import free_memory
 from .model import Model
 from .options import HUGE, TINY, as_numbers, as_vector, check_entries, check_writable, whole_number
-from .records import FORCES, INPUTS, POSES, Array, Ints, State, read_only
+from .records import FORCES, INPUTS, MOCAP, POSES, Array, Ints, State, read_only
 from .turns import Closable, Turn
 
 if TYPE_CHECKING:
     from .data import _Input
 
 BATCHED = (*POSES, "qacc", *FORCES)  # the derived arrays that worlds can keep
-WRITABLE = (*INPUTS, "time")
+WRITABLE = (*INPUTS, *MOCAP, "time")
 _SPARE = 0.95  # of the memory that is free, what worlds may take
 
 
@@ -52,6 +52,7 @@ class Worlds(Closable, ABC):
         n: Number of worlds.
         workers: Threads or processes that step them.
         qpos, qvel, ctrl: (n, nq), (n, nv) and (n, nu), as in a Data.
+        mocap_pos, mocap_quat: (n, nmocap, 3) and (n, nmocap, 4), as in a Data.
         time: (n,) simulated time of each world [s].
         xpos: (n, nbody, 3), and so on for each name of `derived`.
         derived: Names of the derived arrays that are kept, of `BATCHED`.
@@ -71,6 +72,8 @@ class Worlds(Closable, ABC):
         qpos = _Input()
         qvel = _Input()
         ctrl = _Input()
+        mocap_pos = _Input()
+        mocap_quat = _Input()
         time = _Input()
         xpos: Array
         xquat: Array
@@ -228,8 +231,8 @@ class Worlds(Closable, ABC):
 
     def _check_inputs(self, ids: Ints) -> None:
         """Raise BadInputError for the first entry of these worlds that is not a finite number."""
-        for name in INPUTS:
-            rows = self.model._acting(name, getattr(self, name)[ids])
+        for name in (*INPUTS, *MOCAP):
+            rows = self.model._acting(name, getattr(self, name)[ids]).reshape(len(ids), -1)
             if not np.abs(rows).max(initial=0.0) <= HUGE:  # NaN fails it, too
                 row = int(np.flatnonzero(~(np.abs(rows) <= HUGE).all(axis=1))[0])
                 try:
@@ -279,7 +282,7 @@ class Worlds(Closable, ABC):
             vars(self)[name] = value
         else:
             raise ReadOnlyError(
-                f"{name!r} of Worlds cannot be assigned to; write qpos, qvel, ctrl or time"
+                f"{name!r} of Worlds cannot be assigned to; write {', '.join(WRITABLE)}"
             )
 
     def __delattr__(self, name: str) -> None:

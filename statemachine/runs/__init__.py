@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ..errors import TraceError, refuse
-from ..interface import Array, Data, Model, make_data, reset
+from ..interface import MOCAP, Array, Data, Model, make_data, reset
 from .drive import Controller, Progress, check_length, silent
 from .files import export_csv, model_file, read, shipped, shipped_names, write
 from .header import COLUMNS, CONTACTS, Header
@@ -216,6 +216,10 @@ def play(
             (header.nq, header.nv) != (model.nq, model.nv),
             "the trace's joints are of other kinds than the model's",
         ),
+        (
+            header.nmocap != model.nmocap,
+            f"the trace has {header.nmocap} mocap bodies, and the model {model.nmocap}",
+        ),
         error=TraceError,
     )
     rerun = replayed(trace, model, defaults, options)
@@ -223,17 +227,24 @@ def play(
 
 
 def commands_of(trace: Trace) -> Controller:
-    """A controller that gives the ctrl of a trace; a command holds until the time of the next."""
+    """A controller that gives the ctrl of a trace; a command holds until the time of the next.
+
+    So it does with the poses of mocap bodies, which it writes.
+    """
+    led = [name for name in MOCAP if name in trace]
     commands, start = trace.ctrl, float(trace.time[0])
     # A hair early, so that a sum of timesteps does not miss the row that it means.
     times = trace.time - start - 1e-6 * trace.timestep
     began: list[float] = []
 
-    def controller(time: float, _data: Data) -> Array:
+    def controller(time: float, data: Data) -> Array:
         if not began:
             began.append(time)
         row = int(np.searchsorted(times, time - began[0], side="right")) - 1
-        return commands[max(0, min(row, len(commands) - 1))]
+        row = max(0, min(row, len(commands) - 1))
+        for name in led:
+            getattr(data, name)[:] = trace[name][row]
+        return commands[row]
 
     return controller
 

@@ -23,7 +23,7 @@ from ..errors import (
     check_name,
     did_you_mean,
 )
-from ..interface import JointType
+from ..interface import MOCAP, JointType
 from ..models import resolve
 from .formats import read_npz, read_parquet, write_npz, write_parquet
 from .header import COLUMNS, Header, model_digest
@@ -224,7 +224,11 @@ def column_labels(header: Header, column: str) -> list[str]:
     if column in ("qpos", "qvel") or column.startswith("qfrc"):
         return [f"{column}.{label}" for label in coordinate_labels(header, column == "qpos")]
     names = header.bodies if column in ("xpos", "xquat") else header.sites
+    if column in MOCAP:
+        names = [""] * header.nmocap
     parts = {
+        "mocap_pos": "xyz",
+        "mocap_quat": ("qw", "qx", "qy", "qz"),
         "xpos": "xyz",
         "site_xpos": "xyz",
         "xquat": ("qw", "qx", "qy", "qz"),

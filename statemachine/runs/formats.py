@@ -17,6 +17,7 @@ from numpy.lib import format as npy
 
 from ..errors import TraceError, refuse
 from ..installed import require_extra
+from ..interface import MOCAP
 from .header import COLUMNS, CONTACTS, INPUTS, Header
 from .trace import WHOLE, Trace, as_column, check_shapes, check_size
 
@@ -32,7 +33,7 @@ def write_npz(trace: Trace, out: BinaryIO) -> None:
     columns: dict[str, Any] = dict(trace.columns)
     if trace.header.single:
         columns = {
-            name: array if name in (*INPUTS, *WHOLE) else array.astype(np.float32)
+            name: array if name in (*INPUTS, *MOCAP, *WHOLE) else array.astype(np.float32)
             for name, array in columns.items()
         }
     header = np.frombuffer(trace.header.as_json().encode(), dtype=np.uint8)

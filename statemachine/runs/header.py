@@ -100,6 +100,8 @@ COLUMNS: dict[str, tuple[str | int, ...]] = {
     "qpos": ("nq",),
     "qvel": ("nv",),
     "ctrl": ("nu",),
+    "mocap_pos": ("nmocap", 3),
+    "mocap_quat": ("nmocap", 4),
     "xpos": ("nbody", 3),
     "xquat": ("nbody", 4),
     "site_xpos": ("nsite", 3),
@@ -111,7 +113,7 @@ COLUMNS: dict[str, tuple[str | int, ...]] = {
     "qfrc_contact": ("nv",),
     "energy": (2,),
 }
-INPUTS = ("time", "qpos", "qvel", "ctrl")
+INPUTS = ("time", "qpos", "qvel", "ctrl")  # mocap poses only where there are any
 # Contacts, one row for each contact of a moment; in order of `contact_row`.
 CONTACTS: dict[str, tuple[int, ...]] = {
     "contact_row": (),
@@ -139,7 +141,7 @@ class Header:
         keyframe: Where it started; None for the default state, or one that was given.
         timestep: Simulated time between rows [s]; substeps: engine steps within it.
         gravity: (3,) [m/s²], as the engine had it.
-        nq, nv, nu: Lengths of qpos, qvel and ctrl.
+        nq, nv, nu, nmocap: Lengths of qpos, qvel, ctrl and mocap_pos.
         joints, sites, bodies, geoms, actuators: Names by id.
         jnt_type, jnt_qposadr, jnt_dofadr: As in a Model.
         geom_bodyid, body_parentid, actuator_jntid: As in a Model.
@@ -182,6 +184,7 @@ class Header:
     ended: str = ""
     single: bool = False
     recorded: bool = False
+    nmocap: int = 0
     schema: int = SCHEMA
 
     @property
@@ -205,6 +208,7 @@ class Header:
             "nq": self.nq,
             "nv": self.nv,
             "nu": self.nu,
+            "nmocap": self.nmocap,
             "nbody": len(self.bodies),
             "nsite": len(self.sites),
         }
@@ -323,6 +327,7 @@ _KINDS: dict[str, Callable[[Any], bool]] = {
     "nq": _count,
     "nv": _count,
     "nu": _count,
+    "nmocap": _count,
     "substeps": _count,
     "timestep": lambda value: isinstance(value, float) and 0 < value < 1e6,
     "experiment": _text,

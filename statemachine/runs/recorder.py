@@ -21,6 +21,7 @@ from ..installed import DEFAULT
 from ..interface import (
     DERIVED,
     INPUTS,
+    MOCAP,
     Array,
     Data,
     Model,
@@ -147,6 +148,7 @@ def layout_of(model: Model) -> dict[str, Any]:
         "nq": model.nq,
         "nv": model.nv,
         "nu": model.nu,
+        "nmocap": model.nmocap,
         "joints": model.joint_names,
         "sites": model.site_names,
         "bodies": model.body_names,
@@ -168,6 +170,7 @@ def _run(
     """The inputs of each row, as they are when the step begins, and why it ended early."""
     times: list[float] = []
     rows: tuple[list[bytes], ...] = ([], [], [])
+    led: dict[str, list[Array]] = {name: [] for name in MOCAP if model.nmocap}
     # Bound methods: this loop is all that a recording costs while the run goes on.
     keep_time, (keep_qpos, keep_qvel, keep_ctrl) = times.append, (row.append for row in rows)
     qpos, qvel, ctrl = data.qpos.tobytes, data.qvel.tobytes, data.ctrl.tobytes
@@ -178,6 +181,8 @@ def _run(
             keep_qpos(qpos())
             keep_qvel(qvel())
             keep_ctrl(ctrl())
+            for name, poses in led.items():
+                poses.append(getattr(data, name).copy())
             if not len(times) & 255:
                 progress(len(times) / total)
     except DivergedError as error:
@@ -190,6 +195,7 @@ def _run(
         name: np.frombuffer(b"".join(parts)).reshape(len(times), width)
         for name, parts, width in kept
     }
+    inputs |= {name: np.array(poses) for name, poses in led.items()}
     # The last rows may have finite numbers that no trace holds.
     state = np.hstack([inputs["qpos"], inputs["qvel"]])
     stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
@@ -219,7 +225,8 @@ def derived(
     Args:
         model: What was run.
         begin: Puts a Data to the start.
-        inputs: Columns time (n,), qpos (n, nq), qvel (n, nv) and ctrl (n, nu) of the run.
+        inputs: Columns time (n,), qpos (n, nq), qvel (n, nv) and ctrl (n, nu) of the run, and
+            those of mocap poses, if there are any.
         progress: Told the fraction that is done.
 
     Returns:
@@ -264,7 +271,9 @@ def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:
     others = [n for n in ("qpos", "qvel") if getattr(data, n).tobytes() != inputs[n][k].tobytes()]
     for name in others:
         getattr(data, name)[:] = inputs[name][k]
-    data.ctrl[:] = inputs["ctrl"][k]
+    for name in ("ctrl", *MOCAP):
+        if name in inputs:
+            getattr(data, name)[:] = inputs[name][k]
     return bool(others)
 
 

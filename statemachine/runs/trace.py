@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TraceError, refuse
-from ..interface import Array, Ints
+from ..interface import MOCAP, Array, Ints
 from ..interface.options import HUGE, index_of
 from ..measures import ContactNames, overlaps
 from ..measures.text import grouped
@@ -49,12 +49,13 @@ def check_shapes(header: Header, shapes: Mapping[str, tuple[int, ...]]) -> None:
 
 def _check_entries(name: str, array: NDArray[Any]) -> None:
     """Inputs are numbers that an engine takes; the rest may be NaN, which is not told."""
-    most = HUGE if name in INPUTS else LARGEST
+    is_input = name in (*INPUTS, *MOCAP)
+    most = HUGE if is_input else LARGEST
     # fmax and fmin pass over NaN.
     ends = np.fmin.reduce(array, None, initial=0), np.fmax.reduce(array, None, initial=0)
     refuse(
         (
-            name in INPUTS and not np.isfinite(array).all(),
+            is_input and not np.isfinite(array).all(),
             f"column {name!r} has an entry that is not a finite number",
         ),
         (

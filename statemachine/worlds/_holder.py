@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..interface import (
     INPUTS,
+    MOCAP,
     Array,
     Data,
     Model,
@@ -121,7 +122,8 @@ class Holder:
             data = make_data(self._variants[key])
             self._models.append(self._variants[key])
             self._data.append(data)
-            self._inputs.append([(getattr(data, k), self._arrays[k][world]) for k in INPUTS])
+            names = *INPUTS, *MOCAP
+            self._inputs.append([(getattr(data, k), self._arrays[k][world]) for k in names])
             self._take(len(self._data) - 1)
 
     def _put(self, place: int) -> None:
@@ -135,8 +137,8 @@ class Holder:
     def _take(self, place: int) -> None:
         """Copy what a Data has into the arrays: in a line without a call, where no signal comes."""
         world, time = self._world(place), self._data[place].time
-        (qpos, qpos_row), (qvel, qvel_row), (ctrl, ctrl_row) = self._inputs[place]
-        qpos_row[:], qvel_row[:], ctrl_row[:], self._time[world] = qpos, qvel, ctrl, time
+        (qpos, q), (qvel, v), (ctrl, u), (where, w), (turn, t) = self._inputs[place]
+        q[:], v[:], u[:], w[:], t[:], self._time[world] = qpos, qvel, ctrl, where, turn, time
 
     def _step(self, nstep: int, _payload: Any, places: Sequence[int]) -> None:
         self._for_all(places, partial(step, nstep=nstep))

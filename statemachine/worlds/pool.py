@@ -21,9 +21,9 @@ import numpy as np
 
 from .. import backends
 from ..errors import BusyDataError, StateMachineError, UnsupportedError
-from ..interface import INPUTS, Array, Ints, Model, State
+from ..interface import Array, Ints, Model, State
 from ..interface.turns import alone
-from ..interface.worlds import Worlds, check_memory
+from ..interface.worlds import WRITABLE, Worlds, check_memory
 from ..processes import checked_jobs
 from ._holder import Holder, Layout, arrays_in
 from ._worker import ANSWER_MOST, Answer, SharedBlock, WorldsProcess, end_all, lost_worlds
@@ -332,10 +332,11 @@ def _shapes_of(
     """Shape and type of the arrays of n worlds; of three more `_holder` and `_worker` tell."""
     sizes = {
         **{"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()},
+        **{"mocap_pos": (model.nmocap, 3), "mocap_quat": (model.nmocap, 4)},
         **{"xpos": (model.nbody, 3), "xquat": (model.nbody, 4)},
         **{"site_xpos": (model.nsite, 3), "site_xmat": (model.nsite, 9)},
     }
-    floats = {name: (n, *sizes.get(name, (model.nv,))) for name in (*INPUTS, "time", *derived)}
+    floats = {name: (n, *sizes.get(name, (model.nv,))) for name in (*WRITABLE, *derived)}
     shapes = {name: (shape, "f8") for name, shape in floats.items()}
     return {**shapes, "ids": ((n,), "u1"), "rows": ((n,), "i8"), "stop": ((1,), "i8")}
 

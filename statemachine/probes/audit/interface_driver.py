@@ -77,7 +77,8 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
     ways += ["each servo on its way"] if model.nu else []
     stir = np.random.default_rng(seed).uniform(-STIR, STIR, model.nu)
 
-    key = model.keyframes[0] if model.keyframes else Keyframe("", 0.0, zero, still, none)
+    led = model.mocap_pos0, model.mocap_quat0
+    key = model.keyframes[0] if model.keyframes else Keyframe("", 0.0, *rest, *led)
     start = f"keyframe {key.name!r}" if key.name else "keyframe 0"
     start = start if model.keyframes else "default pose"
     moved = key.ctrl.copy()
