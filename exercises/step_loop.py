@@ -16,7 +16,8 @@ prints it. What you may need, with `import statemachine as sm`:
     sm.forward(model, data)                 recompute what is derived; no time passes
     sm.reset(model, data)                   back to the default state
     sm.reset(model, data, keyframe=0)       or to the first state that the model file names
-    data.qpos, data.qvel, data.ctrl         arrays that you may read, and write into
+    data.qpos, data.qvel, data.ctrl         arrays that you may read, and write into: positions,
+                                            velocities, and the angles that servos aim at [rad]
     data.time                               a number [s] that you may read and write
     data.site_xpos[model.site_id("…")]      where a site is, three numbers [m]; read only
     model.timestep                          how much time one step takes [s]
@@ -64,7 +65,7 @@ def demo_gravity(model, seconds=4):
     found it.
 
     Args:
-        model: A Model of the arm. Do not count on its timestep, nor on where a joint begins.
+        model: A Model of the arm. Do not rely on its timestep, nor on where a joint begins.
         seconds: A whole number: how long each run lasts [s of simulated time].
 
     Returns:
@@ -100,7 +101,7 @@ def demo_forward(model):
     shoulder_lift in qpos; 4. after a second forward. No time passes in all this.
 
     Args:
-        model: A Model of the arm. Do not count on where a joint begins in qpos.
+        model: A Model of the arm. Do not rely on where a joint begins in qpos.
 
     Returns:
         The four positions [m], in this order: a list of four, or an array of shape (4, 3).

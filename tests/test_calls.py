@@ -387,7 +387,7 @@ def test_the_still_copy_is_never_stepped() -> None:
             for model in ("model", "off")
         ),
         *(f"the world of {data}" for data in ("data", "other")),
-        "a world for a moment",  # in which load tries what it wrote
+        "a world that is gone again",  # in which load tries what it wrote
     }
     # Nothing of an engine's world changes but by a call of the engine's.
     assert not [

@@ -75,7 +75,7 @@ A physics simulator is a state machine that you advance.
 
   {PROGRAM} lesson           the guided path: ten lessons, about 35 minutes
 
-Each lesson alone, as in `{PROGRAM} lesson state`:
+Each of the ten alone, as in `{PROGRAM} lesson state`:
 {{lessons}}
 
 Then your turn:
@@ -88,6 +88,7 @@ All commands: {PROGRAM} --help"""
 def overview(_options: argparse.Namespace) -> int:
     """List what there is."""
     lessons = [f"  {lesson.name:<11}{lesson.question}" for lesson in (*PATH, *BESIDE)]
+    lessons.insert(len(PATH), "and beside the path:")
     print(_OVERVIEW.format(lessons="\n".join(lessons)))
     return 0
 

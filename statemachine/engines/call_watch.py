@@ -78,7 +78,9 @@ class WatchedObject(ABC):
     @property
     def title(self) -> str:
         """Its label, or what there is to say of one that no variable ever led to."""
-        return self.label or f"{self.kind} {'for a moment' if self.gone else 'without a name'}"
+        return (
+            self.label or f"{self.kind} {'that is gone again' if self.gone else 'without a name'}"
+        )
 
     def look_again(self, thoroughly: bool = False) -> dict[str, str]:
         """What differs from the last look: fields, and which of their entries; `CLOSED` if gone."""

@@ -215,8 +215,10 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
         **(lesson_module.tables(results, results[first]) if has_tables else {}),
     }
     page = template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
-    asked = f": {lesson.question}" if taken[first].arm else ""  # which is about the arm
-    return replace(page, title=f"{lesson.name}{asked}")
+    asked = (
+        lesson.question if taken[first].arm else "code and figures; its text is about the SO-101"
+    )
+    return replace(page, title=f"{lesson.name}: {asked}")
 
 
 def stepping_loop(model: Model, marks: Sequence[float], seconds: float) -> tuple[str, str]:

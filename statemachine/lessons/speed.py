@@ -109,14 +109,12 @@ def _way(
 
 def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
-    told_apart = result.loop.differs_from(result.null)
     return {
-        "right": 0 if not told_apart or result.loop.median <= 1 else 1 + (result.loop.median > 2),
+        "right": int(result.told_apart) and sum(result.loop.median > limit for limit in (1, 2)),
         "simulated": f"{result.simulated:g}",
         "steps": count(result.nstep, "step"),
         "timestep": f"{result.provenance.timestep:g} s",
         "rounds": count(result.loop.rounds, "round"),
-        "told_apart": told_apart,
         "loop_cost": f"{result.loop.median:.2f}",
         "noise": f"{result.null.median:.2f}",
         "step_cost": duration(result.bulk / result.nstep),

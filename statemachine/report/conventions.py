@@ -216,9 +216,9 @@ def _calls_table(engine: str, statement: Figures) -> Table:
     for (owner, on), calls in groupby(statement.calls, key=lambda call: (call.engine, call.on)):
         of = "" if owner == engine else f"{owner}: "
         titles.add(len(rows))
-        rows += [(f"{of}{on or 'no object'}", "", ""), *_rows(list(calls))]
+        rows += [(f"{of}{on or 'no model, no data'}", "", ""), *_rows(list(calls))]
     changed = grouped((name.rpartition(".")[2] in DERIVED, name) for name in statement.changed)
-    others = {"outside these calls": False, "computed because it was read": True}
+    others = {"changed outside these calls": False, "computed because it was read": True}
     for title, derived in others.items():
         if derived in changed:
             titles.add(len(rows))

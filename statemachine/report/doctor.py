@@ -142,7 +142,7 @@ def _version(name: str) -> str | None:
 def _clash() -> HealthCheck:
     version = _version("python-statemachine")
     if version is None:
-        return HealthCheck("import name", True, "statemachine is ours alone")
+        return HealthCheck("import name", True, "no other package is imported as statemachine")
     return HealthCheck(
         "import name",
         False,

@@ -35,6 +35,7 @@ def grade_page(grade: Figures) -> Page:
         total=len(grade.functions),
         todo=f"; {todo} not written yet" if todo else "",
         passed=if_true(grade.passed),
+        unwritten=if_true(todo),
     )
 
 

@@ -16,7 +16,7 @@ class Fault:
     Attributes:
         name: What `--only` takes; its fault is patch is `patches.PATCHES[name]`.
         wrong: What is wrong, in a few words.
-        hint: What nobody looked at, where it survives.
+        hint: What no test looked at, where none catches it.
     """
 
     name: str
@@ -29,73 +29,73 @@ _FAULTS = (
     Fault(
         "xyzw",
         "quaternions read x y z w",
-        "nothing compares a quaternion with a turn that you know by hand",
+        "no test compares a quaternion with a turn that you know by hand",
     ),
     Fault(
         "com-for-frame",
         "xpos is the centre of mass",
-        "nothing compares xpos of a link with a place from the model's file, or asks whether "
+        "no test compares xpos of a link with a place from the model's file, or asks whether "
         "turning a joint leaves the origin of its own link where it is",
     ),
     Fault(
         "joints-shifted",
         "numbers go to the next joint",
-        "nothing turns one joint and asks whether the fingertip moves as that joint moves it",
+        "no test turns one joint and asks whether the fingertip moves as that joint moves it",
     ),
     Fault(
         "degrees",
         "angles are taken for degrees",
-        "nothing writes a known angle into qpos and measures how far the arm turned",
+        "no test writes a known angle into qpos and measures how far the arm turned",
     ),
     Fault(
         "no-forward",
         "forward does nothing",
-        "nothing writes qpos, calls forward, and asks whether the fingertip followed",
+        "no test writes qpos, calls forward, and asks whether the fingertip followed",
     ),
     Fault(
         "forward-steps",
         "forward takes a step",
-        "nothing asks whether forward leaves time, qpos and qvel as they were",
+        "no test asks whether forward leaves time, qpos and qvel as they were",
     ),
     Fault(
         "step-and-forward",
         "step ends with a forward",
-        "nothing asks to which moment the fingertip belongs that is read right after a step",
+        "no test asks to which moment the fingertip belongs that is read right after a step",
     ),
     Fault(
         "one-step-short",
         "step(…, n) takes n − 1 steps",
-        "nothing compares one call of n steps with n calls of one step; `time` does not show it",
+        "no test compares one call of n steps with n calls of one step; `time` does not show it",
     ),
     Fault(
         "motor-left-on",
         "a motor resists every joint",
-        "nothing turns the servos off (model.replace(actuation=False)) and lets the arm fall",
+        "no test turns the servos off (model.replace(actuation=False)) and lets the arm fall",
     ),
     Fault(
         "gains-doubled",
         "servos pull twice as hard",
-        "nothing looks at how far the arm sags under its own weight, or how hard a servo pulls",
+        "no test looks at how far the arm sags under its own weight, or how hard a servo pulls",
     ),
     Fault(
         "gravity-up",
         "gravity points up",
-        "nothing lets something fall and asks where it went",
+        "no test lets something fall and asks where it went",
     ),
     Fault(
         "spin-in-world",
         "a box spins about world axes",
-        "nothing spins a box that is already turned, and asks about which axis it goes round",
+        "no test spins a box that is already turned, and asks about which axis it goes round",
     ),
     Fault(
         "reset-keeps-ctrl",
         "reset keeps the old ctrl",
-        "nothing writes ctrl, resets, and looks at ctrl",
+        "no test writes ctrl, resets, and looks at ctrl",
     ),
     Fault(
         "no-replay",
         "a hidden number moves ctrl",
-        "nothing runs the same commands twice from the same start and asks for the same bits",
+        "no test runs the same commands twice from the same start and asks for the same bits",
     ),
 )
 FAULTS = {fault.name: fault for fault in _FAULTS}
