@@ -140,7 +140,7 @@ def test_a_force_is_never_read_as_a_place(model: Any) -> None:
 
 def test_what_has_no_servo_is_pointed_to_what_runs_it(model: Any) -> None:
     floating, mixed = model(FLOATING), model(MIXED.format(rest=""), "mixed.xml")
-    says = "compare {0} --model robot.xml, or statemachine trace record {0} --model"
+    says = r"compare {0} --model \S+robot.xml, or statemachine trace record {0} --model"
     refused(
         *(
             (errors.BadInputError, says.format(name), partial(lesson, name, floating))

@@ -77,8 +77,7 @@ A physics simulator is a state machine that you advance.
 
 Each of the ten alone, as in `{PROGRAM} lesson state`:
 {{lessons}}
-
-Then your turn:
+then your turn:
   {PROGRAM} check exercises/step_loop.py   four functions to write, judged
   {PROGRAM} compare hold --why             where two engines differ, and why
   {PROGRAM} doctor                         what this machine has, what to do
