@@ -241,7 +241,7 @@ def test_output_that_cannot_be_written(command: str) -> None:
         ),
         (
             ("lesson", "replay", "--break", "late-ctrl", "--ctrl", "0,-0.6,0.5,1.6,1.57,0.28"),
-            ("changed nothing",),
+            ("made no difference",),
         ),
     ],
 )
