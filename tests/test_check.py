@@ -24,7 +24,7 @@ import pytest
 
 from statemachine.errors import MissingEngineError
 from statemachine.grading import exercise, recording
-from statemachine.grading.answers import Answer, Thing, decode, encode
+from statemachine.grading.answers import Answer, OtherValue, decode, encode
 from statemachine.grading.calls import FaultError, answers_of, answers_of_file
 from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.grading.watch import EngineRun, Inputs, engine_watched
@@ -515,7 +515,7 @@ def _answer() -> Answer:
         {"joint": (slice(0, None), slice(1, 2, None))},
         np.arange(6, dtype=np.float32).reshape(2, 3),
         np.array([True, False]),
-        Thing("an object"),
+        OtherValue("an object"),
     )
     changed = {"opt.gravity": ([0.0], [1.0])}
     return Answer(result, (0, 1, 2), ("", "qpos", ""), (run,), (inputs,), (inputs,), changed)
@@ -545,8 +545,8 @@ def test_no_object_gets_through() -> None:
     odd = [Any3(), {1: 2j}, np.array([1j]), np.array(["a"]), 10**30, {1, 2}]
     value = decode(json.loads(_text(Answer(odd)))).result
     things, numbers = value[:1] + value[2:], value[1]
-    assert [type(thing) for thing in things] == [Thing] * 5
-    assert numbers == {"an int: 1": Thing("a complex: 2j")}
+    assert [type(thing) for thing in things] == [OtherValue] * 5
+    assert numbers == {"an int: 1": OtherValue("a complex: 2j")}
 
 
 def _places(found: Any) -> list[tuple[Any, Any]]:

@@ -97,7 +97,7 @@ class Lab(ExitStack):
         require(len(data.contacts) > 0, "the held box touches nothing")
         return data
 
-    def keeps(self, *questions: Callable[[Driver, ReferenceRun], Iterator[Figures]]) -> None:
+    def audit(self, *questions: Callable[[Driver, ReferenceRun], Iterator[Figures]]) -> None:
         """Ask the interface questions of the audit: what is promised holds, to the bit.
 
         The run is that of the held box under a command that moves the arm: mid-contact.

@@ -114,7 +114,7 @@ def check_forward_changes_no_input(lab: Lab, model: Model, data: Data) -> None:
 
 def check_forward_perturbs_nothing(lab: Lab) -> None:
     """A run with forwards in between is, bit for bit, the run without, mid-contact too."""
-    lab.keeps(trials.look)
+    lab.audit(trials.look)
 
 
 @check("position servo", on="held")

@@ -40,7 +40,7 @@ def check_time_passes_only_in_step(lab: Lab, model: Model, data: Data) -> None:
 
 def check_steps_add_up(lab: Lab) -> None:
     """step(n) is n times step(1), bit for bit, mid-contact too."""
-    lab.keeps(trials.pieces)
+    lab.audit(trials.pieces)
 
 
 @check(on="box")
@@ -86,7 +86,7 @@ def check_a_state_restores_the_inputs(lab: Lab, model: Model, data: Data) -> Non
 
 def check_restored_futures_agree(lab: Lab) -> None:
     """Restores of one State have the same bits ever after; the run's own, if that is promised."""
-    lab.keeps(trials.restored)
+    lab.audit(trials.restored)
 
 
 @check(on="arm")

@@ -26,7 +26,7 @@ _SHOWN = 40  # characters of a value
 
 
 @dataclass(frozen=True)
-class Thing:
+class OtherValue:
     """A value of another kind than any that is asked for; `text` is what it is, in words."""
 
     text: str
@@ -38,7 +38,7 @@ class Answer:
 
     Attributes:
         result: What it returned: numbers, texts, lists, tuples, dicts, slices and copies of
-            arrays; a `Thing` in place of all else.
+            arrays; a `OtherValue` in place of all else.
         memory: For each part of the result, the number of the first part with the same
             memory: its own if it shares none.
         live: For each part, the array of a Data that it is itself, not a copy of; or "".
@@ -57,7 +57,7 @@ class Answer:
     changed: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
 
 
-_RECORDS: dict[str, Any] = {kind.__name__: kind for kind in (Answer, EngineRun, Inputs, Thing)}
+_RECORDS: dict[str, Any] = {kind.__name__: kind for kind in (Answer, EngineRun, Inputs, OtherValue)}
 
 
 def answer_of(result: Any, watch: StudentWatch, changed: dict[str, Any]) -> Answer:
@@ -107,7 +107,7 @@ def _live(value: Any, datas: Sequence[Any]) -> str:
 
 def kind(value: Any) -> str:
     """What a value is, in words."""
-    if isinstance(value, Thing):
+    if isinstance(value, OtherValue):
         return value.text
     if _rows(value):
         return f"an array of shape {value.shape}"
@@ -146,7 +146,7 @@ def encode(value: Any, depth: int = 0) -> Any:
         if isinstance(value, (tuple, list)) and len(value) <= _MOST:
             items = [encode(item, depth + 1) for item in islice(value, _MOST)]
             return {"tuple": items} if isinstance(value, tuple) else items
-    return {"Thing": {"text": kind(value)}}
+    return {"OtherValue": {"text": kind(value)}}
 
 
 def decode(record: Any) -> Answer:

@@ -27,7 +27,7 @@ from .template import differences, largest_gap, where
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
 _SHOWN = 12  # numbers of qpos that fit in a line
-_THERE = np.radians(0.1)  # rad, or m
+_AT_GOAL = np.radians(0.1)  # rad, or m
 OLDER = "mujoco==3.3.7"  # its servos damp where their force is at its limit, too
 
 
@@ -155,11 +155,11 @@ def _freely(model: Model, ctrl: Array, steps: int, places: Ints) -> Array | None
 def slots(result: Figures) -> dict[str, Any]:
     """What the page says."""
     gaps, free = np.abs(result.qpos[-1] - result.goal), result.without_contacts
-    away, worst = int((gaps > _THERE).sum()), largest(gaps)[1]
+    away, worst = int((gaps > _AT_GOAL).sum()), largest(gaps)[1]
     free_gaps, older = gaps if free is None else np.abs(free - result.goal), result.older
     return {
         "right": 0 if away == 0 else 2 if away == len(gaps) else 1,
-        "within": position(_THERE, result.slides[worst]),
+        "within": position(_AT_GOAL, result.slides[worst]),
         "seconds": f"{result.time[-1]:g} s",
         "away": f"{away} of {len(gaps)}",
         "worst": _farthest(result, gaps),

@@ -107,11 +107,11 @@ REMEMBER = (
     ("state", "A joint's slots in qpos and in qvel differ: jnt_qposadr, jnt_dofadr."),
     ("write", "data.qpos is the array itself; a copy is data.qpos.copy()."),
     ("forward", "A write changes nothing that is derived. forward recomputes it; no time passes."),
-    ("forward", "step computes, then moves: what it leaves is of the state before. Call forward."),
-    ("hold", "ctrl is the only wire in: one number for each actuator."),
+    ("forward", "step computes, then moves: what you read is of the state before. Call forward."),
+    ("hold", "ctrl has your commands, one number an actuator: of a servo, an angle [rad]."),
     ("gravity", "ctrl = 0 is a command: a servo holds its joint at 0."),
     ("reset", "A keyframe has a time of its own."),
-    ("replay", "The same state and the same commands give the same bits. That is not truth."),
+    ("replay", "The same state and the same commands give the same bits. They need not be true."),
     ("time", "Nothing waits. Count steps; do not compare times."),
 )
 

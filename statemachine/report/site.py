@@ -51,7 +51,7 @@ def make_path(
         }
         page = with_picture(page_of_lesson(lesson, taken), lesson.name)
         name, typed = f"{number:02}-{lesson.name}", f"statemachine lesson {lesson.name}"
-        written.append(_write(folder, name, page, typed, f"**{lesson.question}** "))
+        written.append(_write(folder, name, page, typed))
     return written
 
 
@@ -117,7 +117,7 @@ def _why_as_they_come(name: str, backends: tuple[str, str]) -> Page:
     )
 
 
-def _write(folder: Path, name: str, page: Page, typed: str, lead: str = "") -> Path:
+def _write(folder: Path, name: str, page: Page, typed: str) -> Path:
     """Write a page and its pictures; what is already the same is left alone."""
     numbers = itertools.count(1)
 
@@ -134,7 +134,7 @@ def _write(folder: Path, name: str, page: Page, typed: str, lead: str = "") -> P
         return file
 
     heading, _, rest = markdown(page, picture).partition("\n\n")
-    text = f"{heading}\n\n{lead}In a terminal: `{typed}`\n\n{rest}"
+    text = f"{heading}\n\nIn a terminal: `{typed}`\n\n{rest}"
     return _save(folder / f"{name}.md", text.encode())
 
 
