@@ -146,7 +146,7 @@ def test_every_call_is_recorded(engine: str) -> None:
         exec(compile(code, "<plain>", "exec"), namespace)
     # Python's account lacks what C calls for it: constructors and copy.
     assert recorded.pop("MjData") >= 2
-    assert recorded.pop("MjModel.__copy__") == 1
+    assert recorded.pop("MjModel.__copy__") + recorded.pop("MjData.__copy__", 0) >= 1
     if engine == "mujoco":
         assert recorded["mj_step"] == 1 + 5 + 1 + 1
     if sys.version_info[:2] == (3, 12):  # its account lacks methods of objects, too
