@@ -93,7 +93,11 @@ class Plan:
 
     @cached_property
     def still(self) -> mujoco.MjData:
-        """Where everything is in the file."""
+        """Where everything is in the file; not to be written into."""
+        return self.standing()
+
+    def standing(self) -> mujoco.MjData:
+        """The same, to be written into."""
         data = mujoco.MjData(self.raw)
         mujoco.mj_kinematics(self.raw, data)
         return data

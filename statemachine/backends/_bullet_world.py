@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Iterator, Sequence
-from copy import copy
 from functools import cached_property
 from itertools import chain
 from typing import Any, Literal
@@ -202,7 +201,7 @@ class World:
     @cached_property
     def still(self) -> mujoco.MjData:
         """Where bodies and sites are that no joint moves; those on mocap bodies as they are led."""
-        return copy(self._plan.still)
+        return self._plan.standing()
 
     def lead(self, poses: Array) -> bool:
         """Put the mocap bodies (7·n,) where `HiddenWorld.command` wants them; whether one moved."""

@@ -338,7 +338,8 @@ class Driver(ABC):
         Raises:
             DivergedError: It does not stay finite.
         """
-        with self.at(point) as machine:
+        with self.new(point) as machine:
+            self.arrive(machine, point)
             future = self.drive(machine, point, steps)
         if not np.isfinite(future).all():
             raise DivergedError(f"{self.name} diverged")

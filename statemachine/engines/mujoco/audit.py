@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from copy import copy
 from functools import partial
 from importlib import import_module
@@ -34,6 +35,7 @@ class MujocoDriver(Driver):
     def __init__(self, model: Model, seed: int) -> None:
         super().__init__(model, seed)
         self.name = f"MuJoCo {model.engine_version} itself"
+        self._there: dict[SavePoint, Any] = {}
         self.integration = int(_STATE.mjSTATE_INTEGRATION)
         # Every component that this model has, by the engine's own name for it.
         self.fields = {
@@ -46,6 +48,16 @@ class MujocoDriver(Driver):
 
     def fresh(self, point: SavePoint) -> Any:
         return mj.MjData(point.model.raw)
+
+    @contextmanager
+    def at(self, point: SavePoint) -> Iterator[Any]:
+        """By a copy of all that the first machine had there: the ways are long, and many."""
+        with self.new(point) as machine:
+            if point not in self._there:
+                self.arrive(machine, point)
+                self._there[point] = copy(machine)
+            mj.mj_copyData(machine, machine.model, self._there[point])
+            yield machine
 
     def close(self, machine: Any) -> None:
         """It goes with its last name."""
