@@ -64,14 +64,6 @@ def test_gravity_prints_the_table_of_the_course(here: Cli) -> None:
     assert found["servos_on"]["forces"]["contact"] == 0.0
 
 
-def test_replay(here: Cli) -> None:
-    found = _json(here, "lesson", "replay")["mujoco"]
-    assert (found["identical"], max(found["difference"]), len(found["contacts"])) == (True, 0, 600)
-    assert 8 <= min(found["contacts"]) <= max(found["contacts"]) <= 12
-    assert set(found["pairs"].values()) == {600}
-    assert found["travel"] > 0.3
-
-
 @pytest.mark.slow
 def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
     page = cli("lesson", "gravity", "--menagerie", str(menagerie)).stdout
@@ -152,12 +144,7 @@ def test_a_terminal_without_unicode(cli: Cli) -> None:
     assert "23.92" in done.stdout
 
 
-def test_doctor(cli: Cli) -> None:
-    findings = {f["name"]: f for f in json.loads(cli("doctor", "--json").stdout)["findings"]}
-    assert (findings["mujoco"]["works"], findings["viser"]["optional"]) == (True, True)
-
-
-def test_the_doctor_knows_every_package_of_an_extra(cli: Cli) -> None:
+def test_the_doctor_knows_every_package_of_an_extra(here: Cli) -> None:
     """But for those that only work on this library itself needs."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     named: dict[str, list[str]] = {}
@@ -166,12 +153,14 @@ def test_the_doctor_knows_every_package_of_an_extra(cli: Cli) -> None:
             package = re.split(r"[<>=\[]", requirement)[0]
             if package not in ("statemachine-sim", "viser"):  # viser has a line of its own
                 named.setdefault(package, []).append(extra)
-    told = json.loads(cli("doctor", "--json").stdout)["packages"]
+    found = json.loads(here("doctor", "--json").stdout)
+    told, findings = found["packages"], {f["name"]: f for f in found["findings"]}
+    assert (findings["mujoco"]["works"], findings["viser"]["optional"]) == (True, True)
     assert {each["name"]: sorted(each["extras"]) for each in told} == {
         package: sorted(extras) for package, extras in named.items()
     }
     assert {each["name"]: each["version"] for each in told}["pytest"] == pytest.__version__
-    assert f"pytest {pytest.__version__}" in " ".join(cli("doctor").stdout.split())
+    assert f"pytest {pytest.__version__}" in " ".join(here("doctor").stdout.split())
 
 
 def test_the_doctor_says_what_the_viewer_lacks(cli: Cli, tmp_path: Path) -> None:
@@ -217,7 +206,7 @@ def test_a_body_of_the_scene_is_not_taken_for_the_robot(here: Cli) -> None:
     assert held["first_contact"] > 0.2
 
 
-@pytest.mark.parametrize("command", ["", "lesson state", "lesson state --json", "doctor --json"])
+@pytest.mark.parametrize("command", ["", "lesson state", "lesson state --json"])
 def test_output_that_cannot_be_written(command: str) -> None:
     if not Path("/dev/full").exists():
         pytest.skip("no /dev/full here")

@@ -48,15 +48,6 @@ def box() -> Trace:
 # Differences that were made, of known size.
 
 
-def test_a_trace_agrees_with_itself(box: Trace) -> None:
-    found = compare(box, box)
-    assert_has(found, agrees=True, moments=len(box), notes=())
-    assert {each.max for each in found.agreements} == {0.0}
-    names = set(by_name(found))
-    assert {"elbow_flex", "box, position", "box, rotation", "gripperframe, position"} <= names
-    assert {"energy", "gripper on box, normal force", "gripper on box, first touch"} <= names
-
-
 def test_a_shifted_joint_is_found_with_its_size_and_time(hold: Trace) -> None:
     # Beyond a count of 0.00153, and within.
     qpos = added(added(hold.qpos, np.s_[50:100, 2], 0.01), np.s_[100:, 2], -0.001)

@@ -63,18 +63,6 @@ def sizes(found: tuple[Gap, ...]) -> dict[str, float | None]:
     return {gap.unit: gap.size for gap in found}
 
 
-def test_forward_makes_everything_of_now(box: Model, held: Data) -> None:
-    """By comparing numbers, so it also says that the scratch Data computes what forward does."""
-    assert not sm.freshness(box, held)
-    sm.forward(box, held)
-    fresh = sm.freshness(box, held)
-    assert fresh
-    assert fresh.stale == ()
-    assert [row.name for row in fresh.rows] == [*DERIVED, "contacts"]
-    assert {(row.of, row.steps, row.gaps) for row in fresh.rows} == {("now", 0, ())}
-    assert len(held.contacts) > 0
-
-
 def test_a_fresh_data_was_never_computed(box: Model) -> None:
     with sm.make_data(box) as data:
         state = sm.get_state(box, data)
@@ -528,19 +516,6 @@ def test_a_watch_names_the_lines_that_read_and_tells_the_worst(box: Model) -> No
     text = str(watch)
     assert text.startswith("60 of 61 reads were stale")
     assert max(map(len, text.splitlines())) <= 80
-
-
-def test_a_watch_that_does_not_raise_never_does(model: Model) -> None:
-    """What is written is not a number, which the program may still mend: no size, no error."""
-    with sm.make_data(model) as data, sm.watch_freshness(model, data) as watch:
-        sm.forward(model, data)
-        data.qpos[1] = np.nan
-        _ = data.site_xpos
-        data.qpos[1] = 0.0
-        _ = data.site_xpos
-    (read,) = watch.stale_reads
-    assert (read.of, read.gaps) == ("1 write ago", ())
-    assert str(watch).splitlines()[-1].endswith("not to be told")
 
 
 def test_a_watch_leaves_nothing_behind(box: Model) -> None:

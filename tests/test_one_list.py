@@ -7,10 +7,7 @@ from pathlib import Path
 
 import pytest
 
-import statemachine as sm
-from statemachine.compare.matching import match_models
 from statemachine.compare.models import compare
-from statemachine.compare.why.causes import differences_of
 from statemachine.page import Figures
 
 from .conftest import Cli, assert_has, written_all
@@ -32,35 +29,6 @@ def test_each_difference_is_told_once_by_the_name_of_its_cause(name, tmp_path):
     # A medium has a density and a viscosity, a filter two masks; an actuator is told with its gain.
     assert len(figures) == (2 if name in ("medium", "filter", "actuator") else 1), figures
     assert not any(row.refused for row in rows)
-
-
-@pytest.mark.parametrize(
-    "names",
-    [
-        ("mass", "gains", "damping", "axis"),
-        ("geom moved", "extra shape", "floor", "pair"),
-        ("gravity", "tendon", "equality", "exclude", "actuator"),
-    ],
-)
-def test_many_differences_are_each_in_both_lists(names, tmp_path):
-    right = ARM
-    for name in names:
-        right = changed(right, ALONE[name])
-    rows = _listed(tmp_path, right)
-    one, two = (sm.load(tmp_path / f"{side}.xml") for side in ("left", "right"))
-    found = differences_of(one, two, match_models(one, two))
-    assert {name for row in rows for name in row.causes} == {each.title for each in found}
-    assert len({(row.where, row.figure, row.causes) for row in rows}) == len(rows)
-
-
-def test_what_cannot_be_brought_over_is_said_with_its_reason(tmp_path):
-    more = (
-        '<body name="more"><joint name="more" axis="1 0 0"/><inertial mass="0.2" pos="0 0 0" '
-        'diaginertia="0.001 0.001 0.001"/></body><site name="tip"'
-    )
-    rows = _listed(tmp_path, ARM.replace('<site name="tip"', more))
-    refused = {name for row in rows if row.refused for name in row.causes}
-    assert refused == {"extra joint of more"}
 
 
 def test_the_words_are_those_of_two_sides(here: Cli, tmp_path):

@@ -242,12 +242,8 @@ def test_arguments_are_checked(worlds: many.Worlds) -> None:
     assert not worlds.xpos.any()
 
 
-ORDERS = ({700.0: 0, 900.0: 1}, {700.0, 900.0}, "ab", 3.0, np.array(3.0))
-
-
-@pytest.mark.parametrize(
-    ("call", "error", "says"),
-    [
+def test_what_is_refused_is_said(worlds: many.Worlds) -> None:
+    cases: list[tuple[Callable[[Any], object], type[Exception], str]] = [
         (lambda w: many.record(w, 1, ["qpo"]), UnknownNameError, "Did you mean 'qpos'"),
         (lambda w: many.record(w, 2, None), BadInputError, "names of fields are wanted"),  # pyright: ignore
         (
@@ -266,7 +262,7 @@ ORDERS = ({700.0: 0, 900.0: 1}, {700.0, 900.0}, "ab", 3.0, np.array(3.0))
                 BadInputError,
                 "kp wants 2 values",
             )
-            for values in ORDERS
+            for values in ({700.0: 0, 900.0: 1}, {700.0, 900.0}, "ab", 3.0, np.array(3.0))
         ),
         (
             lambda w: setattr(w, "ctrl", np.zeros((3, 6))),
@@ -287,12 +283,8 @@ ORDERS = ({700.0: 0, 900.0: 1}, {700.0, 900.0}, "ab", 3.0, np.array(3.0))
             (partial(lambda world, w: w.model_of(world), world), BadInputError, "there is no world")
             for world in (4, -1, "x", 1.5, True)
         ),
-    ],
-)
-def test_what_is_refused_is_said(
-    worlds: many.Worlds, call: Callable[[Any], object], error: type[Exception], says: str
-) -> None:
-    refused((error, says, lambda: call(worlds)))
+    ]
+    refused(*((error, says, partial(call, worlds)) for call, error, says in cases))
     assert not worlds.time.any()
 
 
