@@ -477,14 +477,6 @@ def test_a_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert finder in broken(asked(question, backend))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("question", QUESTIONS)
-def test_without_a_fault_nothing_is_found(question: str, backend: str) -> None:
-    found = asked(question, backend)
-    assert found or (question, backend) == ("pools", "pybullet")  # which has none
-    assert broken(found) == set()
-
-
 def test_an_engine_whose_restore_drops_the_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the engine itself it is a fact; of the interface on it, a broken promise."""
     forget = followed_by(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import contextlib
-import functools
 import gc
 import io
 import itertools
@@ -178,16 +177,6 @@ def past_the_recorder(engine: str, run: Callable[[], object]) -> set[str]:
 def test_no_call_goes_round_the_recorder(engine: str) -> None:
     """What holds on to an engine's function from before would not be heard."""
     assert not past_the_recorder(engine, lambda: record(WHOLE.format(engine=engine), engine))
-
-
-def test_early_hold_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """That the test above can fail."""
-    early, lines = mujoco.mj_forward, list[Figures]()
-    monkeypatch.setattr(MujocoData, "_recompute", lambda self: early(self._home.raw, self.raw))
-    run = functools.partial(short, "mujoco", "sm.forward(model, data)")
-    assert past_the_recorder("mujoco", lambda: lines.extend(run())) == {"mj_forward"}
-    assert lines[0].calls == ()
-    assert "data.xpos" in lines[0].changed
 
 
 def test_looks_disturb_nothing_for_long(engine: str) -> None:

@@ -42,14 +42,6 @@ def test_the_words_are_those_of_two_sides(here: Cli, tmp_path):
         assert [row["causes"] for row in found] == [["range of shoulder"]]
 
 
-def test_a_file_that_does_not_compile_has_its_description(tmp_path):
-    gone = '<asset><mesh name="gone" file="gone.stl"/></asset><worldbody>'
-    right = changed(ARM, ALONE["damping"]).replace("<worldbody>", gone)
-    right = right.replace('<site name="tip"', '<geom type="mesh" mesh="gone"/><site name="tip"')
-    rows = {row.subject: row for row in _listed(tmp_path, right)}
-    assert_has(rows["damping"], causes=(), left=0.1, right=0.2)
-
-
 _CYLINDER = '<geom name="lower_shape" type="capsule" size="0.02"'
 _ELBOW_DRIVE = '<position name="elbow" joint="elbow" kp="20" kv="1"/>'
 
