@@ -12,7 +12,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Container, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, redirect_stdout, suppress
 from functools import partial
 from pathlib import Path
@@ -155,12 +154,6 @@ def runs_in_silence(code: str, folder: Path, printed: str = "") -> None:
     """Code ends well in a Python of its own, and prints nothing but this."""
     done = in_its_own_python(code, folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, printed, "")
-
-
-def raised_in_a_thread(use: Callable[[], object]) -> BaseException | None:
-    """What something raises in a thread of its own."""
-    with ThreadPoolExecutor(1) as pool:
-        return pool.submit(use).exception()
 
 
 def interrupted_at(at: int, call: Callable[[], object], among: str) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import compare
 from statemachine.measures import (
     ContactNames,
     Gap,
@@ -22,45 +21,16 @@ from statemachine.measures import (
     text,
     together,
 )
-from statemachine.report.finding import events_of
-from statemachine.report.plot import of_trace
 from statemachine.runs import Trace, record, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import Cli, lesson_result, opened
+from .conftest import Cli
 from .small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
 
 
 @pytest.fixture(scope="module")
 def trace() -> Trace:
     return record_scenario(SCENARIOS["hold"], sm.load("so101/scene"), seconds=0.5)
-
-
-def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(
-    trace: Trace, mujoco_scene: sm.Model
-) -> None:
-    name = "gripper on floor"
-    found = compare(trace, trace)
-    assert {each.name for each in found.agreements if each.kind == "contact"} == {
-        f"{name}, first touch"
-    }
-    assert [touch.pair for touch in found.touches] == [name]
-    assert {event.what for event in events_of(found) if event.what} == {name}
-    assert list(of_trace(trace).touches) == [name]
-    # The lesson and freshness also say which of the gripper's geoms it is.
-    lesson = lesson_result("hold", mujoco_scene, seconds=0.5)
-    assert lesson.touched
-    assert all(touch.startswith(f"{name} (") for touch in lesson.touched)
-    row = int(trace["contact_row"][-1])
-    with opened(
-        mujoco_scene, qpos=trace.qpos[row], qvel=trace.qvel[row], ctrl=trace.ctrl[row], derived=True
-    ) as (
-        _,
-        data,
-    ):
-        data.qpos[1] -= 0.5
-        gaps = sm.freshness(mujoco_scene, data)["contacts"].gaps
-        assert [gap.where for gap in gaps if gap.unit == "vanishes"] == [lesson.touching[0]]
 
 
 def test_a_recorded_trace_has_the_same_names(trace: Trace) -> None:

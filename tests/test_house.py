@@ -28,11 +28,6 @@ def _sources() -> dict[str, str]:
     return {file.relative_to(PACKAGE).as_posix(): file.read_text("utf-8") for file in files}
 
 
-@cache
-def _trees() -> dict[str, ast.Module]:
-    return {path: ast.parse(source) for path, source in _sources().items()}
-
-
 # No engine is named outside its rooms.
 
 
@@ -107,8 +102,8 @@ def test_no_module_imports_itself_by_way_of_others() -> None:
 
 def test_no_public_class_has_the_name_of_another() -> None:
     places: dict[str, list[str]] = defaultdict(list)
-    for path, tree in _trees().items():
-        for node in tree.body:
+    for path, source in _sources().items():
+        for node in ast.parse(source).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].append(path)
     assert {name: where for name, where in places.items() if len(where) > 1} == {}

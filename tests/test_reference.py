@@ -6,7 +6,6 @@ import json
 import re
 import sys
 from copy import deepcopy
-from typing import Any
 
 import pytest
 
@@ -19,11 +18,10 @@ from reference.size import beyond, counts, lowered
 from .conftest import REQUIRED, ROOT, of_python, refused
 
 
-def _slow(group: str) -> Any:
-    return group if group in QUICK else pytest.param(group, marks=pytest.mark.slow)
-
-
-@pytest.mark.parametrize("group", [_slow(group) for group in GROUPS])
+@pytest.mark.parametrize(
+    "group",
+    [pytest.param(group, marks=[pytest.mark.slow] * (group not in QUICK)) for group in GROUPS],
+)
 def test_the_figures_are_those_of_the_reference(group: str) -> None:
     if absent(group):
         assert "shared" not in REQUIRED, f"{group} is not beside the checkout"

@@ -29,7 +29,6 @@ from .conftest import (
     bits,
     interrupted_at,
     opened,
-    raised_in_a_thread,
     refused,
     registered,
     runs_in_silence,
@@ -75,7 +74,8 @@ def meanwhile(of: Any, use: Callable[[], object], hook: str) -> list[BaseExcepti
     def hooked(*args: object) -> object:
         put(place, hook, right)
         result = right(*args)
-        raised.append(raised_in_a_thread(use))
+        with ThreadPoolExecutor(1) as pool:
+            raised.append(pool.submit(use).exception())
         return result
 
     put(place, hook, hooked)
