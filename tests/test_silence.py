@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-import threading
 
 import pytest
 
@@ -61,25 +60,6 @@ def test_after_an_error_the_streams_are_back(capfd: pytest.CaptureFixture[str]) 
     _print(b"seen")
     ctypes.CDLL(None).fflush(None)
     assert capfd.readouterr() == ("seen\n", "")
-
-
-def test_what_another_thread_prints_is_not_caught(capfd: pytest.CaptureFixture[str]) -> None:
-    begun, printed = threading.Event(), threading.Event()
-
-    def work() -> None:
-        begun.wait(10)
-        os.write(1, b"one\n")
-        print("two", file=sys.__stderr__, flush=True)
-        printed.set()
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    with silence() as lines:
-        begun.set()
-        assert printed.wait(10)
-    thread.join()
-    assert lines == []
-    assert capfd.readouterr() == ("one\n", "two\n")
 
 
 # A thread prints two hundred numbered lines while the engine loads and is quiet.
