@@ -331,14 +331,6 @@ def test_engine_motors_hold_an_arm_that_nobody_drives() -> None:
         assert data.qfrc_actuator[LIFT] == pytest.approx(data.qfrc_bias[LIFT], rel=0.01)
 
 
-def test_engine_servo_follows_without_droop() -> None:
-    with opened(_as_it_comes(gravity=[0, 0, -9.81]), nstep=480) as (model, data):
-        assert abs(np.degrees(data.qpos[LIFT])) < 0.001  # 0.033° with the servo of the model
-        data.ctrl = HOLD
-        sm.step(model, data, 480)
-        assert np.abs(np.degrees(data.qpos - HOLD)).max() < 0.005  # 0.0014 was measured
-
-
 def test_engine_bias_of_the_first_step_does_not_follow_writes() -> None:
     """That of a step right after a reset, of which the arrays are the only copy."""
     model = load("so101", defaults="engine", gravity=(0, 0, -9.81))
