@@ -468,23 +468,16 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-@pytest.mark.parametrize("name", SETTINGS)
-def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
+@pytest.mark.parametrize(("name", "experiment"), [("damping", HOLD), ("limits", FALL)])
+def test_dials_that_no_figure_shows_act_on_the_emulated_side(
+    name: str, experiment: Scenario
+) -> None:
     """All settings the model's, one as the engine comes: the run is another one."""
-    experiment = {"limits": FALL, "surfaces": replace(scenario("gravity"), seconds=0.8)}.get(
-        name, HOLD
-    )
-    fresh, found = dialled(options=experiment.options)
+    _, found = dialled(options=experiment.options)
     emulated = quietly("so101/scene").replace(**experiment.options)
-    rest = {each: "model" for each in SETTINGS if each != name}
-    if name == "servo":
-        rest = {k: v for k, v in rest.items() if k not in ("armature", "frictionloss", "limits")}
-    other: Any = found.build(rest, values_of(emulated))  # pyright: ignore[reportArgumentType]
-    rows = path_of(other, experiment)
-    if name == "timestep":
-        assert other.timestep == fresh.timestep
-    else:
-        assert np.abs(rows - path_of(emulated, experiment)).max() > 1e-5
+    rest: Any = {each: "model" for each in SETTINGS if each != name}
+    rows = path_of(found.build(rest, values_of(emulated)), experiment)
+    assert np.abs(rows - path_of(emulated, experiment)).max() > 1e-5
 
 
 @pytest.mark.usefixtures("bullet")
