@@ -174,7 +174,7 @@ def test_identical_sides_differ_by_nothing_at_all(files: Path) -> None:
         side = Side(str(files / "arm.xml"), engine)
         run, found = ran("hold", side, side)
         assert largest(found) == 0
-        assert (run.commands, run.is_apart, run.unmatched) == ("the same", False, ())
+        assert (run.commands, run.played, run.unmatched) == ("the same", run.right, ())
         assert (found.left.short, found.right.short) == (f"{engine} (first)", f"{engine} (second)")
 
 

@@ -309,6 +309,34 @@ def test_what_cannot_be_brought_over_stays_unexplained(tmp_path):
 FLOOR = '<geom name="floor" type="plane" size="2 2 0.1"/>'
 
 
+LINKS = """<mujoco><default><geom type="capsule" {geom}/></default><worldbody>
+<body name="a" pos="0 0 1"><joint name="j" axis="0 1 0" damping="0.1"/>
+<geom name="beam" fromto="0 0 0 0.2 0 0" size="0.02" {beam}/>
+<body name="b" pos="0.2 0 0"><joint name="k" axis="0 1 0" damping="0.1"/>
+<geom fromto="0 0 0 0.1 0 0" size="0.02"/></body></body></worldbody>
+<actuator><motor joint="k"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("slot", "values", "name", "unit", "line"),
+    [
+        ("geom", ('density="500"', 'density="600"'), "density of a, b", "kg/m³", 1),
+        ("geom", ("", 'density="1200"'), "density of a, b", "kg/m³", 1),
+        ("geom", ('mass="0.2"', 'mass="0.3"'), "mass of a, b", "kg", 1),
+        ("beam", ('mass="1"', 'mass="1.5"'), "mass of a", "kg", 3),
+    ],
+)
+def test_one_edit_of_the_file_is_one_cause(
+    slot: str, values: tuple[str, str], name: str, unit: str, line: int, tmp_path: Path
+) -> None:
+    """What multiplies masses and moments of inertia, named as the file has it."""
+    left, right = (LINKS.format(**{"geom": "", "beam": "", slot: value}) for value in values)
+    (row,) = explained(tmp_path, left, right, scenario=STILL, seconds=0.5).shares
+    numbers = tuple(float(value.split('"')[1]) if value else 1000.0 for value in values)
+    assert_has(row, name=name, unit=unit, share=pytest.approx(1.0))
+    assert (*row.values[0][1:], row.place.line) == pytest.approx((*numbers, line))
+
+
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("name", ["mass", "gains", "damping", "gear", "place", "armature"])
 def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):

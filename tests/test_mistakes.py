@@ -190,7 +190,7 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("compare hold --film a.webp --why", "go without it"),
         (
             "compare --models arm.xml,turned.xml",
-            "two words behind it: statemachine compare --models arm.xml turned.xml",
+            "two sides are two words: type arm.xml turned.xml",
         ),
         ("compare hold arm.xml,turned.xml", "two sides are two words: type arm.xml turned.xml"),
         (

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Ints
+from ..measures import ctrl_owners
 from ..processes import free_memory
 
 SHORTER = 1 - 1e-6
@@ -28,9 +29,8 @@ _SMALL = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></w
 
 def delay_steps(m: mujoco.MjModel) -> Ints:
     """Engine steps (nu,) by which each number of ctrl acts late."""
-    owner = np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
     steps = np.minimum(_needed(m.actuator_delay, m.opt.timestep), m.actuator_history[:, 0])
-    return steps.astype(np.int64)[owner]
+    return steps.astype(np.int64)[ctrl_owners(m)]
 
 
 def commands_kept(m: mujoco.MjModel, delay: Array, timestep: Array | float) -> Ints:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Ints
+from ..measures import ctrl_owners
 from ._delays import SHORTER, commands_kept, with_room
 from ._release_child import held
 
@@ -129,7 +130,7 @@ def servos(m: mujoco.MjModel) -> tuple[Ints, Any]:
 
     An actuator may take several numbers of ctrl.
     """
-    owner = np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
+    owner = ctrl_owners(m)
     fixed = m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED)
     affine = m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
     gain = m.actuator_gainprm[:, 0]

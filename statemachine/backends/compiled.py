@@ -28,6 +28,7 @@ import numpy as np
 from ..errors import EngineWarning, ModelError, shown
 from ..interface import Array, Ints, JointType, Keyframe
 from ..interface.options import HUGE, TINY
+from ..measures import ctrl_owners
 from ..models import mesh_file
 from ._delays import delay_steps, from_binary, with_room
 from ._edits import edited, servos, step_length
@@ -248,7 +249,7 @@ def fastest(m: mujoco.MjModel) -> Array:
         straight[start : start + 3 * (kind == _FREE) + (kind == _SLIDE)] = True
     in_a_step = _FAR * np.where(straight, m.stat.extent, 1.0) / m.opt.timestep
 
-    known, owner = facts(m), np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
+    known, owner = facts(m), ctrl_owners(m)
     gain, bias = m.actuator_gainprm[owner, 0], m.actuator_biasprm[owner]
     gear, joints = np.abs(known["actuator_gear"]), known["actuator_jntid"]
     command = np.abs(known["actuator_ctrlrange"]).max(axis=1)

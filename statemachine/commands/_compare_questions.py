@@ -212,12 +212,11 @@ OF_MODELS: tuple[Row, ...] = (
     (
         "--models",
         "NAME|FILE",
-        "two models, URDF or MJCF, before anything moves; FILE@ENGINE, or --backends and one "
-        "model: what an engine makes of it",
+        "two models, URDF or MJCF, before anything moves; FILE@ENGINE:engine, or --backends and "
+        "one model: what an engine itself makes of it",
         {"nargs": "*"},
     ),
     ("--frame", "LEFT=RIGHT", "a frame of the left and what the right calls it", REPEATED),
-    ("--rename", None, argparse.SUPPRESS, REPEATED, {"dest": "map"}),
     ("--digits", "N", "equal means to so many digits (6)"),
     ("--all", "", "a row for every figure that differs"),
 )
@@ -226,51 +225,59 @@ OF_MODELS: tuple[Row, ...] = (
 def run_models(options: argparse.Namespace) -> int:
     """Compare, and show."""
     from ..backends import backend_engine
-    from ..compare.models import compare, split
+    from ..compare.models import compare
+    from ..compare.sides import parse_sides
     from ..report import model_diff
     from ..report.terminal import progress
 
-    given = [split(text) for text in options.models]
-    if options.backends:
-        refuse(
-            (
-                any(engine for _, engine in given),
-                "--backends and FILE@ENGINE say the same: give one of them",
-            )
-        )
-        for engine in options.backends:
-            backend_engine(engine)
-        if len(given) == 1:
-            given *= 2
-        given = [
-            (model, engine) for (model, _), engine in zip(given, options.backends, strict=False)
-        ]
-    typed = " ".join(options.models or options.what[-2:]).replace(",", " ").split()
-    hint = "two models, or one and --backends A B"
-    if len(options.models) < 2 and len(typed) == 2:
-        hint = f"two words behind it: {PROGRAM} compare --models {' '.join(typed)}"
     digits = 6 if options.digits is None else options.digits
     refuse(
-        (
-            len(given) != 2 or len(options.models) > 2,
-            f"--models wants {hint}; got {len(options.models)}",
+        *(
+            (True, f"--models compares the two descriptions behind it; {word} is a run")
+            for word in options.what
         ),
-        *((True, f"--models compares descriptions; {word} is a run") for word in options.what),
         (not 1 <= digits <= 17, f"--digits wants a number from 1 to 17; got {digits}"),
         (options.seed < 0, f"--seed must not be negative; got {options.seed}"),
     )
+    words = options.models
+    sides = [side for word in words for side in parse_sides([word], options.menagerie)]
+    # The file itself, unless an engine is named.
+    engines = [None if s.file == word else s.engine for s, word in zip(sides, words, strict=True)]
+    refuse(
+        (
+            options.backends and any(engines),
+            "--backends and FILE@ENGINE say the same: give one of them",
+        ),
+        (
+            any(side.options for side in sides),
+            "--models compares what the files say, without options of a run",
+        ),
+    )
+    if options.backends:
+        engines, sides = list(options.backends), sides * (3 - len(sides))
+        for engine in options.backends:
+            backend_engine(engine)
+    refuse(
+        (
+            len(sides) != 2,
+            f"--models wants two models, or one and --backends A B; got {len(words)}",
+        )
+    )
+    files = [side.file for side in sides]
     with progress("compare"):
         result = compare(
-            given[0][0],
-            given[1][0],
-            engines=(given[0][1], given[1][1]),
+            *files,
+            engines=(engines[0], engines[1]),
             frames=pairs_of(options.frame, "--frame"),
             rename=pairs_of(options.map, "--map"),
             digits=digits,
             seed=options.seed,
             menagerie=options.menagerie,
         )
-    return show(model_diff.page(result, options.all), result, options.json)
+    typed = [
+        f"{file}@{engine}" if engine else file for file, engine in zip(files, engines, strict=True)
+    ]
+    return show(model_diff.page(result, typed, options.all), result, options.json)
 
 
 def for_page(
@@ -300,6 +307,7 @@ def _models(request: Any, traces: Sequence[Any]) -> Any:
     recorded = [trace.header.provenance.model_file for trace in traces]
     names = [side.path for side in request.sides] or recorded
     engines = tuple(trace.header.backend for trace in traces)
+    sides = [f"{Path(name).name}@{engine}" for name, engine in zip(names, engines, strict=True)]
     if engines[0] == engines[1] and names[0] == names[1]:
         return None
     from ..compare.models import compare
@@ -308,7 +316,7 @@ def _models(request: Any, traces: Sequence[Any]) -> Any:
     files = [request.model or name for name in names]
     given = {"engines": engines, "rename": request.names, "menagerie": request.menagerie}
     try:
-        return page(compare(*files, **given))
+        return page(compare(*files, **given), sides)
     except (StateMachineError, OSError):
         return None
 

@@ -304,7 +304,11 @@ def _run_compare(
     with progress("compare") as bar:
         run = run_sides(request, bar)
     comparison = compare(*run.traces, tolerances=tolerances)
-    played = compare(run.left, run.played, tolerances=tolerances) if run.is_apart else None
+    played = (
+        compare(run.left, run.played, tolerances=tolerances)
+        if run.played is not run.right
+        else None
+    )
     parts = {
         "witness": witness(*run.traces, run.file),
         "floor": _floor(options, comparison, run.reruns[0], uncertain),

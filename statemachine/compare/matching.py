@@ -22,6 +22,7 @@ from ..engines.records import BodyPair, Counterparts, Pairs
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
 from ..interface import INPUTS, Array, Model, State
+from ..measures import ctrl_owners
 from ..rotations import HERE
 from ..runs import SideStart
 
@@ -119,7 +120,7 @@ def _ends(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
 
 def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int]]:
     """Pairs of places in act."""
-    owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (left, right)]
+    owner = ctrl_owners(left), ctrl_owners(right)
     pairs: set[tuple[int, int]] = set()
     for a, b in actuators:
         here, there = int(owner[0][a]), int(owner[1][b])

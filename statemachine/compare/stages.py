@@ -70,7 +70,9 @@ class StageReader:
         frames += [left.site_names[a] or f"site {a}" for a, _ in matched.sites]
         self._upper = np.triu_indices(len(names))
         entries = list(zip(*(places.tolist() for places in self._upper), strict=True))
-        masses = [names[i] if i == j else f"{names[i]} and {names[j]}" for i, j in entries]
+        masses = [
+            names[i] if names[i] == names[j] else f"{names[i]} and {names[j]}" for i, j in entries
+        ]
         accelerations = np.where(turns, "rad/s²", "m/s²").tolist()
         self.columns = [
             StageColumn(KINEMATICS, frames, ["m"] * len(frames)),

@@ -81,11 +81,6 @@ class SidesRun:
         return self.left, self.right
 
     @property
-    def is_apart(self) -> bool:
-        """Whether the open loop is another run than the closed one."""
-        return self.played is not self.right
-
-    @property
     def unmatched(self) -> tuple[str, ...]:
         """What could not be matched, and what was matched by more than its name."""
         if self.matched is None:

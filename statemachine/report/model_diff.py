@@ -7,7 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ..compare.models.ledger import SUBJECTS, Value
 from ..lessons.template import by_engine
-from ..measures.text import after, capital, grouped, reading, rounded, sentence, significant
+from ..measures.text import (
+    after,
+    capital,
+    command,
+    grouped,
+    reading,
+    rounded,
+    sentence,
+    significant,
+)
 from ..page import Block, Figures, Items, Page, Table, Text
 from . import template
 from .template import if_true, versions_of
@@ -80,11 +89,12 @@ _SAID_BY_ITS_NAME = {
 }
 
 
-def page(result: Figures, everything: bool = False) -> Page:
+def page(result: Figures, sides: Sequence[str], everything: bool = False) -> Page:
     """What differs, the weightiest first; then what is equal, and how well.
 
     Args:
         result: Of `compare`.
+        sides: Both as one types them for a run.
         everything: Whether every figure has a row of its own.
     """
     named, rows, posed = (
@@ -114,7 +124,8 @@ def page(result: Figures, everything: bool = False) -> Page:
         ],
         all_able=if_true(able and not refused),
         able=len(able) if able and refused else None,
-        command="" if able else None,
+        command=command(["statemachine", "compare", "hold", *sides, "--why"]) if able else None,
+        emulated=next((side.reader.split()[0] for side in named.values() if side._emulated), None),
         refused_too=if_true(refused),
         refused=Items([f"{capital(name)}: {why}." for name, why in refused.items()]),
         equal=_equal(result.agreements),

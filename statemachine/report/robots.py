@@ -207,7 +207,7 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
         "two futures of a State are one": lambda backend: _MARKS[backend.restores],
         "gap without contacts": lambda backend: _gap_in_full(backend.without_contacts),
         "gap with contacts": lambda backend: _gap_in_full(backend.with_contacts),
-        **{f"scenario {name}": partial(_scenario, name) for name in TRIED},
+        **{f"experiment {name}": partial(_scenario, name) for name in TRIED},
         "cost of a step, on this machine": lambda backend: (
             NONE if backend.cost is None else f"{backend.cost:.3g} ×"
         ),

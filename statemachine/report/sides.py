@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..compare import Agreement, Comparison, SidesRun
-from ..interface import Array, JointType
+from ..compare.alike import commands_alike
 from ..measures.text import (
     NONE,
     figure,
@@ -25,7 +25,6 @@ from .finding import long_labels, moment, name_of, short_labels, traces_of, wind
 from .template import if_true, versions_of
 from .why import missing
 
-_NEAR = 0.2  # rad: joints that end as near as this to their ctrl were told an angle
 _PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
 # Of the promises that a backend may emulate, those that move the arm, in plain words.
 PHYSICS = {
@@ -45,46 +44,17 @@ def commanded(comparison: Comparison) -> list[Block]:
         return []
     if all(trace.header.options.get("actuation") is False for trace in (left, right)):
         return [Text("The actuators are off on both sides: nothing is commanded.")]
-    misses = [_ends(trace) for trace in (left, right)]
-    # The trace does not say so, but ctrl is an angle where most joints end near it.
-    angle = all(np.isfinite(miss).all() and np.median(miss) < _NEAR for miss in misses)
-    unit, scale = ("°", 180 / np.pi) if angle else ("", 1.0)
-    same = _same(left.ctrl, right.ctrl)
+    same = commands_alike(left, right)
     traces = {"": left} if same else {f"{labels[0]}, ": left, f"{labels[1]}, ": right}
     columns = {
-        f"{side}{when}": [f"{figure(round(ctrl * scale, 9))}{unit}" for ctrl in trace.ctrl[row]]
+        f"{side}{when}": map(figure, trace.ctrl[row].tolist())
         for side, trace in traces.items()
         for when, row in (("at the start", 0), ("in the end", -1))
     }
-    if angle:
-        columns |= {
-            f"missed in the end, {label}": [quantity(far, "rad") for far in miss.tolist()]
-            for miss, label in zip(misses, labels, strict=True)
-        }
     rows = list(zip(actuators, *columns.values(), strict=True))
     heading = f"What was commanded ({'' if same else 'not '}the same on both sides)"
-    title = f"{'Commanded' if angle else 'ctrl'}, by actuator"
-    table = Table(("actuator", *columns), rows, title)
+    table = Table(("actuator", *columns), rows, "ctrl, by actuator")
     return [Section("", heading, [table], folded=True, detail=True)]
-
-
-def _same(left: Array, right: Array) -> bool:
-    """Whether two runs were told the same, each at its own rows."""
-    rows = np.linspace(0, 1, 50)
-    a, b = (c[np.round(rows * (len(c) - 1)).astype(int)] for c in (left, right))
-    return bool(np.allclose(a, b, rtol=0, atol=1e-9)) or (
-        len(left) == len(right) and bool(np.allclose(left[:-1], right[:-1], rtol=0, atol=1e-9))
-    )
-
-
-def _ends(trace: Trace) -> Array:
-    """How far each actuator's joint is from its ctrl in the end (nu,) [rad]; NaN for no hinge."""
-    header = trace.header
-    misses = np.full(header.nu, np.nan)
-    for k, joint in enumerate(header.actuator_jntid):
-        if joint >= 0 and JointType(header.jnt_type[joint]) is JointType.HINGE:
-            misses[k] = abs(trace.qpos[-1, header.jnt_qposadr[joint]] - trace.ctrl[-1, k])
-    return misses
 
 
 def contact_words(comparison: Comparison) -> Table:
@@ -195,6 +165,7 @@ def emulated(comparison: Comparison) -> list[Block]:
         blocks += template.blocks(
             "provenance",
             engine=engine,
+            backend=engine.split()[0],
             moving=listed(moving) if moving else None,
             rest=[Section("", heading, [text], folded=True, detail=True)] if rest else [],
         )

@@ -141,7 +141,7 @@ def one_step(result: Figures, labels: tuple[str, str], experiment: str) -> Page:
             "The stages of a step, in their order",
             words=frozenset({0, 5}),
             emphasis=frozenset(k for k, gap in enumerate(result.stages) if gap is result.first),
-            wide=frozenset({7, 8}),
+            wide=frozenset({4, 7, 8}),
         ),
         relative=figure(result.relative),
         null=quantity(null.null, null.unit),

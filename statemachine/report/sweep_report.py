@@ -136,7 +136,7 @@ def _map_tables(sweep: Figures, chart: Figures) -> list[Table]:
     names = [setting_word(sweep, chart.up, value) for value in chart.rows] if chart.up else ["gap"]
     rows = [(name, *(cell(r, c) for c in range(len(places)))) for r, name in enumerate(names)]
     down = f"{up} down, " if chart.up else ""
-    title = f"The gap of the {sweep.quantity.says},{unit}: {down}{across} across"
+    title = f"The gap of the {sweep.quantity.says}, {unit.strip()}: {down}{across} across"
     return [
         Table(
             (chart.up or chart.across, *places[k : k + _COLUMNS]),

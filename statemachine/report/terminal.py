@@ -266,8 +266,10 @@ def _loud(cell: str) -> str:
     return cell.upper() if getattr(cell, "verdict", "") == "differs" else cell
 
 
-def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) -> list[int | None]:
-    """Widths of columns that break no name and no number, if there is room for them."""
+def _widths(
+    rows: Sequence[Sequence[str]], words: Container[int], width: int
+) -> Sequence[int | None]:
+    """Widths of columns that break no number, and of the names at most the longest."""
     from rich.cells import cell_len
 
     columns = list(zip(*rows, strict=True))
@@ -275,14 +277,16 @@ def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) ->
     parts = [" ".join(cells).split() if k in words else cells for k, cells in enumerate(columns)]
     least = [max(map(cell_len, cells), default=0) for cells in parts]
     free = width - sum(least) - 3 * (len(least) - 1)
+    longest = max(range(len(least)), key=lambda k: least[k] * (k in words))
     if free < 0:
+        least[longest], free = least[longest] + free, 0
+    if least[longest] < min(_NARROWEST, len(rows[0][longest])):
         return [None] * len(least)
-    widths: list[int | None] = []
-    for cells, size in zip(columns, least, strict=True):
-        more = min(max(map(cell_len, cells)) - size, free)
-        widths.append(size + more)
-        free -= more
-    return widths
+    wants = [max(map(cell_len, cells)) - size for cells, size in zip(columns, least, strict=True)]
+    for k in sorted(range(len(least)), key=wants.__getitem__):  # figures before sentences
+        more = min(wants[k], free)
+        least[k], free = least[k] + more, free - more
+    return least
 
 
 def _hanging(mark: str | RichText, text: str) -> RenderableType:
@@ -295,7 +299,9 @@ def _hanging(mark: str | RichText, text: str) -> RenderableType:
     return grid
 
 
+_NARROWEST = 8  # characters of a column whose names are broken
 _PATIENCE = 0.5  # seconds without a bar
+_TRIED, _LONG = 5.0, 20.0  # seconds after which an estimate is made, and one that is said
 _PACE = 0.1  # seconds between two pictures of it
 
 
@@ -303,10 +309,10 @@ _PACE = 0.1  # seconds between two pictures of it
 def progress(what: str) -> Iterator[Callable[[float], None]]:
     """A function to call with the fraction done; a bar appears if it takes long.
 
-    Nothing is shown where standard error is not a terminal, and nothing stays behind.
+    Nothing of it stays behind. Where standard error is not a terminal, a line tells a long wait.
     """
     if not sys.stderr.isatty():
-        yield lambda _fraction: None
+        yield _estimate(what)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
@@ -342,3 +348,18 @@ def progress(what: str) -> Iterator[Callable[[float], None]]:
     finally:
         if started:
             bar.stop()
+
+
+def _estimate(what: str) -> Callable[[float], None]:
+    """A function to call with the fraction done, which says once how long it may take in all."""
+    began, takes = time.monotonic(), 0.0
+
+    def report(fraction: float) -> None:
+        nonlocal takes
+        now = time.monotonic() - began
+        if not takes and now > _TRIED and fraction:
+            takes = now / fraction
+            if takes > _LONG:
+                print(f"{what}: may take {takes:.0f} s", file=sys.stderr)
+
+    return report

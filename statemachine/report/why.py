@@ -21,7 +21,6 @@ _SHOWN = 12  # rows; the rest is folded away
 _WIDE = 15  # characters of a value
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
-_MASKED = 2.0  # of the gap: a cause with more has others against it
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 _OFF = ("place", "anchor", "com", "axis")
 _HEADS = ("what", "left", "right", "part", "alone", "last")
@@ -125,9 +124,7 @@ def answer(result: Explanation) -> str:
         kind, (left, right) = ("switched", switches[0]) if switches else (kind, (left, right))
     elif kind == "cause":
         cause, (left, right) = capital(causes[0].name), _values(causes[0])
-        # A share below zero hides others; one far above the whole gap does only what they hide.
-        masked = not 0 < (causes[0].share or 0.0) < _MASKED
-        kind = "masked" if masked else "bare" if NONE in (left, right) else "cause"
+        kind = "bare" if NONE in (left, right) else "cause"
     return ANSWERS[kind].format(cause=cause, left=left, right=right, part=part, gap=gap)
 
 

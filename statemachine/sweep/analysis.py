@@ -48,7 +48,7 @@ def sweep_report(
     Args:
         folder: Of the dataset.
         backends: Two of its engines, the left one first; by default its first two.
-        quantity: Of `QUANTITIES`; by default the fingertip's, else the joint angles'.
+        quantity: Of `QUANTITIES`; by default the site's, else the joint angles'.
         tolerances: By kind, instead of ours [SI].
         fit: The parameters to fit; by default the one that the gap is most sensitive to.
         varied: Whether the left side keeps the model's own value of it ("right") or both have the

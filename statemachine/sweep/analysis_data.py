@@ -2,7 +2,7 @@
 
 A run is an element of a structured array, whose fields are
 
-    tip (m, 3) fingertip at the moments that are kept [m]
+    tip (m, 3) site at the moments that are kept [m]
     qpos (m, n) angles then [rad]
     touch when something first touched [s]; infinite if nothing did
     time simulated time at the end [s]
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..errors import BadInputError
 from ..interface import Array, Ints
+from ..page import Figures
 from .design import Design, DesignPoint
 from .rows import DONE, require_parquet
 
@@ -32,27 +33,14 @@ Flags = NDArray[np.bool_]
 Runs = NDArray[Any]  # structured, as above
 
 
-@dataclass(frozen=True)
-class RunQuantity:
-    """What the gap of two runs is a gap of.
-
-    Attributes:
-        kind: As a tolerance calls it; `measures.QUANTITIES` has its unit.
-        says: In words.
-        end: Whether it is that of the last moment; else the largest of the moments that are kept.
-    """
-
-    kind: str
-    says: str
-    end: bool = False
-
-
+# What the gap of two runs is a gap of: kind, as a tolerance calls it; in words, where {site} is the
+# site's name; and whether it is that of the last moment, else the largest of those that are kept.
 RUN_QUANTITIES = {
-    "tip": RunQuantity("tip", "fingertip"),
-    "tip-end": RunQuantity("tip", "fingertip at the end", True),
-    "qpos": RunQuantity("joint", "joint angles"),
-    "qpos-end": RunQuantity("joint", "joint angles at the end", True),
-    "touch": RunQuantity("contact", "first touch"),
+    "tip": Figures(kind="tip", says="site {site}", end=False),
+    "tip-end": Figures(kind="tip", says="site {site} at the end", end=True),
+    "qpos": Figures(kind="joint", says="joint angles", end=False),
+    "qpos-end": Figures(kind="joint", says="joint angles at the end", end=True),
+    "touch": Figures(kind="contact", says="first touch", end=False),
 }
 
 

@@ -86,7 +86,7 @@ def agreement_of(
     return (
         Figures(
             name=name,
-            says=quantity.says,
+            says=quantity.says.format(site=facts.site),
             unit=QUANTITIES[quantity.kind].unit,
             tolerance=most_tolerant.value,
             reason=most_tolerant.reason,

@@ -12,7 +12,7 @@ import numpy as np
 from ..backends import load
 from ..compare.perturbed import ROUNDING
 from ..errors import StateMachineError, refuse
-from ..interface import Ints, Model, forward, make_data, reset
+from ..interface import Ints, Model, forward, make_data, reset, usual_site
 from ..measures import JointPlaces
 from ..page import Figures
 from ..processes import checked_jobs
@@ -167,6 +167,7 @@ class ModelFacts:
 
     Attributes:
         hinges: Which numbers of qpos are angles; None for all of them.
+        site: The name of its usual site; "tip" where that is not known.
         foot: (3,) where the first jointed body has its origin [m].
         own: Value of each option that is varied, as the model has it; None where its parts have
             several.
@@ -174,6 +175,7 @@ class ModelFacts:
     """
 
     hinges: tuple[int, ...] | None = None
+    site: str = "tip"
     foot: tuple[float, ...] = (0.0, 0.0, 0.0)
     own: Mapping[str, float | None] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
@@ -194,6 +196,7 @@ def facts_of(
             model = load(files[0], backend=backend, menagerie=menagerie)
         except StateMachineError:
             continue
+        sites = model.site_names or ("tip",)
         hinges = tuple(JointPlaces.of(model.jnt_type, model.jnt_qposadr).hinges.tolist())
         with make_data(model) as data:
             reset(model, data)
@@ -201,6 +204,7 @@ def facts_of(
             foot = tuple(data.xpos[min(1, model.nbody - 1)].tolist())
         return ModelFacts(
             hinges or None,
+            sites[usual_site(sites) or 0],
             foot,
             {v.label: own_value(v, model) for v in factors},
             {v.label: v.unit_on(_joints(model, v)) for v in factors},

@@ -40,7 +40,12 @@ COLUMNS = (
     ("time", "double", "s", "simulated time at the end"),
     ("qpos", "list<double>", "rad or m", "(nq,) at the end"),
     ("qvel", "list<double>", "rad/s or m/s", "(nv,) at the end"),
-    ("tip", "list<double>", "m", "(3,) fingertip at the end, in world axes; none without a site"),
+    (
+        "tip",
+        "list<double>",
+        "m",
+        "(3,) the usual site at the end, in world axes; none without a site",
+    ),
     ("max_qvel", "double", "rad/s or m/s", "the largest size of a velocity in any step"),
     ("energy_start", "double", "J", "kinetic and potential energy at the start"),
     ("energy", "double", "J", "the same at the end"),

@@ -296,7 +296,7 @@ def _run(
 
 
 def _tips(model: Model, data: Data, samples: list[Array]) -> list[list[float]] | None:
-    """The fingertip (3,) [m] in world axes at some positions; the run is over, so `data` serves."""
+    """The usual site (3,) [m] in world axes at some positions; `data` of the ended run serves."""
     site = usual_site(model.site_names)
     if site is None:
         return None

@@ -15,22 +15,20 @@ import os
 import platform
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from ... import __version__
-from ...backends import backend_names, check_backend, load
+from ...backends import check_backend, load
 from ...engines import room, rooms_with
 from ...engines.description import urdf
 from ...engines.description.match import renamed
 from ...engines.description.records import Robot
 from ...engines.description.tree import GroupTree
-from ...errors import StateMachineError, UnsupportedError, unknown_name
+from ...errors import StateMachineError, UnsupportedError
 from ...installed import DEFAULT
-from ...models import SUFFIXES, resolve
+from ...models import resolve
 from ...page import Figures
-from ...probes import conventions
 from ...releases import engine_of, is_release
 from .compiled import compiled, enter_rest
 from .diff import diff
@@ -40,21 +38,7 @@ __all__ = [
     "Robot",
     "compare",
     "read",
-    "split",
 ]
-
-# Of the conventions, those that stand between a description and what comes of it.
-_ASKED = ("actuation", "damping", "friction")
-
-
-def split(text: str) -> tuple[str, str | None]:
-    """A model and the engine that it is asked of: "so101@pybullet"; None: the file itself."""
-    model, sign, engine = text.rpartition("@")
-    if sign and (engine in backend_names() or is_release(engine)):
-        return model, engine
-    if sign and Path(model).suffix.lower() in SUFFIXES and not Path(text).exists():
-        raise unknown_name("engine", engine, backend_names())
-    return text, None
 
 
 def read(
@@ -159,8 +143,6 @@ def compare(
     posed, notes = diff(book, trees[0], trees[1], frames, seed)
     if matched:
         skipped += enter_rest(book, matched, robots, max(tree.reach for tree in trees))
-    for question, *answers in own_ways(*engines):
-        book.differ("engine", "", question, answers, share=0.5)
     versions = {
         "statemachine": __version__,
         "numpy": np.__version__,
@@ -178,9 +160,12 @@ def compare(
             joints=len(robot.joints),
             shapes=sum(len(link.shapes) for link in robot.links),
             _mass=mass,
+            _emulated=bool(engine) and room(engine_of(engine)).emulated,
             notes=robot.notes,
         )
-        for robot, mass in ((trees[0].robot, robots[0].mass), (robots[1], robots[1].mass))
+        for robot, mass, engine in zip(
+            (trees[0].robot, robots[1]), (r.mass for r in robots), engines, strict=True
+        )
     ]
     rows = book.ordered()
     return Figures(
@@ -196,24 +181,3 @@ def compare(
         skipped=tuple(skipped),
         equal=not skipped and not any(row.matters for row in rows),
     )
-
-
-def own_ways(left: str | None, right: str | None) -> tuple[tuple[str, str, str], ...]:
-    """For each question that two engines answer otherwise: its title, and both answers.
-
-    They are asked on small models, whatever a file says.
-    """
-    engines = [engine for engine in (left, right) if engine and room(engine).can("measurement")]
-    if len({*engines}) < 2:
-        return ()
-    answers = [
-        (
-            asked.question.title,
-            *(
-                "; ".join(f"{a.of}: {a.answer}" if a.of else a.answer for a in findings or ())
-                for findings in map(asked.findings.get, engines)
-            ),
-        )
-        for asked in conventions.probe(engines, _ASKED).questions
-    ]
-    return tuple((title, a, b) for title, a, b in answers if a and b and a != b)

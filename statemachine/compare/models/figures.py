@@ -15,7 +15,7 @@ import numpy as np
 from ...engines.description.match import Pair
 from ...engines.description.records import OF_A_SLIDE, SCALAR, Actuator, RobotJoint, Setting
 from ...engines.description.tree import GroupTree
-from ...measures.text import few, milliseconds, rounded
+from ...measures.text import milliseconds, rounded
 from .ledger import Ledger
 
 # Of a joint each figure's subject and what of it it is, the field of a `RobotJoint`, its unit, and
@@ -224,10 +224,6 @@ def of_settings(book: Ledger, left: GroupTree, right: GroupTree) -> Iterator[str
             f"a {silent[0]} says nothing of timestep, gravity and solver: the engine that "
             "loads it decides (--backends shows what it takes)"
         )
-    names = [{*(robot.settings or ())} for robot in robots]
-    for which, alone in (("left", names[0] - names[1]), ("right", names[1] - names[0])):
-        if alone and not silent:
-            yield f"only the engine of the {which} has the settings {few(sorted(alone), 8)}"
 
 
 def _share(name: str, left: Setting, right: Setting) -> float:

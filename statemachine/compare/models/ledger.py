@@ -39,7 +39,6 @@ SUBJECTS = {
     "contact": "How it touches",
     "settings": "Settings of the simulation",
     "further": "What else can change a motion",
-    "engine": "What the engines do of themselves, measured on small models of their own",
 }
 _ORDER = tuple(SUBJECTS)
 

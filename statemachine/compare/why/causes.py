@@ -5,7 +5,7 @@ And the line of a file that says what a cause is of.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
@@ -25,6 +25,8 @@ START, COMMANDS, ORDER = "start", "commands", "order of ctrl"  # of the run itse
 _SAME = 1e-12
 _MOST = 24  # causes, before all of one quantity are taken together
 _NAMED = 3  # elements of one cause, before they are counted
+_DENSITY = 1000.0  # kg/m³, where an MJCF says none
+_SCALING = {"density": "kg/m³", "mass": "kg"}  # attributes of a geom, and their units
 _PLURALS = {"body": "bodies", "equality": "equalities", "flex": "flexes"}
 
 
@@ -110,8 +112,9 @@ def built(model: Model, edits: tuple[Edit, ...]) -> Model:
 def causes(differences: Iterable[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:
     """Differences as causes: what was changed alike in several elements is one.
 
-    A changed default of a file's class is such a change. Where there are more than 24 causes, all
-    of one quantity are one.
+    A changed default of a file's class is such a change; so are masses and moments of inertia that
+    are multiplied alike, as by a density. Where there are more than 24 causes, all of one quantity
+    are one.
 
     Args:
         differences: In their order.
@@ -132,8 +135,19 @@ def _change(row: ModelDifference) -> object:
     """What is equal for two differences that are the same change of different elements."""
     if row.subject == "extra actuator":  # a file without motors is one difference
         return row.subject, repr(row.values)
+    if scale := scale_of(row):
+        return row.kind, scale
     single = not row.where or row.subject.startswith("extra ")
     return row.title if single else (row.kind, row.subject, repr(row.values))
+
+
+def scale_of(row: ModelDifference) -> str:
+    """The factor from the left's mass or moments of a body to the right's; "" for anything else."""
+    if row.kind != "body" or row.subject not in ("mass", "inertia"):
+        return ""
+    left, right = (np.ravel(value) for value in row.values[0][1:])
+    factors = {f"{number:.8g}" for number in right / left} if left.all() else {""}
+    return factors.pop() if len(factors) == 1 else ""
 
 
 def _grouped(
@@ -148,11 +162,12 @@ def _grouped(
 def _name(rows: list[ModelDifference]) -> str:
     """What a cause is, and of what: of up to three elements by name."""
     first, places = rows[0], list(dict.fromkeys(row.where for row in rows))
-    if len(places) == 1:
+    subject = " and ".join(dict.fromkeys(row.subject for row in rows))
+    if len(rows) == 1:
         return first.title
     if len(places) <= _NAMED:
-        return f"{first.subject} of {', '.join(places)}"
-    return f"{first.subject} of {len(places)} {_PLURALS.get(first.kind, f'{first.kind}s')}"
+        return f"{subject} of {', '.join(places)}"
+    return f"{subject} of {len(places)} {_PLURALS.get(first.kind, f'{first.kind}s')}"
 
 
 def of_the_run(
@@ -244,23 +259,57 @@ class Place:
 _ATTRIBUTES = {"ipos": "pos", "inertia": "diaginertia", "gainprm": "kp", "solref_limit": "solref"}
 
 
-def places_of(path: Path, causes: Iterable[Cause]) -> dict[str, Place]:
-    """The place of each cause that one line of a file says, with the value that the side has.
-
-    An element's own line; of a change that several elements share, the line of the default that
-    has it.
+def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Figures]:
+    """Each cause as the right's file has it.
 
     Args:
-        path: An MJCF; of any other file no place is known.
+        left: The left's file; of any but an MJCF nothing is known.
+        right: The right's.
         causes: What to look for.
+
+    Yields:
+        name: What it is, and of what.
+        values: Each figure that differs: its name, the left's value, the right's; of masses that
+            are multiplied alike the density that says so, or the factor.
+        unit: Of the first figure.
+        place: The one line that says it, with the value that the side has: an element's own; of a
+            change that several elements share, that of the default; None where that was not found.
     """
-    elements = list(_elements(path)) if path.suffix in (".xml", ".mjcf") else []
-    places = {}
+    ours, theirs = (
+        list(_elements(path)) if path.suffix in (".xml", ".mjcf") else [] for path in (left, right)
+    )
     for cause in causes:
-        lines = {element.place for element in elements if _says(element, cause)}
-        if len(lines) == 1:
-            places[cause.name] = lines.pop()
-    return places
+        name, rows = cause.name, cause.differences
+        values, unit = tuple(value for row in rows for value in row.values), rows[0].unit
+        lines = {element.place for element in theirs if _says(element, cause)}
+        scale = scale_of(rows[0])
+        if scale and len(rows) > 1:
+            said = _scalings(ours, theirs, float(scale))
+            if len(said) == 1:
+                name = name.replace("mass and inertia", said[0][0])
+                values, unit, lines = (said[0][:3],), _SCALING[said[0][0]], {said[0][3]}
+            elif len({row.where for row in rows}) > 1:
+                values, unit = (("scale", 1.0, float(scale)),), "×"
+        place = lines.pop() if len(lines) == 1 else None
+        yield Figures(name=name, values=values, unit=unit, place=place)
+
+
+def _scalings(
+    ours: Sequence[Figures], theirs: Sequence[Figures], scale: float
+) -> list[tuple[str, float, float, Place]]:
+    """Attributes that are multiplied so in the right's file: both values, and the place."""
+    left, right = (
+        [(word, float(e.attributes[word]), e.place) for e in elements for word in _SCALING
+         if word in e.attributes]
+        for elements in (ours, theirs)
+    )  # fmt: skip
+    known = {("density", _DENSITY), *(row[:2] for row in left)}
+    return [
+        (word, value / scale, value, place)
+        for word, value, place in right
+        if (word, value) not in known
+        and any(word == w and np.isclose(scale * v, value, 1e-6) for w, v in known)
+    ]
 
 
 def _says(element: Figures, cause: Cause) -> bool:

@@ -20,7 +20,7 @@ from ...runs.scenarios import Scenario
 from ..labels import files_apart
 from ..matching import match_alike, match_models, missing_parts
 from ..perturbed import EXACT, Uncertainty
-from .causes import Cause, order_of_joints, places_of
+from .causes import Cause, as_written, order_of_joints
 from .gap import touched_at_start
 from .shapley import locate, shapley
 from .trials import Measure, Trials
@@ -29,6 +29,7 @@ from .trials import Measure, Trials
 # 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
 ROUNDING = {"rad": 1e-8, "m": 1e-9}
 UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
+_MASKED = 2.0  # of the gap: a cause with more has others against it
 _STILL = 1e-3  # [rad or m] over a whole run
 NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
 _NOT_RUN = "no set of causes with it could be run"
@@ -82,12 +83,16 @@ class Explanation(Figures):
         from that, and counts as unexplained.
         """
         stays = 1.0 - self.explained if any(row.note for row in self.shares) else self.unexplained
-        return self.is_rounding or (abs(stays) <= UNEXPLAINED and not self.is_masked)
+        return self.is_rounding or (abs(stays) <= UNEXPLAINED and self.explained >= -UNEXPLAINED)
 
     @property
     def is_masked(self) -> bool:
-        """Whether the gap grows when all differences are brought to the same: they hide it."""
-        return self.explained < -UNEXPLAINED
+        """Whether the differences hide one another, so that none of them causes the gap.
+
+        All of them together widen it, or the largest share is below zero or above twice the gap.
+        """
+        largest = next((row.share for row in self.shares if row.share), 0.0)
+        return min(self.explained, largest) < -UNEXPLAINED or largest > _MASKED
 
 
 def explain(
@@ -183,7 +188,7 @@ def explain(
         gaps = trials.gaps(brought)
         return getattr(gaps[quantity], measure) if gaps else None
 
-    expected = 3 * len(able) + 20
+    expected = 3 * len(able) + 10
     divided = shapley(
         [] if nothing else able,
         value,
@@ -201,7 +206,7 @@ def explain(
             trials, frozenset(able), quantity, measure, gap, brought, max(negligible, floor)
         )
     )
-    shares = _shares(listed, divided, rest, right, nothing)
+    shares = _shares(listed, divided, rest, left, right)
     explained, located, unexplained = _parts(gap, brought, rest, nothing)
     # Each of them explains nearly all alone, and next to nothing after the others.
     redundant = [
@@ -227,7 +232,7 @@ def explain(
         method=divided.method,
         orders=divided.orders,
         brought=brought,
-        found_in=tuple(part for part in rest if not part.is_setting),
+        found_in=tuple(part for part in rest if not part._side),
         explained=explained,
         located=located,
         unexplained=unexplained,
@@ -290,41 +295,34 @@ def _shares(
     listed: tuple[Cause, ...],
     divided: Figures,
     rest: tuple[Figures, ...],
+    left: Model,
     right: Model,
-    nothing: bool,
 ) -> tuple[Figures, ...]:
     """The causes, the largest share first; of what was found by a setting of one side, too.
 
     Returns:
-        name: What it is, and of what.
+        name, values, unit, place: See `as_written`.
         kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
             start, "engine" of a setting of an engine as it comes.
-        values: Each figure that differs: its name, the left's value, the right's.
-        unit: Of the first figure.
         share: Its part of the gap (Shapley value); below zero where it hides others; None where it
             cannot be brought to the same, or no set of causes with it could be run.
         error: Standard error of the share; 0 where it is not an estimate.
         alone: The part that it takes away as the only one; last: after all others.
         note: Why there is no share, or what else is to be said.
-        place: Where the right's file says it; None where that was not found.
         chosen: Of an integrator the side that can choose, and the one to choose; else None.
     """
-    places = {} if nothing else places_of(right.path, listed)
     rows = [
         Figures(
-            name=cause.name,
+            **vars(said),
             kind=cause.kind,
-            values=tuple(value for row in cause.differences for value in row.values),
-            unit=cause.differences[0].unit,
             share=divided.share.get(cause.name),
             error=divided.error.get(cause.name, 0.0),
             alone=divided.alone.get(cause.name),
             last=divided.last.get(cause.name),
             note=cause.refused or _NOT_RUN * (divided.share.get(cause.name, 0.0) is None),
-            place=places.get(cause.name),
             chosen=None,
         )
-        for cause in listed
+        for cause, said in zip(listed, as_written(left.path, right.path, listed), strict=True)
     ]
     rows += [
         Figures(
@@ -338,10 +336,10 @@ def _shares(
             last=part.share,
             note="",
             place=None,
-            chosen=(part.side, part.without),
+            chosen=(part._side, part.without),
         )
         for part in rest
-        if part.is_setting
+        if part._side
     ]
     return tuple(sorted(rows, key=lambda row: -abs(row.share or 0.0)))
 
@@ -352,8 +350,8 @@ def _parts(
     """What is explained, located and unexplained, as parts of the gap."""
     if nothing or brought is None:
         return 0.0, 0.0, float(not nothing)
-    explained = (gap - brought) / gap + sum(part.share for part in rest if part.is_setting)
-    located = sum(part.share for part in rest if not part.is_setting)
+    explained = (gap - brought) / gap + sum(part.share for part in rest if part._side)
+    located = sum(part.share for part in rest if not part._side)
     return explained, located, (rest[-1].gap if rest else brought) / gap
 
 

@@ -8,7 +8,6 @@ law of contact, is only located: it is left out on both sides.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from ...engines.records import Dials, ModelDifference, Setting
 from ...interface import Model
 from ...measures.text import milliseconds, rounded, significant
+from ...page import Figures
 
 # In the order of the tables: the world before the robot.
 TITLES: Mapping[str, str] = {
@@ -41,30 +41,19 @@ NEEDS: Mapping[str, str] = {
 _FINER = 4
 
 
-@dataclass(frozen=True)
-class Feature:
-    """Something that both engines compute, each in its own way, and that can be left out.
-
-    Attributes:
-        name: What it is called in a result; without: what a run without it is, in words.
-        option: That of `Model.replace`; value: what leaves the feature out.
-    """
-
-    name: str
-    without: str
-    option: str
-    value: Any
-
-
+# What both engines compute, each in its own way, and what can be left out: its name, what a run
+# without it is, and the option of `Model.replace` with the value that leaves it out.
 # What acts now and then comes first. Gravity and the servos are not among them: they drive the
 # motion, and with it goes whatever there is between two sides.
 FEATURES = (
-    Feature("contact", "nothing touches", "contacts", False),
-    Feature("limits", "no joint limits", "limits", False),
-    Feature("frictionloss", "no dry friction", "frictionloss", 0.0),
-    Feature("damping", "no damping", "damping", 0.0),
-    Feature("armature", "no armature", "armature", 0.0),
-    Feature("timestep", f"steps {_FINER} times finer", "substeps", _FINER),
+    Figures(name="contact", without="nothing touches", option="contacts", value=False),
+    Figures(name="limits", without="no joint limits", option="limits", value=False),
+    Figures(name="frictionloss", without="no dry friction", option="frictionloss", value=0.0),
+    Figures(name="damping", without="no damping", option="damping", value=0.0),
+    Figures(name="armature", without="no armature", option="armature", value=0.0),
+    Figures(
+        name="timestep", without=f"steps {_FINER} times finer", option="substeps", value=_FINER
+    ),
 )
 
 

@@ -287,11 +287,9 @@ def locate(
         values: The integrators of the two sides as they come; None of what was left out.
         share: The part of the gap that went.
         gap: What was left of it, in the unit of the gap.
-        moved: How far the left's own motion is then from its motion as it comes; above zero
-            the gap is that of another motion.
         is_still: Whether nothing moves any more, so that there can be no gap.
-        is_setting: Whether it is a setting of one side, chosen while nothing was left out.
-        side: That side, "left" or "right"; "" of the others.
+        _side: Of a setting of one side, chosen while nothing was left out, that side: "left" or
+            "right"; "" of the others.
     """
     rows: list[Figures] = []
     without, integrator = frozenset[str](), ""
@@ -321,10 +319,8 @@ def locate(
                 values=values,
                 share=(left - rest) / gap,
                 gap=rest,
-                moved=trials.moved(quantity, without, integrator),
                 is_still=trials.extent(quantity, without) < _STILL * trials.extent(quantity),
-                is_setting=setting,
-                side=("left", "right")[trials.selects[0]] if setting else "",
+                _side=("left", "right")[trials.selects[0]] if setting else "",
             )
         )
         left = rest

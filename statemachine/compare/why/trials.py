@@ -40,7 +40,7 @@ from .causes import (
     order_of_ctrl,
 )
 from .gap import Curves, Ruler, first_touch
-from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, Feature, OwnSettings, leave_out
+from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, OwnSettings, leave_out
 
 Measure = Literal["worst", "end", "rms"]
 # What the right is given of the left by `Model.replace`, by the name of its cause: the timestep,
@@ -246,7 +246,7 @@ class Trials:
         chosen = side in self.selects and model.compiled is not None
         return room(DEFAULT).integrator(model.compiled) if chosen else "its own"
 
-    def can_be_without(self, feature: Feature) -> bool:
+    def can_be_without(self, feature: Figures) -> bool:
         """Whether a feature can be left out on both sides, and is not what the experiment sets."""
         own = [
             feature.name in ENGINE_CAN_BE_WITHOUT
@@ -255,12 +255,6 @@ class Trials:
             for own, model in zip(self._own, self._models, strict=True)
         ]
         return all(own) and feature.option not in self._scenario.options
-
-    def moved(self, quantity: str, without: frozenset[str], integrator: str) -> float:
-        """How far the left's own motion is then from what it is as it comes, all brought over."""
-        run = self._pair(frozenset(self._by_name), without, integrator)[0]
-        before, after = self._run(_Run(0, _NONE)), self._run(run)
-        return self.ruler.gap(quantity, before, after).worst if before and after else 0.0
 
     def extent(self, quantity: str, without: frozenset[str] = _NONE) -> float:
         """How far the left moves from where it starts, as it comes or without some features."""

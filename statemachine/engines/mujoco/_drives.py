@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ...installed import require
+from ...measures import ctrl_owners
 from ..records import Counterparts, Edit, ModelDifference
 from ._sides import Sides, name_of, plain, same, zeros
 
@@ -32,7 +31,7 @@ _STILL = (
 def drives(sides: Sides) -> Iterator[ModelDifference]:
     """Actuators, by their gains, ranges, laws and what they drive."""
     left, right = sides.left, sides.right
-    owners = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (left, right)]
+    owners = ctrl_owners(left), ctrl_owners(right)
     places = sides.pairs.actuators
     actuators = sorted({(int(owners[0][a]), int(owners[1][b])) for a, b in places})
     for a, b in actuators:
