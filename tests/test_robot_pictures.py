@@ -83,7 +83,7 @@ def test_without_a_renderer_a_page_has_the_words(
     monkeypatch.setattr(
         film, "renderer_here", Mock(side_effect=MissingEngineError("nothing draws"))
     )
-    path = site._write(tmp_path, "page", Page("t", "o", [_picture()]), "", "x")  # pyright: ignore
+    path = site._write(tmp_path, "page", Page("t", "o", [_picture()]), "x")  # pyright: ignore
     text = path.read_text()
     assert_in(text, "the words", "*the title* Live: `statemachine view`")
     assert "![" not in text
