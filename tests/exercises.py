@@ -149,6 +149,14 @@ WRONG_ONES: dict[str, dict[str, tuple[str, Changes]]] = {
             {BOTH: "return fall(model.replace(actuation=False)), fall(model)"},
         ),
         "arithmetic_address": ("that is qpos[1], of 'crate'", {LIFT: "1"}),
+        "arithmetic_address, the start typed in": (
+            "of 'crate'; shoulder_lift is at qpos[8]",
+            {LIFT: "1", f"[{ANGLE}]": "[0.0]"},
+        ),
+        "servos_on_and_radians": (
+            "the servos were still on in this run, and that is radians",
+            {ANGLE: "float(data.qpos[place])", "model.replace(actuation=False)": "model"},
+        ),
         "timestep_taken_for_granted": (
             "you took 200 steps for a second, and at 4 ms a step a second has 250",
             {"round(1 / model.timestep)": "200"},

@@ -89,10 +89,12 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall, course: Fall) -> li
     if near(given[0], falls[1], TOLERANCE) and near(given[1], falls[0], TOLERANCE):
         return [*remarks, "the two lists are swapped: (on, off) is the order"]
     for limp, name in enumerate(_NAMES):
-        if not near(given[limp], falls[limp], TOLERANCE):
-            text = _why(given, bool(limp), world, right, course, answer)
-            remarks.append(f"{name}: {text}")
-        elif text := _by_the_clock(given[limp], bool(limp), world, right):
+        text = (
+            _by_the_clock(given[limp], bool(limp), world, right)
+            if near(given[limp], falls[limp], TOLERANCE)
+            else _why(given, bool(limp), world, right, course, answer)
+        )
+        if text:
             remarks.append(f"{name}: {text}")
     if not answer.runs:
         remarks.append(_NO_STEP)
@@ -123,7 +125,7 @@ def _why(
     speed = fall.speed[int(limp), fall.marks]
     nothing = float(abs(mine).max()) <= TOLERANCE < float(abs(right).max())
     mistakes = (
-        (_is(mine, mistaken, right), text)
+        (_is(mine[1:], mistaken[1:], right[1:]), text)  # the zero at the start may be typed in
         for mistaken, text in _mistakes(limp, world, fall, course, answer)
     )
     why = reason(
@@ -165,7 +167,7 @@ def _mistakes(
     for entry in set(range(model.nq)) - {place}:
         yield (
             angles[marks, entry],
-            f"that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at "
+            f"that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at qpos[{place}]: "
             "model.jnt_qposadr[model.joint_id(…)]",
         )
     for unit in _UNITS:
@@ -176,8 +178,9 @@ def _mistakes(
             course.degrees(limp)[: len(marks)],
             f"that belongs to the course's own scene, not to the model that you got{loaded}",
         )
-    how = "still on" if limp else "off already"
-    yield fall.degrees(not limp), f"the servos were {how} in this run"
+    servos = f"the servos were {'still on' if limp else 'off already'} in this run"
+    yield fall.degrees(not limp), servos
+    yield np.radians(fall.degrees(not limp)), f"{servos}, and that is radians"
     for nstep in dict.fromkeys(run.nstep for run in answer.runs):
         rate = nstep // (len(marks) - 1)
         if rate != marks[1] and (len(marks) - 1) * rate < len(angles):
