@@ -198,7 +198,7 @@ def test_a_remark_is_told_as_far_as_there_is_room() -> None:
 
 def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path) -> None:
     texts = (
-        "right in 2 other cases",
+        "right on 2 other models, too",
         "ctrl was written ([0 0]): here it must stay",
         "x" * 500,
         "TODO",
@@ -219,7 +219,7 @@ def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path
 
 
 def test_a_roster_gives_every_student_a_row(
-    folder: Path, judged: list[str], tmp_path: Path
+    folder: Path, judged: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     written_all(
         folder,
@@ -235,6 +235,7 @@ def test_a_roster_gives_every_student_a_row(
     table = tmp_path / "t.csv"
     for _ in range(2):  # a row without a file is not a verdict on another one
         main(["check", str(folder), "--roster", str(roster), "--csv", str(table)])
+        assert "4 students have all functions right" in capsys.readouterr().out
         rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
         found = {row["student"]: row for row in rows if row["student"]}
         assert [row["student"] for row in rows[:4]] == ["Ann Smith", "Bo Lee", "Cy", "Zoë"]

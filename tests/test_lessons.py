@@ -605,6 +605,14 @@ _LATER = "Go on later with: statemachine lesson --from "
         ),
         ("state", [(_ASKED, "a\n"), (_MORE, "q\n")], {"more": False}, "", "Next:"),
         (
+            *("state", [(_ASKED, "a\n"), (_MORE, "x\n")], {}),
+            *(f"{_MORE}.*press Enter alone.*{_MORE}", ""),
+        ),
+        (
+            *("hold", [(_ASKED, "b\n"), (_ASKED, "a\n")], {}),
+            *(r"You predicted a; it is c((?!You predicted).)*A result depends", "You had"),
+        ),
+        (
             *("--from state", [(_ASKED, "a\n"), (_MORE, "q\n")], {"more": False}),
             *(f"{_LATER}state", "3 of 10"),
         ),

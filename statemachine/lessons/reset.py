@@ -184,12 +184,12 @@ def _keyframe(number: int, scenes: Mapping[str, Figures]) -> Table:
         (pair, *(count(scene.contacts.get(pair, 0), "contact") for scene in columns))
         for pair in pairs
     ]
-    after = f"of the next {first.nstep} steps: "
-    if first.body is not None:
+    if first.body:
+        after = f"of the next {first.nstep} steps, those in which"
         rows += [
-            (f"{after}the robot touches the {first.body}", *(str(s.robot_steps) for s in columns)),
-            (f"{after}something fixed touches it", *(str(s.world_steps) for s in columns)),
-            (f"meanwhile the {first.body} rises by", *(millimetres(s.rise) for s in columns)),
+            (f"{after} the robot touches the {first.body}", *(str(s.robot_steps) for s in columns)),
+            (f"{after} a fixed body touches it", *(str(s.world_steps) for s in columns)),
+            ("how far it rises in all of them", *(millimetres(s.rise) for s in columns)),
         ]
     return Table(
         ("what touches", *scenes),

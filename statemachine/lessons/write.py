@@ -117,7 +117,6 @@ def _refused(data: Data) -> tuple[tuple[str, str], ...]:
     attempts = {
         "data.qpos = [0.8]": ("qpos", [0.8]),
         "data.xpos = …": (DERIVED[0], getattr(data, DERIVED[0]).copy()),
-        "data.qpso = …": ("qpso", data.qpos.copy()),
     }
     refused = []
     for text, (name, value) in attempts.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 
-from ..grading.class_table import NOTHING, ClassEntry, verdict_word
+from ..grading.class_table import ClassEntry, verdict_word
 from ..grading.judges import JUDGES
 from ..measures.text import count
 from ..page import Figures, Page, Table, Text, Verdict
@@ -56,22 +56,25 @@ def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Pa
     }
     shown = {name: cell for name, cell in columns.items() if any(map(cell, entries))}
     table = Table.of(entries, shown, words=shown, wide={"predictions", "alike"})
-    copies = [(e.name, f"has the same code as {e.same_as}.") for e in entries if e.same_as]
-    looks = [(f"{entry.name}:", look) for entry in entries for look in entry.looks]
-    unjudged = {
-        entry.name: entry.refusal or next(e.remarks[0] for e in entry.functions if not e.judged)
+    notes = [Text(f"{e.name} has the same code as {e.same_as}.") for e in entries if e.same_as]
+    notes += [Text(f"{entry.name}: {look}") for entry in entries for look in entry.looks]
+    # With a roster, files of nobody on it are not counted.
+    counted = [entry for entry in entries if entry.student] or entries
+    unjudged = [
+        Verdict(f"{entry.name}: {why}", False)
         for entry in entries
         if not entry.judged
-    }
+        for why in [entry.refusal or next(e.remarks[0] for e in entry.functions if not e.judged)]
+    ]
     return template.page(
         "classroom",
-        files=count(sum(entry.refusal != NOTHING for entry in entries), "file"),
+        rows=count(len(counted), "student" if counted[0].student else "file"),
         made_with=entries[0].made_with,
         table=table,
-        solved=sum(entry.right == len(JUDGES) for entry in entries),
+        solved=sum(entry.right == len(JUDGES) for entry in counted),
         ignored=", ".join(ignored) or None,
-        notes=[Text(f"{name} {note}") for name, note in (*copies, *looks)],
-        unjudged=[Verdict(f"{n} could not be judged: {why}", False) for n, why in unjudged.items()],
+        notes=notes,
+        unjudged=unjudged,
         all_judged=None if unjudged else True,
     )
 

@@ -84,12 +84,10 @@ class Reader:
         self.show()
         letters = LETTERS[: len(question.choices)]
         while True:
-            typed = self._typed(
-                f"Your prediction ({letters[0]}-{letters[-1]}, Enter to pass, q to stop): "
-            )
+            typed = self._typed(f"Your prediction (a-{letters[-1]}, Enter to pass, q to stop): ")
             if not typed:
                 return None
-            if typed in letters and len(typed) == 1:
+            if typed in [*letters]:
                 return letters.index(typed)
             print(f"Please type one of {', '.join(letters)}.")
 
@@ -101,7 +99,7 @@ class Reader:
         """
         self.show()
         while self._typed(f"Enter for {what} (q to stop) ", end="q"):
-            pass
+            print("Please press Enter alone, or type q.")
 
     def _typed(self, prompt: str, end: str = "") -> str:
         """What the reader types, in small letters; `end` if there is nothing more to come."""

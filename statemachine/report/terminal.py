@@ -102,15 +102,16 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
         if isinstance(block, Heading):
             headings.append(block)
             continue
-        _write(tell, [*headings, block])
+        # What was printed may say it first; a text explains it.
+        shown = [*predicted, block] if isinstance(block, Text) else [block, *predicted]
+        _write(tell, [*headings, *shown])
         headings.clear()
         if reader and predicted:
-            _write(tell, predicted)
             predicted = []
             if following and not isinstance(following, Question):
                 reader.go_on()
     last: list[Block] = []
-    if len(answered) > 1:
+    if len(answered) > 2:  # of so few there is no score
         last.append(Text(f"You had {sum(answered)} of {len(answered)} right."))
     if reader and views and find_spec("viser"):  # else there is nothing to look at it with
         last.append(Text(f"To look at it: {views[0]}"))

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...interface import Array, Model
+from ...measures.text import count
 from ..answers import Answer, kind
 from ..calls import FaultError
 from ..worlds import ExerciseWorld
@@ -83,7 +84,7 @@ def judged(
         passed.append(verdict)
     if len(passed) < len(worlds):
         return None
-    also = f"; right in {len(worlds) - 1} other case{'s' * (len(worlds) > 2)}"
+    also = f"; right on {count(len(worlds) - 1, 'other model')}, too"
     return Judgement(function, True, True, (passed[0] + also,))
 
 
@@ -155,8 +156,7 @@ def same_bits(left: Array, right: Array) -> bool:
 
 def owner(model: Model, place: int) -> str:
     """The joint that a place in qpos belongs to."""
-    starts = model.jnt_qposadr.tolist()
-    return model.joint_names[max(k for k, start in enumerate(starts) if start <= place)]
+    return model.joint_names[int(np.searchsorted(model.jnt_qposadr, place, "right")) - 1]
 
 
 def listed(values: Array, digits: int = 4) -> str:
