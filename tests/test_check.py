@@ -446,7 +446,7 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
 def test_the_solution_passes_on_every_backend(here: Cli, backend: str) -> None:
     done = here("check", str(SOLUTION), "--backend", backend, code=0)
     assert done.stderr == ""
-    assert "4 of 4 functions do what they should" in done.stdout
+    assert "4 of 4 functions right" in done.stdout
 
 
 def test_the_students_file_is_still_to_be_written(here: Cli) -> None:

@@ -173,7 +173,7 @@ def lag_tables(results: Mapping[str, Figures]) -> list[Any]:
                 )
                 for name in _MOMENTS
             ],
-            title="In how many steps each is that of the state before the step, and after it",
+            title="Steps after which an array belongs to the state before the step, or after it",
         ),
         Traces(
             "How far site_xpos is behind after each step",

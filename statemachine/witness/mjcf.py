@@ -306,7 +306,7 @@ _CHANGES = {
     "fromto": "fromto of a site written as pos and axes: {}",
     "still sites": "sites of bodies without a joint written as bodies: {}",
     "root places": "root bodies without a joint, each put into a body that has its place: {}",
-    "root sites": "sites that are fixed to the world, each given a body that stands still: {}",
+    "root sites": "sites fixed to the world, written as sites of bodies that stand still: {}",
     "root bodies": "root bodies put below one body that stands still: {}",
 }
 
