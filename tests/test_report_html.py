@@ -40,7 +40,7 @@ from statemachine.page import (
     Verdict,
 )
 from statemachine.report.compare import page as compared
-from statemachine.report.finding import events_of, headline
+from statemachine.report.finding import events_of, headline, leading, subject
 from statemachine.report.html import Look, check_target, report, write_report
 from statemachine.report.html.geometry import bones_of, mesh_as_data, mesh_of
 from statemachine.report.html.scene import moments_of, rows_at
@@ -338,6 +338,10 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     assert "2e-14° apart" in lead.causes[0]
     late = Figures(time=0.27, what="finger on floor", before=0.01)  # they were apart before
     assert len(headline(comparison, [], explanation_of(hold, touch=late)).causes) == 1
+    # Of two that are as far apart the page names one, here and where it counts agreements.
+    lead = leading(comparison)
+    tied = (replace(lead, max=lead.max * (1 - 1e-9)), *comparison.agreements)
+    assert subject(replace(comparison, agreements=tied), explanation_of(hold))[3] is lead
     # Of another quantity than any that is compared: named as it is.
     other = headline(comparison, [], explanation_of(hold, quantity="box relative to gripperframe"))
     assert other.lead.startswith("The box relative to gripperframe is up to 2.58° apart")
@@ -346,25 +350,36 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
 def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     located = explanation_of(hold, shares=(), explained=0.0, located=1.0)
     assert answer(located).startswith("50.0 % of the 2.58° comes from contact")
-    stays = explanation_of(hold, shares=(), found_in=(), explained=0.0, located=0.0, unexplained=1)
-    assert answer(stays) == "The cause was not found: 100.0 % of the 2.58° is unexplained"
-    for shares in ((-217.0, 127.0), (127.0, -126.5)):
-        rows = zip(explanation_of(hold).shares, shares, strict=True)
+    assert answer(
+        explanation_of(hold, shares=(), found_in=(), explained=0.0, located=0.0, unexplained=1)
+    ).startswith("The cause was not found: 100.0 % of the 2.58°")
+    for part, *parts in (
+        *(("share", -217.0, 127.0), ("share", 127.0, -126.5)),
+        *(("alone", -0.094, 0.0), ("last", -0.094, 0.0)),  # it widens the gap at first, or last
+    ):
+        rows = zip(explanation_of(hold).shares, parts, strict=True)
         masked = explanation_of(
-            hold, shares=[with_figures(row, share=share) for row, share in rows]
+            hold, shares=[with_figures(row, **{part: value}) for row, value in rows]
         )
-        assert answer(masked).startswith("No single difference causes the 2.58°"), shares
+        assert answer(masked).startswith("No single difference causes the 2.58°"), parts
+    still = with_figures(located.found_in[0], is_still=True)
+    assert answer(with_figures(located, found_in=[still])).endswith("a weak hint")
     worse = explanation_of(hold, explained=-0.26, located=1.26)  # all brought over widens the gap
     assert answer(worse).startswith("No single difference causes the 2.58°")
     assert not worse.is_explained
-    switch = {"name": "contact", "values": (("contact", True, False),), "share": 0.1}
-    one_side = explanation_of(hold, shares=(with_figures(worse.shares[0], **switch),))
-    assert answer(one_side) == "50.0 % of the 2.58° comes from contact (left: on, right: off)"
+    switch = with_figures(
+        worse.shares[0], name="contact", values=(("contact", True, False),), share=0.1
+    )
+    assert (
+        answer(explanation_of(hold, shares=(switch,)))
+        == "50.0 % of the 2.58° comes from contact (left: on, right: off)"
+    )
     # Two values that read the same are shown with all their digits.
     close = ("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
     rounded = with_figures(explanation_of(hold).shares[0], values=(close,), unit="rad")
-    found = answer(explanation_of(hold, shares=(rounded,)))
-    assert "1.5708 on the left and 1.570796 on the right" in found
+    assert "1.5708 on the left and 1.570796 on the right" in answer(
+        explanation_of(hold, shares=(rounded,))
+    )
     noisy = explanation_of(hold, floor=0.2 * located.gap)
     (table,) = [block for block in causes(noisy) if isinstance(block, Table)]
     assert [row[3] for row in table.rows] == ["60.0 %", "< 20.0 %", "50.0 %*"]
@@ -376,9 +391,9 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         if isinstance(block, Table)
     ]
     assert [row[0] for row in table.rows] == ["Servo law", "Contact", "2 more, none above 0.1 %"]
-    chaos = explanation_of(hold, floor=0.04)
-    assert answer(chaos).startswith("Nothing can be concluded: the gap is 2.58°, and the chaos")
-    assert chaos.is_rounding
+    assert answer(explanation_of(hold, floor=0.04)).startswith(
+        "Nothing can be concluded: the gap is 2.58°, and the chaos"
+    )
     assert answer(explanation_of(hold, negligible=1.0)).startswith("The two sides move alike")
     # Where something cannot be brought to the same, a location is not an explanation.
     refused = with_figures(located.found_in[0], share=1.0)
@@ -405,8 +420,10 @@ def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
         assert bar("Servo law") == pytest.approx((0.0, 0.3), abs=0.02)
         assert bar("Armature") == pytest.approx((-0.05, 0.0), abs=0.02)
         assert bar("Contact") == pytest.approx((0.0, 0.25), abs=0.02)
-        (step,) = tab.locator("#agree ul li").all_inner_texts()
-        assert step.replace("\u00a0", " ") == "servo law: its motors → kp 998.2"
+        steps = tab.locator("#agree ul li").all_inner_texts()  # all that was brought over
+        assert [step.replace("\u00a0", " ") for step in steps] == [
+            f"{name}: its motors → kp 998.2" for name in ("servo law", "armature")
+        ]
     assert 'id="agree"' not in page_of(hold)
 
 

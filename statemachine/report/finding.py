@@ -181,7 +181,7 @@ def subject(
         and abs(agreement.max - gap.worst) <= 1e-6 * gap.worst
     ]
     who = f"one of the {quantities}" if kind else f"the {quantities}"
-    first = same[0] if same else None
+    first = max(same, key=lambda a: a.max, default=None)  # as `leading`
     far = quantity(gap.worst, explanation.unit)
     return named(first) if first else who, far, gap.at, first
 

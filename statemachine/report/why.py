@@ -40,8 +40,9 @@ ANSWERS = {
     "chaos": "Nothing can be concluded: the gap is {gap}, and the chaos floor {floor}",
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
-    "masked": "No single difference causes the {gap}: the differences hide one another",
-    "located": "{part} of the {gap} comes from {cause}: no setting that differs makes it",
+    "masked": "No single difference causes the {gap}: the differences act together",
+    "located": "{part} of the {gap} comes from {cause}, which no setting makes the same",
+    "still": "{part} of the {gap} goes without {cause}, but so does the motion: a weak hint",
     "switched": "{part} of the {gap} comes from {cause} (left: {left}, right: {right})",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
 }
@@ -109,8 +110,8 @@ def answer(result: Explanation) -> str:
     causes = [row for row in result.shares if row.share]
     places = sorted(result.found_in, key=lambda place: -place.share)
     parts = {
-        "cause": max((abs(row.share or 0.0) for row in causes[:1]), default=0.0),
-        "located": max((place.share for place in places), default=0.0),
+        "cause": abs(causes[0].share) if causes else 0.0,
+        "located": places[0].share if places else 0.0,
         "unexplained": result.unexplained,
     }
     kind = max(parts, key=parts.__getitem__)
@@ -121,6 +122,7 @@ def answer(result: Explanation) -> str:
         cause = f"the {places[0].name}" if places[0].values else places[0].name
         # What only one side has is a setting, and closes the gap only where both are without it.
         switches = [_values(row) for row in result.shares if row.name == places[0].name]
+        kind = "still" if places[0].is_still else kind
         kind, (left, right) = ("switched", switches[0]) if switches else (kind, (left, right))
     elif kind == "cause":
         cause, (left, right) = capital(causes[0].name), _values(causes[0])
@@ -133,8 +135,8 @@ def proofs(result: Explanation) -> tuple[str, ...]:
     touch = result.touch
     if touch is None or not touch.time or touch.before >= _PROOF * result.gap:
         return ()
-    time, before = short_time(touch.time), _amount(result, touch.before)
-    return (TOUCH.format(what=touch.what, time=time, before=before),)
+    before = _amount(result, touch.before)
+    return (TOUCH.format(what=touch.what, time=short_time(touch.time), before=before),)
 
 
 def causes(result: Explanation) -> list[Block]:
@@ -148,7 +150,7 @@ def causes(result: Explanation) -> list[Block]:
     hardly = _hardly(result, able)
     gap, method = result.first[result.quantity], result.method
     others = [
-        f"{name} {quantity(other.worst, other.unit)}"
+        f"{name.replace(',', '')} {quantity(other.worst, other.unit)}"
         for name, other in result.first.items()
         if name != result.quantity
     ]
@@ -159,11 +161,11 @@ def causes(result: Explanation) -> list[Block]:
         worst=quantity(gap.worst, gap.unit),
         rms=quantity(gap.rms, gap.unit),
         end=quantity(gap.end, gap.unit),
-        elsewhere=", ".join(others) or None,
+        elsewhere="; ".join(others) or None,
         between=if_true(result.between),
         negligible=_amount(result, result.negligible) if result.is_rounding and small else None,
         chaos=floor if result.is_rounding and not small else None,
-        same=if_true(not result.shares and not result.found_in),
+        same=if_true(not (result.shares or result.found_in)),
         table=_table(result, able, hardly),
         more=few([row.name for row in hardly], 6) or None,
         located=[
@@ -173,6 +175,7 @@ def causes(result: Explanation) -> list[Block]:
                 "why_located",
                 cause=None if place.values or place.is_still else place.name,
                 idle=place.name if place.is_still and not place.values else None,
+                still=result.quantity,
                 integrator=place.values and place.without,
             )
         ],
@@ -202,13 +205,11 @@ def steps(result: Explanation) -> list[Block]:
     if result.is_rounding:
         return []
     lines, least = [], max(_NO_PART, result.floor / result.gap)
-    changed = [row for row in result.shares if not (row.note or row.chosen)]
-    for row in changed:
-        if (row.share or 0.0) >= least and row.share > -(row.last or 0.0):
-            left, right = _values(row)
-            place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
-            change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
-            lines.append(f"{place}{row.name}: {change.format(left=left, right=right)}")
+    for row in _at_least(least, [r for r in result.shares if not (r.note or r.chosen)]):
+        left, right = _values(row)
+        place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
+        change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
+        lines.append(f"{place}{row.name}: {change.format(left=left, right=right)}")
     side, integrator = next((row.chosen for row in result.shares if row.chosen), (None, None))
     return template.blocks(
         "why_changes",
@@ -216,14 +217,17 @@ def steps(result: Explanation) -> list[Block]:
         changes=Items(lines),
         side=side,
         integrator=integrator,
-        left=_amount(result, result.brought) if changed and result.brought is not None else None,
+        left=_amount(result, result.brought) if lines and result.brought is not None else None,
     )
 
 
 def parts(result: Explanation) -> str:
     """The three parts of a gap, in a sentence without its end."""
-    names = ("explained", "located", "unexplained")
-    return PARTS.format(**{name: percent(getattr(result, name)) for name in names})
+    return PARTS.format(
+        explained=percent(result.explained),
+        located=percent(result.located),
+        unexplained=percent(result.unexplained),
+    )
 
 
 def three_parts(result: Explanation) -> list[Block]:
@@ -262,13 +266,13 @@ def _table(result: Explanation, able: Sequence[Figures], small: Sequence[Figures
 
 def _hardly(result: Explanation, able: Sequence[Figures]) -> list[Figures]:
     """The differences without an effect, if there are several."""
-    small = [
-        row
-        for row in able
-        if not result.is_rounding
-        and max(abs(part or 0.0) for part in (row.share, row.alone, row.last)) < _NO_PART
-    ]
-    return small if len(small) > 1 else []
+    large = able if result.is_rounding else _at_least(_NO_PART, able)
+    return [row for row in able if row not in large] if len(able) > len(large) + 1 else []
+
+
+def _at_least(part: float, rows: Sequence[Figures]) -> list[Figures]:
+    """The causes that take away so much of the gap: in the mean, alone, or last."""
+    return [r for r in rows if max(abs(p or 0.0) for p in (r.share, r.alone, r.last)) >= part]
 
 
 def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
@@ -281,17 +285,9 @@ def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
     if row.error and math.isfinite(row.error):
         explains += f" ± {percent(row.error)}"
     noise = 0.0 if result.is_rounding else result.floor / result.gap
-    if result.is_rounding:
-        explains, alone, last = NONE, NONE, NONE
-    elif abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
+    if abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
         explains, alone, last = f"< {percent(noise)}", NONE, NONE
-    return (
-        what,
-        *_values(row),
-        TableCell(explains, share=None if result.is_rounding else row.share),
-        alone,
-        last,
-    )
+    return what, *_values(row), TableCell(explains, share=row.share), alone, last
 
 
 def _values(row: Figures) -> tuple[str, str]:

@@ -109,7 +109,7 @@ def built(model: Model, edits: tuple[Edit, ...]) -> Model:
     return model.with_compiled(room(DEFAULT).edited(model.compiled, edits))
 
 
-def causes(differences: Iterable[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:
+def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:
     """Differences as causes: what was changed alike in several elements is one.
 
     A changed default of a file's class is such a change; so are masses and moments of inertia that
@@ -117,10 +117,9 @@ def causes(differences: Iterable[ModelDifference], finer: bool = False) -> tuple
     are one.
 
     Args:
-        differences: In their order.
+        rows: Differences, in their order.
         finer: Each by itself, however many there are.
     """
-    rows = list(differences)
     able = [row for row in rows if not row.refused]
     refused = _grouped([row for row in rows if row.refused], lambda row: row.title)
     if finer:
@@ -209,7 +208,7 @@ def order_of_ctrl(matched: Matched) -> tuple[ModelDifference, ...]:
 
 def order_of_joints(matched: Matched) -> tuple[str, ...]:
     """What a function of the user's may stumble over."""
-    places = [int(matched.right.jnt_qposadr[b]) for _, b in matched.joints]
+    places = [matched.right.jnt_qposadr[b] for _, b in matched.joints]
     if places == sorted(places):
         return ()
     return (

@@ -87,12 +87,18 @@ class Explanation(Figures):
 
     @property
     def is_masked(self) -> bool:
-        """Whether the differences hide one another, so that none of them causes the gap.
+        """Whether the differences act together, so that none of them causes the gap.
 
-        All of them together widen it, or the largest share is below zero or above twice the gap.
+        All of them together widen it; or the largest share, where no more is located, is above
+        twice the gap, or its cause widens the gap: by its share, alone, or after all others.
         """
-        largest = next((row.share for row in self.shares if row.share), 0.0)
-        return min(self.explained, largest) < -UNEXPLAINED or largest > _MASKED
+        parts = [
+            part or 0.0
+            for row in self.shares[:1]
+            if abs(row.share or 0.0) > self.located
+            for part in (row.share, row.alone, row.last)
+        ]
+        return min(self.explained, *parts) < -UNEXPLAINED or parts[:1] > [_MASKED]
 
 
 def explain(
@@ -212,9 +218,8 @@ def explain(
     redundant = [
         row.name
         for row in shares
-        if row.alone is not None
-        and row.last is not None
-        and row.alone > 1.0 - UNEXPLAINED
+        if row.last is not None
+        and (row.alone or 0.0) > 1.0 - UNEXPLAINED
         and abs(row.last) < UNEXPLAINED
     ]
     progress(1.0)

@@ -253,7 +253,7 @@ def _along(game: _Game, order: Sequence[str]) -> dict[str, float]:
 
 
 _NOTHING = 1e-6  # of the gap: what is less is left alone
-_LEAST = 0.5  # of what was left: what takes less away does not count
+_LEAST, _LEAST_SET = 0.5, 0.05  # of what was left: less does not count; of a setting of one side
 _STILL = 0.1  # of the left's own motion: less is no motion any more
 
 
@@ -269,7 +269,8 @@ def locate(
     """Leave features out on both sides, each on top of those that count.
 
     The integrator comes first, of the sides that have several, and is tried again once something is
-    left out: what differs by it may be hidden by what was left.
+    left out: what differs by it may be hidden by what was left. Where only one side has several it
+    is a setting as any other, and need not take away half.
 
     Args:
         trials: The runs.
@@ -300,23 +301,21 @@ def locate(
             break
         more = without | {feature.name} if feature else without
         choices = [integrator] if feature or integrator else trials.integrators
-        rests = {
-            choice: getattr(gaps[quantity], measure)
+        rests = [
+            (getattr(gaps[quantity], measure), choice)
             for choice in choices
             if (gaps := trials.gaps(brought, more, choice))
-        }
-        best = min(rests, key=rests.__getitem__, default="")
-        rest = rests.get(best, left)
-        if not rest < _LEAST * left:
+        ]
+        rest, best = min(rests, default=(left, ""))
+        setting = len(trials.selects) == 1 and not more
+        if left - rest <= (_LEAST_SET if setting else _LEAST) * left:
             continue
         without, integrator = more, best
-        setting = len(trials.selects) == 1 and not feature and not without
-        values = None if feature else (trials.integrator_of(0), trials.integrator_of(1))
         rows.append(
             Figures(
                 name=feature.name if feature else "integrator",
                 without=feature.without if feature else best,
-                values=values,
+                values=None if feature else (trials.integrator_of(0), trials.integrator_of(1)),
                 share=(left - rest) / gap,
                 gap=rest,
                 is_still=trials.extent(quantity, without) < _STILL * trials.extent(quantity),

@@ -161,7 +161,9 @@ class Trials:
             files = differences_of(
                 left, right, self._matched, not own, finer, sensors=self._scenario.own
             )
-            rows += [row for row in files if (row.kind, row.subject) != ("option", "timestep")]
+            # An integrator that one side does not read is chosen on the other, see `locate`.
+            apart = ("timestep", "integrator" * (len(self.selects) == 1))
+            rows += [row for row in files if row.subject not in apart]
             rows += of_the_run(self._matched, self._starts, self._keyframes[1])
         if self._recordings:
             left_recording, right_recording = self._recordings
@@ -201,8 +203,8 @@ class Trials:
     def touch(self, quantity: str) -> Figures | None:
         """The first contact of either side; None where nothing touches, or it is not told."""
         left, right = (self._runs[_Run(side, _NONE)].curves for side in (0, 1))
-        gap = self.ruler.distances(quantity, left, right) if left and right else None
-        return None if gap is None else first_touch(self.traces, self.ruler.time, gap)
+        gap = self.ruler.distances(quantity, left, right)
+        return first_touch(self.traces, self.ruler.time, gap)
 
     @property
     def needs(self) -> dict[str, str]:
@@ -226,8 +228,10 @@ class Trials:
     def _pair(
         self, brought: frozenset[str], without: frozenset[str] = _NONE, integrator: str = ""
     ) -> list[_Run]:
-        chosen = [integrator if k in self.selects else "" for k in (0, 1)]
-        return [_Run(side, self._acting(side, brought), without, chosen[side]) for side in (0, 1)]
+        return [
+            _Run(k, self._acting(k, brought), without, integrator if k in self.selects else "")
+            for k in (0, 1)
+        ]
 
     @property
     def selects(self) -> tuple[int, ...]:
