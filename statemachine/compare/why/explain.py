@@ -98,7 +98,7 @@ class Explanation(Figures):
             if abs(row.share or 0.0) > self.located
             for part in (row.share, row.alone, row.last)
         ]
-        return min([self.explained, *parts]) < -UNEXPLAINED or parts[:1] > [_MASKED]
+        return min([self.explained, *parts]) < -UNEXPLAINED or parts > [_MASKED]  # by the first
 
 
 def explain(
