@@ -97,10 +97,10 @@ picture: $(VENV)/test.stamp
 urdf: $(VENV)/run.stamp
 	@$(BIN)/python models/so101/make_urdf.py
 
-# make extras       what figures, films, the viewer and parquet need, too
+# make extras       what figures, films, the viewer, sweeps and parquet need, too
 extras: $(VENV)/run.stamp
-	@echo "adding figures, films, the viewer and parquet: about half a minute ..."
-	@$(PIP) $(CONSTRAINTS) -e '.[plot,render,mp4,view,parquet]'
+	@echo "adding figures, films, the viewer, sweeps and parquet: about half a minute ..."
+	@$(PIP) $(CONSTRAINTS) -e '.[plot,render,mp4,view,sweep,parquet]'
 
 # make report       where the engines part when the arm is told one pose, and why: hold.html
 report: $(VENV)/run.stamp

@@ -75,6 +75,8 @@ class _Parser(argparse.ArgumentParser):
                 message += f"; it is an option of {PROGRAM} lesson {' and '.join(others)}"
             else:
                 message += did_you_mean(given, known, 0.6)
+        elif message.startswith("unrecognized arguments: "):
+            message += "; a command that takes one model takes it as --model FILE"
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
 

@@ -124,6 +124,13 @@ FALLING_BAR = """<mujoco><option timestep="0.01" integrator="{integrator}">{flag
     <geom name="floor" type="plane" size="5 5 1"/></worldbody></mujoco>"""
 
 
+# It starts outside of its limits: at 10 ms what pushes it back is stiff.
+BAR_OUTSIDE = """<mujoco><option timestep="0.01"/><worldbody><body>
+  <joint axis="0 1 0" range="30 70" damping="{damping}" armature="1"/>
+  <geom type="capsule" size=".08" fromto="0 0 0 .4 .4 0" density="5"/></body>
+  </worldbody></mujoco>"""
+
+
 ROTOR = """<mujoco><option timestep="{timestep}" integrator="implicitfast"/><worldbody>
   <body><joint name="rotor" axis="0 0 1"/><geom type="cylinder" size=".1 .01"/></body>
   <body pos="1 0 0"><joint name="rail" type="slide" axis="0 0 1"/><geom size=".1"/></body>

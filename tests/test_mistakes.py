@@ -289,6 +289,7 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("compare waves --why --seed=-1", ""),
         ("sweep hold --out t --fit x", "goes with --report"),
         ("sweep hold", "--report DIR"),
+        ("audit arm.xml", "takes it as --model FILE"),
         ("sweep hold --out t --report d", "takes no folder"),
         ("sweep --report .", "is not a sweep"),
         ("sweep hold --out ''", "has no name"),

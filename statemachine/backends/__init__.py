@@ -123,7 +123,8 @@ def load(
 ) -> Model:
     """Compile a model's file into a Model. The slow part, done once.
 
-    Shapes that are more than 1 mm inside each other at the start are an EngineWarning.
+    Shapes that are more than 1 mm inside each other at the start are an EngineWarning, unless
+    contacts are off.
 
     Args:
         model: A name ("so101/scene_box") or a path; see `models.resolve`.
@@ -166,7 +167,7 @@ def load(
     loaded = loader(path, defaults=defaults, **early)
     if options and not takes_options:
         loaded = loaded.replace(**options)
-    if pairs := few(overlaps_at_start(loaded)):
+    if options.get("contacts", True) and (pairs := few(overlaps_at_start(loaded))):
         text = f"{path.name}: shapes are inside each other at the start: {pairs}"
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded

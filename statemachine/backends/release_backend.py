@@ -94,8 +94,7 @@ def served(
             ),
             error=ModelError,
         )
-        installed = load_installed(path, defaults)
-        return ServedModel(_compiled(engine, installed), capabilities)
+        return ServedModel(_compiled(engine, load_installed(path, defaults)), capabilities)
 
     return load_there
 

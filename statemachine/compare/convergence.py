@@ -8,13 +8,14 @@ law of an engine depends on its timestep, and the runs have no common limit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import EndedEarlyError
-from ..interface import Array, Ints
+from ..interface import Array
 from ..measures import common_moments
 from ..page import Figures
 from ..runs import Trace
@@ -22,10 +23,13 @@ from ..runs.drive import Progress, silent
 from .labels import labels_of
 from .series import Series, default_tip, series
 
-FINER = (1, 2, 4)  # engine steps to one of the first runs
+FINER = (1, 2, 4, 8, 16)  # engine steps to one of the first runs; from 8 on, where it is unclear
 _ROUNDING = 1e-9  # of the largest value of a quantity, or of 1
-_FIRST_ORDER = 1.6  # the least ratio of two gaps, one with half of the other's steps
-_PART, _MOST = 0.1, 0.75  # of the gap: less is left by chance, more is all of it
+# What a halving divides a gap by, at orders from 0.7 (Euler's is 1) to 4.5 (RK4's is 4).
+_SLOWEST, _FASTEST = 2**0.7, 2**4.5
+_MARGIN = 0.25  # of an extrapolation, that it may be off: a safety factor of 1.25 (Roache)
+_LEVEL = 0.85  # of the largest of three gaps: then three quarters are left, at any such order
+_MOST = 0.75  # of the first gap: with so much left, it stays
 
 Limit = Literal["rounding", "discretisation", "stays", "in part", "unclear"]
 
@@ -35,7 +39,7 @@ def convergence(
     *,
     progress: Progress = silent,
 ) -> Figures:
-    """Run two sides with their steps as given, halved and quartered.
+    """Run two sides with their steps as given, halved and quartered; then finer, while unclear.
 
     Args:
         run: Gives the traces of both sides, with rows as far apart as ever and so many times as
@@ -46,39 +50,39 @@ def convergence(
         What was found, by name.
 
         - labels: The two sides.
-        - steps: The engine's steps of the left side and of the right one [s], as given; they are
-          halved and quartered.
+        - steps: The engine's steps of the left side and of the right one [s], as given.
         - until: The last moment that is compared [s].
         - touch: When something touches first in any of the runs [s]; None if nothing does.
         - before: Each quantity until then, see `_limit`; of a run that begins with a touch there is
           none.
         - whole: Each quantity over all of the run; the same as `before` if nothing touches.
         - vanishes: Whether no gap is more than discretisation, over the whole run.
+        - unclear: Whether some gap has no steady order.
 
     Raises:
         EndedEarlyError: A run ends before its time.
         TraceError: The sides have too few moments in common.
     """
-    runs = []
-    for k, finer in enumerate(FINER):
+    runs, result = [], Figures()
+    for finer in FINER:
         runs.append(run(finer))
-        progress((k + 1) / len(FINER))
+        progress(finer / FINER[-1])
         for trace in runs[-1]:
             if trace.header.ended:
                 raise EndedEarlyError(
                     f"with steps {finer} times finer, {trace.header.label} ended early: "
                     f"{trace.header.ended}"
                 )
+        if len(runs) >= 3 and not (result := _result(runs)).unclear:
+            break
+    return result
+
+
+def _result(runs: list[tuple[Trace, Trace]]) -> Figures:
     left, right = runs[0]
     tip = default_tip(left.header, right.header)
-    common = common_moments(left.time, right.time, (left.timestep, right.timestep))
-    time = common.time
-    # Of the pairs of sides; then of each side's first runs and its finest.
-    between = [_gaps(a, b, tip) for a, b in runs]
-    own = [
-        [_gaps(pair[side], runs[-1][side], tip, rows) for pair in runs[:-1]]
-        for side, rows in ((0, common.left), (1, common.right))
-    ]
+    time = common_moments(left.time, right.time, (left.timestep, right.timestep)).time
+    between = [{c.name: c.difference for c in series(*pair, tip)} for pair in runs]
     curves = [
         curve
         for curve in series(left, right, tip)
@@ -93,7 +97,7 @@ def convergence(
     touch = min((first for first in firsts if first <= time[-1]), default=None)
     early = time < (np.inf if touch is None else touch - 1e-9)
     whole, before = (
-        tuple(_limit(curve, between, own, chosen) for curve in curves if chosen.any())
+        tuple(_limit(curve, between, chosen) for curve in curves if chosen.any())
         for chosen in (np.ones(len(time), dtype=bool), early)
     )
     return Figures(
@@ -107,61 +111,72 @@ def convergence(
         before=before,
         whole=whole,
         vanishes=all(limit.verdict in ("rounding", "discretisation") for limit in whole),
+        unclear=any(limit.verdict == "unclear" for limit in (*whole, *before)),
     )
-
-
-def _gaps(
-    left: Trace, right: Trace, tip: str, rows: Ints | slice = slice(None)
-) -> dict[str, Array]:
-    return {curve.name: curve.difference[rows] for curve in series(left, right, tip)}
 
 
 def _limit(
     curve: Series,
     between: list[dict[str, Array]],
-    own: list[list[dict[str, Array]]],
     chosen: NDArray[np.bool_],
 ) -> Figures:
     """One quantity at some of the moments (n,), with finer and finer steps.
 
     Returns:
         name, kind, unit: As of an Agreement.
-        gaps: The largest gap between the sides, with the steps as given, halved and quartered.
-        left: How far the left side's run with the steps as given, and with halved ones, is from
-            its run with the finest; right: the same of the right side.
-        limit: What the gap tends to for steps of no length, on the line through the last two.
-        verdict: "rounding" where there is no gap; "discretisation" if each halving takes away
-            half of it or about that, and nothing is left; "stays" if three quarters or more are
-            there with the finest steps; "in part" if less is left, but some; "unclear" if it does
-            not shrink from run to run.
+        gaps: The largest gap between the sides, with the steps as given, halved, quartered, ….
+        limit: What the gap tends to for steps of no length; None where that is not known.
+        verdict: "rounding" where there is no gap; "discretisation" if it tends to nothing;
+            "stays" if it tends to three quarters of the first gap or more; "in part" if it tends
+            to less; "unclear" if it has no steady order.
     """
-    name = curve.name
-    gaps = [float(run[name][chosen].max()) for run in between]
-    left, right = (
-        [float(run[name][chosen].max()) if name in run else np.nan for run in side] for side in own
-    )
+    gaps = [float(run[curve.name][chosen].max()) for run in between]
     values = curve.left[chosen] if curve.left.size else np.ones(1)
     rounding = _ROUNDING * max(1.0, float(np.abs(values).max()))
-    limit = max(0.0, 2 * gaps[2] - gaps[1])
+    verdict, limit = verdict_of(gaps, rounding)
     return Figures(
-        name=name,
+        name=curve.name,
         kind=curve.kind,
         unit=curve.unit,
         gaps=gaps,
-        left=left,
-        right=right,
         limit=limit,
-        verdict=_verdict(gaps, limit, rounding),
+        verdict=verdict,
     )
 
 
-def _verdict(gaps: list[float], limit: float, rounding: float) -> Limit:
-    first, second, third = gaps
-    if first <= rounding:
-        return "rounding"
-    if third >= _MOST * first:
-        return "stays"
-    if limit > max(_PART * first, rounding):
-        return "in part" if third <= second <= first else "unclear"
-    ratios = first / max(second, rounding), second / max(third, rounding)
-    return "discretisation" if min(ratios) >= _FIRST_ORDER or third <= rounding else "unclear"
+def verdict_of(gaps: list[float], rounding: float) -> tuple[Limit, float | None]:
+    """What becomes of a gap, and what it tends to.
+
+    Three gaps give the observed order of convergence and the limit (Richardson's extrapolation;
+    P. J. Roache, "Quantification of uncertainty in computational fluid dynamics", Annual Review
+    of Fluid Mechanics 29, 1997). That holds only where the order is steady. A gap is an absolute
+    distance, and the greatest of a run: where the limits of the two sides differ, it may cross
+    zero on its way, and another moment or touch may become the greatest. So two triples in a row,
+    of four gaps, must say that something is left. Nothing is left where each of three halvings
+    divides the gap by what an order does: of a gap c + a·h less than a tenth of the first can
+    be. Three gaps that are level need no order.
+
+    Args:
+        gaps: Three or more, each with half of the steps of the one before.
+        rounding: No gap is less.
+    """
+    if gaps[-1] <= rounding:
+        return ("rounding", None) if max(gaps) <= rounding else ("discretisation", 0.0)
+    last = gaps[-3:]
+    if min(last) >= _LEVEL * max(last):
+        return ("stays" if last[-1] >= _MOST * gaps[0] else "in part"), None
+    if len(gaps) > 3 and all(a >= _SLOWEST * b for a, b in pairwise(gaps[-4:])):
+        return "discretisation", 0.0
+    before, now = (_extrapolated(gaps[0], *gaps[k:][:3]) for k in (-4, -3))
+    return now if len(gaps) > 3 and before[0] == now[0] else ("unclear", None)
+
+
+def _extrapolated(
+    first: float, coarse: float, middle: float, fine: float
+) -> tuple[Limit, float | None]:
+    ratio = (coarse - middle) / (middle - fine or np.inf)  # 2 to the power of the order
+    rest = (middle - fine) / (ratio - 1 or np.inf)
+    limit = fine - rest
+    if limit <= _MARGIN * abs(rest) or not _SLOWEST <= ratio <= _FASTEST:
+        return "unclear", None
+    return ("stays" if limit >= _MOST * first else "in part"), limit

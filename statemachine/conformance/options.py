@@ -78,8 +78,7 @@ def check_latency_delays_a_command(lab: Lab) -> None:
     Weightless and at rest nothing else tells the moments apart. A latency is rounded up.
     """
     arm = lab.arm.replace(gravity=[0, 0, 0])
-    random = np.random.default_rng(3)
-    commands = random.uniform(-0.1, 0.1, (40, arm.nu))
+    commands = np.random.default_rng(3).uniform(-0.1, 0.1, (40, arm.nu))
     h = arm.timestep
 
     def poses(model: Model) -> Array:

@@ -210,5 +210,4 @@ def _array(dtype: str, shape: list[int], data: str) -> Any:
         (negative or len(shape) > 16 or size != len(content), "an array of another size"),
         error=ValueError,
     )
-    array = np.frombuffer(content, kind).reshape(shape)
-    return array.astype(kind.newbyteorder("="))
+    return np.frombuffer(content, kind).reshape(shape).astype(kind.newbyteorder("="))

@@ -174,8 +174,7 @@ def enrolled(submitted: Sequence[Submission], roster: Path) -> list[Submission]:
     """
     try:
         text = roster.read_text(encoding="utf-8-sig")
-        most = max(",;\t", key=text.count)
-        rows = csv.reader(text.splitlines(), delimiter=most)
+        rows = csv.reader(text.splitlines(), delimiter=max(",;\t", key=text.count))
         cells = [list(filter(None, map(str.strip, row))) for row in rows]
     except (OSError, UnicodeError, csv.Error) as error:
         raise BadInputError(f"the roster {roster.name} cannot be read: {error}") from None

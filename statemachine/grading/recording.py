@@ -153,8 +153,7 @@ def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
         case "answer" if recording.began:
             recording.answers.append(decode(facts["answer"]))
         case "fault" if recording.began:
-            written = facts["written"] is True
-            recording.answers.append(FaultError(_text(facts["text"]), written))
+            recording.answers.append(FaultError(_text(facts["text"]), facts["written"] is True))
         case _:
             raise ValueError("a line in the wrong place")
 

@@ -266,7 +266,7 @@ def _gap_in_full(gap: RunGap | None) -> str:
     ]
     parts = [", ".join(known) or NONE]
     if gap.shrinks is not None:
-        parts.append(f"{gap.shrinks:.3g} times that at half the timestep")
+        parts.append(f"divided by {gap.shrinks:.3g} at half the timestep")
     if gap.floor is not None:
         parts.append(f"rounding alone makes {rough(gap.floor)}")
     if gap.ended:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..compare import Comparison, Request
+from ..compare.convergence import FINER
 from ..compare.stages import FORCES
 from ..measures.text import (
     NONE,
@@ -16,6 +17,7 @@ from ..measures.text import (
     quantity,
     sentence,
     short_time,
+    significant,
 )
 from ..page import Bars, Code, Figures, Headline, Items, Page, Table
 from . import template
@@ -25,9 +27,9 @@ from .template import if_true
 LEADS = {
     "rounding": "There is no gap beyond rounding, whatever the timestep",
     "vanishes": "The gap vanishes with the timestep: it is discretisation",
-    "neither": "The gap neither vanishes with the timestep nor stays as it is",
+    "unclear": "It is unclear whether the gap vanishes with the timestep: it has no steady order",
     "stays": "The gap does not vanish with the timestep: that of {name} is {coarse}, and {fine} "
-    "with a quarter of it",
+    "with the finest steps",
 }
 TOUCH = {
     True: "Before the first touch, at {touch}, there is no gap.",
@@ -36,6 +38,7 @@ TOUCH = {
 
 
 _STAGE_HEADS = ("differs", "first", "largest", "at, s", "where", "from, s", "null", "tolerance")
+_FINER = ("at h", *(f"h/{finer}" for finer in FINER[1:]))
 
 
 def convergence(result: Figures, experiment: str) -> Page:
@@ -55,31 +58,30 @@ def convergence(result: Figures, experiment: str) -> Page:
         right=result.labels[1],
         until=result.until,
         steps=" and ".join(dict.fromkeys(milliseconds(step, 3) for step in result.steps)),
-        before=_limits(result.before, title) if at else None,
+        before=_limits(result.before, title) if result.before and at else None,
         whole=_limits(result.whole, "The gap with finer steps, over the whole run"),
         touch=if_true(at),
-        left_most=_own(result.whole, "left"),
-        right_most=_own(result.whole, "right"),
+        quarter=significant(min(result.steps) / 4) if result.unclear else None,
     )
 
 
 def _limits(limits: Sequence[Figures], title: str) -> Table:
+    levels = len(limits[0].gaps)
     return Table.of(
         limits,
         {
             "quantity": lambda limit: name_of(limit.name),
             "the gap is": lambda limit: limit.verdict,
-            "at h": lambda limit: quantity(limit.gaps[0], limit.unit),
-            "h/2": lambda limit: quantity(limit.gaps[1], limit.unit),
-            "h/4": lambda limit: quantity(limit.gaps[2], limit.unit),
+            **{
+                head: lambda limit, k=k: quantity(limit.gaps[k], limit.unit)
+                for k, head in enumerate(_FINER[:levels])
+            },
             "at 0": lambda limit: quantity(limit.limit, limit.unit),
-            "left's own": lambda limit: quantity(limit.left[0], limit.unit),
-            "right's own": lambda limit: quantity(limit.right[0], limit.unit),
         },
         title,
         words={"the gap is"},
         emphasis=lambda limit: limit.verdict in ("stays", "in part"),
-        wide={"left's own", "right's own"},
+        wide=_FINER[1 : levels - 3],
     )
 
 
@@ -88,23 +90,16 @@ def _of_the_limit(result: Figures, touch: str) -> Headline:
         verdicts = {limit.verdict for limit in result.whole}
         return Headline(LEADS["vanishes" if verdicts - {"rounding"} else "rounding"])
     stay = [limit for limit in result.whole if limit.verdict in ("stays", "in part")]
-    lead = LEADS["neither"]
+    lead = LEADS["unclear"]
     if stay:
         same = (limit for limit in stay if limit.unit == stay[0].unit)
-        most = max(same, key=lambda limit: limit.gaps[2])
-        coarse, fine = (quantity(most.gaps[k], most.unit) for k in (0, 2))
+        most = max(same, key=lambda limit: limit.gaps[-1])
+        coarse, fine = (quantity(most.gaps[k], most.unit) for k in (0, -1))
         lead = LEADS["stays"].format(name=name_of(most.name), coarse=coarse, fine=fine)
     before = {limit.verdict for limit in result.before}
     tells = touch and before and before <= {"rounding", "discretisation"}
     end = TOUCH[before == {"rounding"}].format(touch=touch) if tells else ""
     return Headline(lead, end=end, holds=False)
-
-
-def _own(limits: Sequence[Figures], side: str) -> str | None:
-    """How far a side moves itself at most when its steps get finer, and in what."""
-    known = [limit for limit in limits if limit.unit == limits[0].unit]
-    most = max(known, key=lambda limit: getattr(limit, side)[0], default=None)
-    return most and f"{quantity(getattr(most, side)[0], most.unit)} ({name_of(most.name)})"
 
 
 def one_step(result: Figures, labels: tuple[str, str], experiment: str) -> Page:

@@ -247,7 +247,8 @@ NONE_FITTED = {
 LINES = {
     "not fitted": "{label} is not fitted: {why_not}.",
     "own": "The model's own {label} is the best already: at {value}, {sizes}.",
-    "none": "No value of {label} is better than {other}: at the best, {value}, {sizes}.",
+    "none": "No value of {label} is better than {other} by more than 10 %: at the best, "
+    "{value}, {sizes}.",
     "edge": "{label} {where}: the gap is least at the edge of the range, {value} ({sizes}): look "
     "beyond it.",
     "together": "{label} = {value} {where} brings {pair} together: {sizes}.",

@@ -115,6 +115,10 @@ TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
 _PART = 0.25  # of its range: how far a servo is sent
 _FARTHEST = {JointType.HINGE: 0.5, JointType.SLIDE: 0.1}  # rad, m; of a wide range or none
 _OUTSIDE = 1e-3  # rad, m; less is how a file rounds its numbers
+_START = (
+    "the run starts outside of joint limits [rad or m]: {joints}. A keyframe of the file "
+    "(--keyframe NAME) can start it inside"
+)
 _NO_FORCE = 1e-9  # N·m or N; less is rounding
 _DIGITS = 4  # of what is computed, so that it can be typed and is the same on every engine
 
@@ -129,14 +133,14 @@ def warn_of_start(model: Model, qpos: Array) -> None:
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     joints = np.flatnonzero(scalar & model.jnt_limited)
     at, (low, high) = qpos[model.jnt_qposadr[joints]], model.jnt_range[joints].T
-    names = [model.joint_names[joint] or f"joint {joint}" for joint in joints]
+    beyond = np.maximum(low - at, at - high)
     outside = [
-        f"{names[k]} at {at[k]:.4g} (limits {low[k]:.4g} to {high[k]:.4g})"
-        for k in np.flatnonzero((at < low - _OUTSIDE) | (at > high + _OUTSIDE))
+        f"{model.joint_names[joints[k]] or f'joint {joints[k]}'} by {beyond[k]:.3g}"
+        for k in np.argsort(-beyond.round(6), kind="stable")
+        if beyond[k] > _OUTSIDE
     ]
     if outside:
-        text = f"{model.path.name}: the run starts outside of joint limits [rad or m]: "
-        warnings.warn(text + few(outside), EngineWarning, stacklevel=3)
+        warnings.warn(_START.format(joints=few(outside, 1)), EngineWarning, stacklevel=3)
 
 
 def home(model: Model) -> str | None:

@@ -258,8 +258,7 @@ def record(
         )
     arrays = {}
     for name in names:
-        array = getattr(worlds, name)
-        arrays[name] = np.full((worlds.n, rows, *array.shape[1:]), np.nan)
+        arrays[name] = np.full((worlds.n, rows, *getattr(worlds, name).shape[1:]), np.nan)
     _run(worlds, worlds._record, _chosen(worlds, None), nstep, every, arrays, commands)
     return arrays
 

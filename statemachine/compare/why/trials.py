@@ -197,8 +197,7 @@ class Trials:
                 if not np.array_equal(getattr(left, fact), getattr(right, fact))
             )
             if values and set(BY_OPTION[name]) <= set(right.capabilities.options):
-                unit = "s" if name == "timestep" else ""
-                yield ModelDifference(name, "option", "", values, unit)
+                yield ModelDifference(name, "option", "", values, "s" if name == "timestep" else "")
 
     def touch(self, quantity: str) -> Figures | None:
         """The first contact of either side; None where nothing touches, or it is not told."""

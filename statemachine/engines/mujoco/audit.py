@@ -131,7 +131,12 @@ class MujocoDriver(Driver):
             Disturbance("mj_forward", lambda m: mj.mj_forward(m.model, m)),
             Disturbance("mj_inverse", lambda m: mj.mj_inverse(m.model, m), promised=False),
             Disturbance("mj_getState", lambda m: saved(m, self.integration)),
-            Disturbance("mj_step1, mj_step2 for mj_step", halves, promised=one_stage, instead=True),
+            Disturbance(
+                f"mj_step1, mj_step2 for {'mj_step' if one_stage else 'RK4'}",
+                halves,
+                promised=one_stage,
+                instead=True,
+            ),
         )
 
     def pools(self) -> dict[str, Callable[[SavePoint, int], list[Array]]]:

@@ -243,6 +243,5 @@ def _ends(ends: list[Array], runs: tuple[EngineRun, ...]) -> list[str]:
             (True, "return data.qpos.copy() after the last step"),
         )
         if not same_bits(given, run.end.qpos):
-            text = f"{name} is up to {away:.1e} away from qpos at the end of its run: {why}"
-            return [text]
+            return [f"{name} is up to {away:.1e} away from qpos at the end of its run: {why}"]
     return []
