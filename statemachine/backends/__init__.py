@@ -193,7 +193,8 @@ def on_default(model: Model) -> Model:
         MissingEngineError: That engine is not installed here.
         ModelError: It cannot read the file.
     """
-    return model if model.backend == DEFAULT else load(model.path)
+    with warnings.catch_warnings(action="ignore", category=EngineWarning):  # told of the model
+        return model if model.backend == DEFAULT else load(model.path)
 
 
 def _find(name: str) -> str:
