@@ -116,7 +116,8 @@ def _refused(data: Data) -> tuple[tuple[str, str], ...]:
     """Assignments that are refused before anything changes, and with which words."""
     attempts = {
         "data.qpos = [0.8]": ("qpos", [0.8]),
-        "data.xpos = …": (DERIVED[0], getattr(data, DERIVED[0]).copy()),
+        "data.xpos = …": (DERIVED[0], 0.0),
+        "data.qpso = …": ("qpso", 0.0),
     }
     refused = []
     for text, (name, value) in attempts.items():
