@@ -183,11 +183,11 @@ def of_the_run(
     """
     left, right = starts
     off = max(
-        float(farthest(matched.moved("qpos", left.qpos, right.qpos), right.qpos)),
-        float(farthest(matched.moved("qvel", left.qvel, right.qvel), right.qvel)),
+        farthest(matched.moved("qpos", left.qpos, right.qpos), right.qpos),
+        farthest(matched.moved("qvel", left.qvel, right.qvel), right.qvel),
     )
     if off > _SAME:
-        yield ModelDifference(START, "run", "", (("farthest coordinate", 0.0, off),))
+        yield ModelDifference(START, "run", "", (("farthest coordinate", 0.0, float(off)),))
     if keyframe is not None:
         yield from _of_keyframe(matched, str(keyframe))
 

@@ -230,7 +230,7 @@ def _errors(pairs: Array) -> Array:
     """The standard error of the mean of each column (pairs, causes)."""
     if len(pairs) < 2:
         return np.full(pairs.shape[1], math.inf)
-    return np.array([float(np.std(column, ddof=1)) / math.sqrt(len(pairs)) for column in pairs.T])
+    return np.std(pairs, axis=0, ddof=1) / math.sqrt(len(pairs))
 
 
 def _order(game: _Game, active: Sequence[str], random: np.random.Generator) -> list[str]:
@@ -253,7 +253,7 @@ def _along(game: _Game, order: Sequence[str]) -> dict[str, float]:
 
 
 _NOTHING = 1e-6  # of the gap: what is less is left alone
-_LEAST, _LEAST_SET = 0.5, 0.05  # of what was left: less does not count; of a setting of one side
+_LEAST, _LEAST_SET = 0.5, 0.05  # of what was left: less does not count; of a setting
 _STILL = 0.1  # of the left's own motion: less is no motion any more
 
 
@@ -265,12 +265,13 @@ def locate(
     gap: float,
     left: float,
     bound: float,
+    least: float = _LEAST,
 ) -> tuple[Figures, ...]:
     """Leave features out on both sides, each on top of those that count.
 
     The integrator comes first, of the sides that have several, and is tried again once something is
     left out: what differs by it may be hidden by what was left. Where only one side has several it
-    is a setting as any other, and need not take away half.
+    is a setting, which need not take away half if nothing else does either.
 
     Args:
         trials: The runs.
@@ -280,6 +281,7 @@ def locate(
         gap: As the sides come, above zero.
         left: With the causes brought to the same.
         bound: What rounding and chaos make of it: no more is looked for.
+        least: What such a setting has to take away of what was left.
 
     Returns:
         A part of the gap each, and where it comes from:
@@ -308,7 +310,7 @@ def locate(
         ]
         rest, best = min(rests, default=(left, ""))
         setting = len(trials.selects) == 1 and not more
-        if left - rest <= (_LEAST_SET if setting else _LEAST) * left:
+        if left - rest <= (least if setting else _LEAST) * left:
             continue
         without, integrator = more, best
         rows.append(
@@ -323,4 +325,8 @@ def locate(
             )
         )
         left = rest
-    return tuple(rows)
+    return (
+        tuple(rows)
+        if rows or least < _LEAST
+        else locate(trials, brought, quantity, measure, gap, left, bound, _LEAST_SET)
+    )

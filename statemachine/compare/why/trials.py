@@ -155,7 +155,7 @@ class Trials:
             finer: Differences of files by their single entries, each by itself.
         """
         left, right = self._models
-        own = [setting for setting in self._own if setting]
+        own = any(self._own)
         rows: list[ModelDifference] = []
         if left.compiled is not None and right.compiled is not None:
             files = differences_of(
@@ -385,7 +385,6 @@ class Trials:
         again, first = self._outcome(run).curves, self._runs[run].curves
         self._repeated = 1
         self._ran()
-        assert first is not None  # it has gaps
         return again is not None and all(
             np.array_equal(values, again[name]) for name, values in first.items()
         )
@@ -393,8 +392,6 @@ class Trials:
     def floor(self, uncertain: Uncertainty, measure: Measure) -> dict[str, float]:
         """The chaos floor of each quantity, in its unit: a gap that is no larger says nothing."""
         base = _Run(0, _NONE)
-        first = self._runs[base].curves
-        assert first is not None  # it has gaps
         rerun = self._rerun(base, self._models[0])
 
         def run(k: int) -> tuple[Curves | None]:
@@ -410,7 +407,7 @@ class Trials:
         )
         if None in curves:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
-        return self.ruler.floor(first, [run[0] for run in curves if run], measure)
+        return self.ruler.floor(self._runs[base].curves, [run[0] for run in curves if run], measure)
 
     def _measured(self, side: int, model: Model, trace: Trace) -> Figures:
         curves = self.ruler.curves(trace, self._posed(model), side)
