@@ -127,8 +127,9 @@ def of_trace(trace: Trace) -> Figures:
 
 def _notes(**slots: object) -> list[str]:
     """What the reader must know: the sentences of `plot.md` that have what they need."""
-    none = dict.fromkeys(("right", "changed", "at", "names", "fewer", "not_shown"))
-    return template.texts("plot", **(none | slots))
+    return template.texts(
+        "plot", **dict.fromkeys(("right", "changed", "at", "names", "fewer", "not_shown")) | slots
+    )
 
 
 def _touches(traces: Sequence[Trace], until: float) -> dict[str, Spans]:

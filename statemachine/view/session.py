@@ -298,8 +298,9 @@ class LiveSession(Session, ExitStack):
 
     def _pose(self, model: Model, data: Data) -> EnginePose:
         tip = None if self._site is None else np.array(data.site_xpos[self._site])
-        where = np.array(data.xpos), np.array(data.xquat), tip, np.array(data.qpos)
-        return EnginePose(model.backend, *where)
+        return EnginePose(
+            model.backend, np.array(data.xpos), np.array(data.xquat), tip, np.array(data.qpos)
+        )
 
     def _all_do(self, verb: Callable[[Model, Data], None]) -> bool:
         """Call a verb on every engine; whether there is no trouble, now or before."""
