@@ -89,16 +89,20 @@ class Explanation(Figures):
     def is_masked(self) -> bool:
         """Whether the differences act together, so that none of them causes the gap.
 
-        All of them together widen it; or the largest share, where no more is located, is above
-        twice the gap, or its cause widens the gap: by its share, alone, or after all others.
+        All of them together widen it; or the cause with the largest share, where no more is
+        located, widens it or takes away more than twice of it: by its share, alone, or last.
         """
         parts = [
-            part or 0.0
-            for row in self.shares[:1]
-            if abs(row.share or 0.0) > self.located
-            for part in (row.share, row.alone, row.last)
+            self.explained,
+            *(
+                part
+                for row in self.shares[:1]
+                if abs(row.share or 0.0) > self.located
+                for part in (row.share, row.alone, row.last)
+                if part
+            ),
         ]
-        return min([self.explained, *parts]) < -UNEXPLAINED or parts > [_MASKED]  # by the first
+        return min(parts) < -UNEXPLAINED or max(parts) > _MASKED
 
 
 def explain(
