@@ -279,7 +279,10 @@ def run(options: argparse.Namespace) -> int:
     request, renderer = request_of(options), files.checked(options)
     if options.one_step or options.converge or options.versions is not None:
         return questions.run_steps(options, request)
-    why_not = ""
+    why_not = (
+        "Next: --why tells which difference causes the gap, --one-step where in a step it begins, "
+        "--converge whether it vanishes with the timestep."
+    )
     if why:
         try:
             return questions.run_why(options, request)
@@ -313,7 +316,9 @@ def _run_compare(
         "witness": witness(*run.traces, run.file),
         "floor": _floor(options, comparison, run.reruns[0], uncertain),
     }
-    more: dict[str, Any] = {"why_not": "" if comparison.ended else why_not}  # the page says it
+    more: dict[str, Any] = {
+        "why_not": "" if comparison.ended or comparison.agrees else why_not  # the page says it
+    }
     if options.html:
         more = questions.for_page(options, request, run.traces, comparison.ended)
     page = report.page(

@@ -46,10 +46,7 @@ ANSWERS = {
     "switched": "{part} of the {gap} comes from {cause} (left: {left}, right: {right})",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
 }
-TOUCH = (
-    "Until the first touch, {what} at {time}, the two are {before} apart: what parts them acts "
-    "where they touch."
-)
+TOUCH = "Until the first touch, {what} at {time}, the gap of the {quantity} is {before} at most."
 TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"
 PARTS = "{explained} of the gap is explained, {located} is localised, {unexplained} is unexplained"
 
@@ -136,7 +133,11 @@ def proofs(result: Explanation) -> tuple[str, ...]:
     if touch is None or not touch.time or touch.before >= _PROOF * result.gap:
         return ()
     before = _amount(result, touch.before)
-    return (TOUCH.format(what=touch.what, time=short_time(touch.time), before=before),)
+    return (
+        TOUCH.format(
+            what=touch.what, time=short_time(touch.time), before=before, quantity=result.quantity
+        ),
+    )
 
 
 def causes(result: Explanation) -> list[Block]:

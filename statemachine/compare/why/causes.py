@@ -279,9 +279,12 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
     )
     for cause in causes:
         name, rows = cause.name, cause.differences
-        values, unit = tuple(value for row in rows for value in row.values), rows[0].unit
-        lines = {element.place for element in theirs if _says(element, cause)}
         scale = scale_of(rows[0])
+        values, unit = (
+            tuple(value for row in rows[: 1 if scale else None] for value in row.values),
+            rows[0].unit,
+        )
+        lines = {element.place for element in theirs if _says(element, cause)}
         if scale and len(rows) > 1:
             said = _scalings(ours, theirs, float(scale))
             if len(said) == 1:
