@@ -186,7 +186,6 @@ def causes(result: Explanation) -> list[Block]:
         orders=result.orders if method == "drawn orders" else None,
         shares=if_true(method != "nothing"),
         several=if_true(method != "nothing" and len(able) > 1),
-        negative=if_true(any((row.share or 0.0) < -_NO_PART for row in able)),
         no_figure=if_true(
             method != "nothing" and any(None in (row.alone, row.last) for row in able)
         ),
