@@ -178,7 +178,7 @@ def test_sentences_are_true_of_the_robot(
 ) -> None:
     says = {name: SCENARIOS[name].on(model(FLOATING)).says for name in ("hold", "gravity", "fall")}
     assert "or is left at the start's ctrl" in says["hold"]
-    assert says["gravity"].startswith("No actuator acts")
+    assert says["gravity"].startswith("No actuator of the file acts")
     assert "nothing can touch anything" in says["fall"]
     assert SCENARIOS["hold"].on(mujoco_arm).says.startswith("Each position servo")
     assert "floor" not in SCENARIOS["gravity"].on(mujoco_arm).says

@@ -43,7 +43,7 @@ def commanded(comparison: Comparison) -> list[Block]:
     if not actuators or actuators != right.header.actuators:
         return []
     if all(trace.header.options.get("actuation") is False for trace in (left, right)):
-        return [Text("The actuators are off on both sides: nothing is commanded.")]
+        return [Text("The actuators of the file are off on both sides: nothing is commanded.")]
     same = commands_alike(left, right)
     traces = {"": left} if same else {f"{labels[0]}, ": left, f"{labels[1]}, ": right}
     columns = {
