@@ -137,7 +137,8 @@ SCENARIOS = {
             "so101/scene",
             4.0,
             lambda _model, _seed: _constant(None),
-            "No actuator of the file acts: what can move is left to gravity and to what it touches.",
+            "No actuator of the file acts: what can move is left to gravity and to what it "
+            "touches.",
             _need_joints,
             options={"actuation": False},
         ),
@@ -157,7 +158,8 @@ SCENARIOS = {
             "so101/scene",
             2.0,
             lambda _model, _seed: _constant(None),
-            "No actuator of the file acts and nothing can touch anything: what can move is left to gravity.",
+            "No actuator of the file acts and nothing can touch anything: what can move is left "
+            "to gravity. A robot that floats falls as a whole, and its joints hardly move.",
             _need_joints,
             options={"actuation": False, "contacts": False},
         ),
