@@ -58,7 +58,10 @@ GOOD = """<mujoco><option timestep='0.002'/><worldbody>
 <actuator><position joint='j' kp='5' ctrlrange='-1 1'/></actuator></mujoco>"""
 TENDON = (
     GOOD.replace("<geom name", "<site name='s'/><geom name")
-    .replace("<geom type='sphere'", "<site name='t'/><geom type='sphere'")
+    .replace(
+        "</worldbody>",
+        "<body pos='1 0 0'><joint name='l'/><geom size='.05'/><site name='t'/></body></worldbody>",
+    )
     .replace(
         "</mujoco>",
         "<tendon><spatial><site site='s'/><site site='t'/></spatial></tendon></mujoco>",
@@ -233,7 +236,7 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
     assert gap.hinge < 1e-9
     assert gap.slide is None
     tendon = rows["tendon.xml"].backends
-    assert_has(tendon["pybullet"], features=("spatial tendon",))
+    assert_has(tendon["pybullet"], features=("tendon between trees",))
     assert "tendon" in tendon["pybullet"].refusal
     assert tendon["mujoco"].equals_engine
     assert "cannot read" in rows["broken.xml"].backends["mujoco"].refusal
