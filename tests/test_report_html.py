@@ -335,7 +335,7 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     touch = Figures(time=0.27, what="gripper on floor", before=3e-16)
     lead = headline(comparison, [], explanation_of(hold, touch=touch))
     assert lead.causes[0].startswith("Until the first touch, gripper on floor at 0.270 s")
-    assert "2e-14° apart" in lead.causes[0]
+    assert "the gap of the joints is 2e-14° at most" in lead.causes[0]
     late = Figures(time=0.27, what="finger on floor", before=0.01)  # they were apart before
     assert len(headline(comparison, [], explanation_of(hold, touch=late)).causes) == 1
     # Of two that are as far apart the page names one, here and where it counts agreements.
