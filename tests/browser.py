@@ -16,9 +16,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import pytest
-
-from .conftest import REQUIRED
+from .conftest import absent
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 _QUIET = (
@@ -36,7 +34,7 @@ _QUIET = (
 )
 # What a browser has against drawing without a graphics card is not a fault of a page.
 _SLOW_CARD = ("GPU stall", "GL Driver Message", "software WebGL", "swiftshader")
-_LOCAL = ("127.0.0.1", "localhost", "::1")
+_LOCAL, _INSIDE = ("127.0.0.1", "localhost", "::1"), ("data", "blob", "file", "about")
 
 
 class Tab:
@@ -74,13 +72,11 @@ class Tab:
     @property
     def outside(self) -> list[str]:
         """Addresses asked for that are neither this machine's nor in the page itself."""
-        found = []
-        for url in self.requests:
-            parts = urlsplit(url)
-            inside = parts.scheme in ("data", "blob", "file", "about")
-            if not inside and parts.hostname not in _LOCAL:
-                found.append(url)
-        return found
+        return [
+            url
+            for url in self.requests
+            if urlsplit(url).scheme not in _INSIDE and urlsplit(url).hostname not in _LOCAL
+        ]
 
     def nothing_wrong(self, *known: str) -> None:
         """Fail if anything was asked of the network, or the console has an error.
@@ -91,17 +87,11 @@ class Tab:
         assert [found for found in self.errors if not any(w in found for w in known)] == []
 
 
-def _absent(reason: str) -> None:
-    if "browser" in REQUIRED:
-        pytest.fail(f"STATEMACHINE_REQUIRE names browser: {reason}")
-    pytest.skip(reason)
-
-
 def _executable() -> str:
     asked = os.environ.get("CHROMIUM")
     found = [asked] if asked else [path for name in _NAMES if (path := shutil.which(name))]
     if not found or not Path(found[0]).is_file():
-        _absent("no chromium here: on Debian, apt-get install chromium")
+        absent("browser", "no chromium here: on Debian, apt-get install chromium")
     return found[0]
 
 
@@ -113,8 +103,7 @@ def _playwright() -> Iterator[Any]:
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
-        _absent(f"{error}: pip install playwright")
-        raise
+        absent("browser", f"{error}: pip install playwright")
     _SHARED.append(_SHARED[0] if _SHARED else sync_playwright().start())
     try:
         yield _SHARED[0]
@@ -137,14 +126,14 @@ def tabs(
         **context: Options of Playwright's `new_context`, as `color_scheme="dark"`,
             `java_script_enabled=False`, `reduced_motion="reduce"`.
     """
-    path = _executable()
     with _playwright() as playwright:
         chromium = playwright.chromium.launch(
-            executable_path=path, headless=True, args=list(_QUIET)
+            executable_path=_executable(), headless=True, args=list(_QUIET)
         )
         try:
-            size: Any = {"width": width, "height": height}
-            one = chromium.new_context(viewport=size, offline=offline, **context)
+            one = chromium.new_context(
+                viewport={"width": width, "height": height}, offline=offline, **context
+            )
             yield lambda: Tab(one.new_page())
         finally:
             chromium.close()

@@ -16,7 +16,7 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from functools import partial
 from pathlib import Path
 from types import FunctionType
-from typing import Any
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 import pytest
@@ -36,6 +36,7 @@ from statemachine.report import terminal
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 REQUIRED = set(filter(None, os.environ.get("STATEMACHINE_REQUIRE", "").split(",")))
+_Block = TypeVar("_Block")
 
 
 def of_python(
@@ -60,8 +61,8 @@ def of_python(
 
 def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Code that was run in a folder by a Python of its own, which has this checkout."""
-    silent = ("-W", "ignore:This process:DeprecationWarning")  # of a fork beside threads, from 3.12
-    return of_python(*silent, "-c", code, folder=folder)
+    # Of a fork beside threads, from 3.12.
+    return of_python("-W", "ignore:This process:DeprecationWarning", "-c", code, folder=folder)
 
 
 def lives(pid: int) -> bool:
@@ -90,14 +91,19 @@ def processes_with(part: object) -> list[int]:
     return found
 
 
+def absent(name: str, reason: object) -> NoReturn:
+    """Skip without what is not here, or fail where STATEMACHINE_REQUIRE names it."""
+    if name in REQUIRED:
+        pytest.fail(f"STATEMACHINE_REQUIRE names {name}: {reason}")
+    pytest.skip(str(reason))
+
+
 def need_engine(name: str) -> None:
     """Skip without an engine, or fail where STATEMACHINE_REQUIRE names it."""
     try:
         require(name)
     except MissingEngineError as error:
-        if name in REQUIRED:
-            pytest.fail(f"STATEMACHINE_REQUIRE names {name}: {error}")
-        pytest.skip(str(error))
+        absent(name, error)
 
 
 def assert_in(whole: Container[Any], *parts: object) -> None:
@@ -199,8 +205,10 @@ def around(owner: Any, name: str) -> Callable[[Callable[..., Any]], Patch]:
         def apply(monkeypatch: pytest.MonkeyPatch) -> None:
             place = owner() if isinstance(owner, FunctionType) else owner
             right = getattr(place, name)
-            faulty = lambda *arguments, **named: function(right, *arguments, **named)  # noqa: E731
-            monkeypatch.setattr(place, name, faulty)
+            # A lambda is bound as a method; a partial would not be.
+            monkeypatch.setattr(
+                place, name, lambda *arguments, **named: function(right, *arguments, **named)
+            )
 
         return apply
 
@@ -221,11 +229,11 @@ def followed_by(owner: Any, name: str, act: Callable[..., object]) -> Patch:
 
 def bits(data: Data) -> list[bytes]:
     """Everything that a Data says."""
-    found = []
-    for value in readings(data).values():
-        parts = [value] if isinstance(value, np.ndarray) else vars(value).values()
-        found += [np.array(part).tobytes() for part in parts]
-    return found
+    return [
+        np.array(part).tobytes()
+        for value in readings(data).values()
+        for part in ([value] if isinstance(value, np.ndarray) else vars(value).values())
+    ]
 
 
 def bullet_clients() -> set[int]:
@@ -252,9 +260,10 @@ def written_all(folder: Path, texts: dict[str, str]) -> Path:
 def distribution(folder: Path, name: str, version: str, entries: str = "") -> Path:
     """A folder that looks as if a distribution was installed into it."""
     metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"
-    information = f"{name.replace('-', '_')}-{version}.dist-info"
-    texts = {"METADATA": metadata, "entry_points.txt": entries}
-    return written_all(folder / information, texts)
+    return written_all(
+        folder / f"{name.replace('-', '_')}-{version}.dist-info",
+        {"METADATA": metadata, "entry_points.txt": entries},
+    )
 
 
 @contextmanager
@@ -297,6 +306,11 @@ def shown(page: Page) -> str:
     return said.getvalue()
 
 
+def blocks(page: Page, kind: type[_Block]) -> list[_Block]:
+    """The blocks of one kind on a page."""
+    return [block for block in page.blocks if isinstance(block, kind)]
+
+
 def with_figures(figures: Any, **others: Any) -> Any:
     """Figures of which some are others."""
     return type(figures)(**vars(figures) | others)
@@ -310,10 +324,7 @@ def lesson_result(name: str, model: Model, **options: Any) -> Any:
 def shared(path: Path) -> Path:
     """Data of the public model, which are not part of the project: skip without them."""
     if not path.exists():
-        reason = f"no {path.relative_to(SHARED.parent)} beside the checkout"
-        if "shared" in REQUIRED:
-            pytest.fail(f"STATEMACHINE_REQUIRE names shared: {reason}")
-        pytest.skip(reason)
+        absent("shared", f"no {path.relative_to(SHARED.parent)} beside the checkout")
     return path
 
 
@@ -439,8 +450,7 @@ def golden() -> Callable[[str], np.ndarray]:
     """Golden data from the public reference model, by file name: columns by name."""
 
     def read(name: str) -> np.ndarray:
-        path = shared(SHARED / "so101" / f"{name}.csv")
-        return np.genfromtxt(path, delimiter=",", names=True)
+        return np.genfromtxt(shared(SHARED / "so101" / f"{name}.csv"), delimiter=",", names=True)
 
     return read
 
@@ -505,8 +515,10 @@ def without(tmp_path: Path) -> Callable[..., dict[str, str]]:
             "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
             "sys.meta_path.insert(0, Hide())\n"
         )
-        modules = {f"{name}.py": text for name, text in texts.items()}
-        folder = written_all(tmp_path / "hidden", {"sitecustomize.py": hide, **modules})
+        folder = written_all(
+            tmp_path / "hidden",
+            {"sitecustomize.py": hide} | {f"{name}.py": text for name, text in texts.items()},
+        )
         return {"PYTHONPATH": os.pathsep.join((str(folder), str(ROOT)))}
 
     return without

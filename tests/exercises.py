@@ -13,6 +13,7 @@ from typing import Any
 
 from .conftest import ROOT
 
+TEMPLATE = ROOT / "exercises" / "step_loop.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
 _IMPORTS, *_FUNCTIONS, _ = re.split(r"^(?=def demo_|if )", SOLUTION.read_text("utf-8"), flags=re.M)
 _NAMES: list[str] = ["gravity", "state", "forward", "replay"]
@@ -569,8 +570,9 @@ def _attempts(tables: dict[str, dict[str, tuple[str, Changes]]]) -> Iterator[Att
                 assert old in source, (name, old)
                 source = source.replace(old, new)
             short, _, raw = name.partition(", ")
-            file = _IMPORTS + source
-            yield Attempt(f"{solves}-{short}", f"demo_{solves}", file, message, bool(raw))
+            yield Attempt(
+                f"{solves}-{short}", f"demo_{solves}", _IMPORTS + source, message, bool(raw)
+            )
 
 
 WRONG = [*_attempts(WRONG_ONES)]

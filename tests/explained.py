@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,8 @@ import numpy as np
 import statemachine as sm
 from statemachine.compare.why import Explanation, explain
 from statemachine.runs.scenarios import Scenario
+
+from .conftest import written
 
 # Two links on servos above a floor, a ball on the floor, and a weight on a spring.
 ARM = """
@@ -91,30 +93,28 @@ SWING = Scenario(
 )
 
 
-def write(folder: Path, name: str, text: str) -> Path:
-    """A file of a model."""
-    path = folder / name
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def explained(
     folder: Path, left: str, right: str, *, engines: tuple[str, str] = ("mujoco", "mujoco"), **more
 ) -> Explanation:
     """Why two texts of models differ."""
     models = [
-        sm.load(write(folder, f"{side}.xml", text), backend=engine)
+        sm.load(written(folder / f"{side}.xml", text), backend=engine)
         for side, text, engine in zip(("left", "right"), (left, right), engines, strict=True)
     ]
     return explain(models[0], models[1], more.pop("scenario", SWING), **more)
 
 
+def with_changes(text: str, changes: Iterable[tuple[str, str]]) -> str:
+    """A text with changes, each of a piece that is there once."""
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
 def changed(text: str, *cases: Case) -> str:
     """A text with the changes of cases."""
-    for case in cases:
-        assert text.count(case.old) == 1, case
-        text = text.replace(case.old, case.new)
-    return text
+    return with_changes(text, ((case.old, case.new) for case in cases))
 
 
 _SHOULDER = '<position name="shoulder" joint="shoulder" kp="20" kv="1"'
@@ -123,6 +123,7 @@ _JOINT = 'axis="0 1 0" damping="0.1" armature="0.01" range'
 _BALL = 'name="ball_shape"'
 _ELBOW = 'name="elbow" axis="0 1 0"'
 _LOWER = '<body name="lower" pos="0 0 -0.2"'
+FLOOR = '<geom name="floor" type="plane" size="2 2 0.1"/>'
 
 
 def _more(old: str, more: str, cause: str, quantity: str = "joints") -> Case:
@@ -285,8 +286,7 @@ def _asset(
     points += noise * random.normal(size=points.shape)
     if order is not None:
         points = np.random.default_rng(order).permutation(points)
-    text = " ".join(repr(float(each)) for each in points.ravel())
-    return f'<mesh name="{name}" vertex="{text}"/>'
+    return f'<mesh name="{name}" vertex="{" ".join(map(repr, points.ravel().tolist()))}"/>'
 
 
 def hills(wave: float = 1.0, points: int = 9) -> str:
@@ -296,10 +296,8 @@ def hills(wave: float = 1.0, points: int = 9) -> str:
         f'<asset><hfield name="h" nrow="{points}" ncol="{points}" size="2 2 0.05 0.1" '
         f'elevation="{text}"/></asset><worldbody>'
     )
-    return ARM.replace("<worldbody>", asset).replace(
-        '<geom name="floor" type="plane" size="2 2 0.1"/>',
-        '<geom name="floor" type="hfield" hfield="h"/>',
-    )
+    floor = '<geom name="floor" type="hfield" hfield="h"/>'
+    return with_changes(ARM, [("<worldbody>", asset), (FLOOR, floor)])
 
 
 def equality(text: str) -> str:
@@ -318,13 +316,13 @@ def ledge(words: str) -> str:
 
 def lowered(text: str) -> str:
     """The same arm with the frame of its second link put 5 cm down on it."""
-    for old, new in (
-        (f"{_LOWER}>", '<body name="lower" pos="0 0 -0.25">'),
-        ('<inertial mass="0.3" pos="0 0 -0.08"', '<inertial mass="0.3" pos="0 0 -0.03"'),
-        (_ELBOW, f'{_ELBOW} pos="0 0 0.05"'),
-        ('fromto="0 0 0 0 0 -0.15"', 'fromto="0 0 0.05 0 0 -0.1"'),
-        ('name="tip" pos="0 0 -0.15"', 'name="tip" pos="0 0 -0.1"'),
-    ):
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    return text
+    return with_changes(
+        text,
+        [
+            (f"{_LOWER}>", '<body name="lower" pos="0 0 -0.25">'),
+            ('<inertial mass="0.3" pos="0 0 -0.08"', '<inertial mass="0.3" pos="0 0 -0.03"'),
+            (_ELBOW, f'{_ELBOW} pos="0 0 0.05"'),
+            ('fromto="0 0 0 0 0 -0.15"', 'fromto="0 0 0.05 0 0 -0.1"'),
+            ('name="tip" pos="0 0 -0.15"', 'name="tip" pos="0 0 -0.1"'),
+        ],
+    )

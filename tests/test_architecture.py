@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import tomllib
 
@@ -26,11 +25,10 @@ def test_every_room_is_in_the_table_with_its_purpose() -> None:
 
 
 def test_the_floors_are_those_that_imports_keep() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    layers = project["tool"]["importlinter"]["contracts"][0]["layers"]
+    tools = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]
     floors = {
         name.strip(): number
-        for number, layer in enumerate(layers, start=1)
+        for number, layer in enumerate(tools["importlinter"]["contracts"][0]["layers"], start=1)
         for name in layer.split("|")
     }
     told = {room.removesuffix(".py").rstrip("/"): int(floor) for floor, room, _ in ROOMS}
@@ -42,23 +40,19 @@ def test_every_place_that_is_named_exists() -> None:
     places = re.findall(r"`((?:statemachine|tests)\w*(?:/\w+)*\.py)(?::(\w+))?`", MAP)
     assert len(places) >= 20
     for path, name in places:
-        assert (ROOT / path).is_file(), path
-        tree = ast.parse((ROOT / path).read_text("utf-8"))
-        defined = {
-            node.name
-            for node in tree.body
-            if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
-        }
-        assert not name or name in defined, f"{path}: {name}"
+        text = (ROOT / path).read_text("utf-8")
+        assert not name or re.search(rf"^(class|def|async def) {name}\b", text, re.M), (path, name)
 
 
 def test_the_glossary_tells_a_word_once() -> None:
     _, _, glossary = MAP.partition("## Glossary")
     words = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", glossary, re.MULTILINE)[1:]
     assert len(words) == len(set(words)) >= 40
-    field = "Model Data state derived stale ctrl servo keyframe scenario side gap tolerance verdict"
     assert_in(
-        words, *field.split(), "touch", "witness", "capability", "emulated", "native", "trace"
+        words,
+        *("Model", "Data", "state", "derived", "stale", "ctrl", "servo", "keyframe", "scenario"),
+        *("side", "gap", "tolerance", "verdict", "touch", "witness", "capability", "emulated"),
+        *("native", "trace"),
     )
 
 

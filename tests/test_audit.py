@@ -35,12 +35,14 @@ from .conftest import (
     around,
     assert_has,
     assert_in,
+    blocks,
     bullet_clients,
     followed_by,
     need_engine,
     refused,
     registered,
     shown,
+    with_figures,
 )
 from .small_models import loaded, model_of
 
@@ -81,8 +83,7 @@ def test_quaternions_are_apart_by_their_angle(angle: float) -> None:
     other[0, 3:] = math.cos(angle / 2), 0.0, math.sin(angle / 2), 0.0
     assert gap(one, other, FREE).angle == pytest.approx(angle, rel=1e-6)
     other[0, 3:] *= -1
-    off = gap(one, other, FREE)
-    assert_has(off, angle=pytest.approx(angle, rel=1e-6), length=0)
+    assert_has(gap(one, other, FREE), angle=pytest.approx(angle, rel=1e-6), length=0)
     other = one.copy()
     other[0, 1] += 0.25
     assert gap(one, other, FREE).length == pytest.approx(0.25)
@@ -155,14 +156,12 @@ def test_pybullet_forgets_its_contacts(of_pybullet: Figures) -> None:
     assert "motion" not in found.in_contact
     for way in ("written", "saveState", "saveBullet"):
         assert_in(found.forgotten[way], "motor targets", "a waiting force")
-    exact = {
-        each.point
+    assert any(
+        each.gap.exact
         for each in engine.findings
-        if each.experiment == trials.RESTORE
-        and each.case == "saveState + targets"
-        and each.gap.exact
-    }
-    assert "motion" in exact
+        if (each.experiment, each.case) == (trials.RESTORE, "saveState + targets")
+        and each.point == "motion"
+    )
     assert [line.partition(":")[0] for line in of_pybullet.without] == ["limit"]
     assert interface.conclusion.suffice == ()
     assert "get_state, set_state" in interface.conclusion.agree
@@ -189,7 +188,7 @@ def test_a_call_that_is_harmless_here_moves_falling_boxes(of_pybullet: Figures) 
         assert len(asked) == trials.DROPS
         assert all(each.gap.exact for each in asked)
     off = max(each.gap.length for each in drops)
-    tables = [block for block in report.page({"x": of_pybullet}).blocks if isinstance(block, Table)]
+    tables = blocks(report.page({"x": of_pybullet}), Table)
     rows = [row for t in tables if t.headers[1] == "differs at" for row in t.rows]
     assert [(row[0], row[2]) for row in rows] == [(call, f"{1e3 * off:.0f} mm")]
 
@@ -229,9 +228,8 @@ MODELS = {
 
 @pytest.mark.parametrize("body", MODELS)
 def test_any_model_has_save_points(body: str, tmp_path: Path) -> None:
-    floor = '<geom type="plane" size="3 3 1"/>'
-    model = loaded(tmp_path, f'{floor}<body pos="0 0 .5">{MODELS[body]}</body>')
-    result = audit.run(model, steps=20)
+    world = f'<geom type="plane" size="3 3 1"/><body pos="0 0 .5">{MODELS[body]}</body>'
+    result = audit.run(loaded(tmp_path, world), steps=20)
     assert result.holds
     assert {each.point for each in result.audited[0].points} == {"default", "motion"}
     assert {line.partition(":")[0] for line in result.without} == {
@@ -246,24 +244,24 @@ def test_any_model_has_save_points(body: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_components_of_other_models_are_tried(tmp_path: Path) -> None:
-    model = model_of(
-        tmp_path,
-        """<mujoco><worldbody><body name="m" mocap="true" pos="1 0 1"><geom size=".05"/></body>
+    text = """<mujoco><worldbody><body name="m" mocap="true" pos="1 0 1"><geom size=".05"/></body>
         <body pos="0 0 1"><joint name="j" axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>
         <body name="f" pos="0 -1 .5"><freejoint/><geom size=".05"/></body></worldbody>
         <equality><weld body1="f" body2="m"/></equality><actuator>
-        <general joint="j" dyntype="filter" dynprm=".1" gainprm="5"/></actuator></mujoco>""",
-    )
-    found = audit.run(model, steps=20).audited[0].conclusion
+        <general joint="j" dyntype="filter" dynprm=".1" gainprm="5"/></actuator></mujoco>"""
+    found = audit.run(model_of(tmp_path, text), steps=20).audited[0].conclusion
     assert {"act", "eq_active", "mocap_pos"} <= {each.field for each in found.missing}
     assert found.smallest is True
 
 
 def test_what_cannot_be_audited_is_one_line(tmp_path: Path) -> None:
-    failed = "a fresh process failed: ValueError"  # of a seed that is none
     refused(
         (BadInputError, "nothing moves", lambda: audit.run(loaded(tmp_path, '<geom size="1"/>'))),
-        (EngineError, failed, lambda: run_elsewhere(sm.load(SCENE), -1, 10, {}, ())),
+        (
+            EngineError,
+            "a fresh process failed: ValueError",  # of a seed that is none
+            lambda: run_elsewhere(sm.load(SCENE), -1, 10, {}, ()),
+        ),
     )
 
 
@@ -479,10 +477,10 @@ def test_a_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_an_engine_whose_restore_drops_the_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the engine itself it is a fact; of the interface on it, a broken promise."""
-    forget = followed_by(
-        require("mujoco"), "mj_setState", lambda _, data, *state: data.qacc_warmstart.fill(0)
+    mujoco = require("mujoco")
+    followed_by(mujoco, "mj_setState", lambda _, data, *state: data.qacc_warmstart.fill(0))(
+        monkeypatch
     )
-    forget(monkeypatch)
     found = asked("restore")
     engine = conclude([each for each in found if each.layer == "engine"])
     assert engine.suffice == ("mj_copyData",)
@@ -498,8 +496,8 @@ def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.Monk
     found = asked("restore", "pybullet", only=("keyframe", "limp"))
     assert broken(found) == {("interface", STATE)}
     assert {each.into for each in found if not each.holds} == {"each other"}
-    engine = conclude([each for each in found if each.layer == "engine"])
-    assert "taken apart + targets" not in engine.agree
+    of_the_engine = [each for each in found if each.layer == "engine"]
+    assert "taken apart + targets" not in conclude(of_the_engine).agree
 
 
 @pytest.mark.slow
@@ -523,16 +521,16 @@ def test_conclusions_follow_from_findings(of_mujoco: Figures) -> None:
     """Another engine would get other sentences."""
     engine = of_mujoco.audited[0]
 
-    def without_warm_start(each: Figures) -> Figures:
-        if each.case == "warmstart":
-            return Figures(**vars(each) | {"gap": FutureGap(each.gap.steps, None, 0.0, 0.0)})
-        return each
-
-    changed = [without_warm_start(each) for each in engine.findings]
+    changed = [
+        with_figures(each, gap=FutureGap(each.gap.steps, None, 0.0, 0.0))
+        if each.case == "warmstart"
+        else each
+        for each in engine.findings
+    ]
     found = conclude(changed)
     assert found.idle == ("warmstart",)
-    other = Figures(**vars(engine) | {"findings": tuple(changed), "conclusion": found})
-    changed_page = report.page({"x": Figures(**vars(of_mujoco) | {"audited": (other,)})})
+    other = with_figures(engine, findings=tuple(changed), conclusion=found)
+    changed_page = report.page({"x": with_figures(of_mujoco, audited=(other,))})
     assert "warmstart" not in _needed(changed_page)
     assert any("warmstart" in line for line in _lines(changed_page))
     assert not any("warmstart" in line for line in _lines(report.page({"x": of_mujoco})))
@@ -540,24 +538,25 @@ def test_conclusions_follow_from_findings(of_mujoco: Figures) -> None:
 
 def _needed(page: Page) -> dict[str, tuple[str, ...]]:
     """What has to be restored, and the cells beside it."""
-    tables = [block for block in page.blocks if isinstance(block, Table)]
     return {
-        str(row[0]): tuple(row[1:]) for t in tables if t.headers[0] == "left out" for row in t.rows
+        str(row[0]): tuple(row[1:])
+        for table in blocks(page, Table)
+        if table.headers[0] == "left out"
+        for row in table.rows
     }
 
 
 def _lines(page: Page) -> list[str]:
-    return [line for block in page.blocks if isinstance(block, Items) for line in block.texts]
+    return [line for items in blocks(page, Items) for line in items.texts]
 
 
 def test_the_page_says_what_suffices(of_mujoco: Figures) -> None:
     page = report.page({"x": of_mujoco})
-    needed = _needed(page)
-    places = {name: cells[0] for name, cells in needed.items()}
+    places = {name: str(cells[0]) for name, cells in _needed(page).items()}
     assert_has(places, time="clock", warmstart="default, keyframe, limp, limit, clock", qpos="all")
-    assert needed["ctrl"][0].startswith("none")
+    assert places["ctrl"].startswith("none")
     assert max(map(cell_len, shown(page).splitlines())) <= 80
-    assert set(needed) == {each.field for each in of_mujoco.audited[0].conclusion.missing}
+    assert set(places) == {each.field for each in of_mujoco.audited[0].conclusion.missing}
     assert page.holds
 
 

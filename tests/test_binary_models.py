@@ -43,9 +43,8 @@ def _saved(folder: Path) -> Path:
 
 
 def test_what_this_process_wrote_is_read(tmp_path: Path, cache: Path, mujoco_box: sm.Model) -> None:
-    file = _saved(tmp_path)
     with warnings.catch_warnings(action="error"):
-        model = sm.load(file)
+        model = sm.load(_saved(tmp_path))
     assert np.array_equal(after(mujoco_box, 20), after(model, 20))
 
 

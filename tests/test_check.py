@@ -42,10 +42,7 @@ from .conftest import (
     written,
     written_all,
 )
-from .exercises import RIGHT, SOLUTION, WRONG, Attempt
-
-STUDENT = ROOT / "exercises" / "step_loop.py"
-
+from .exercises import RIGHT, SOLUTION, TEMPLATE, WRONG, Attempt
 
 Prepared = tuple[list[ExerciseWorld], list[Any]]
 
@@ -89,10 +86,8 @@ def test_a_wrong_solution_is_told_what_is_wrong(attempt: Attempt, prepared: Prep
     assert not verdict.passed
     assert any(attempt.message in text for text in texts), texts
     assert all("\n" not in text for text in texts)
-    assert not any(re.search(r"you return (.+?)( at \d s| m)? where \1( |$)", t) for t in texts), (
-        texts
-    )
-    assert not any(re.search(r"\b1 (steps|joints|numbers)", text) for text in texts), texts
+    absurd = r"you return (.+?)( at \d s| m)? where \1( |$)|\b1 (steps|joints|numbers)"
+    assert not any(re.search(absurd, text) for text in texts), texts
 
 
 def test_hints_do_not_lead_astray(prepared: Prepare) -> None:
@@ -124,9 +119,8 @@ def test_right_solutions_of_other_kinds_pass(attempt: Attempt, prepared: Prepare
 )
 def test_pybullet_judges_alike(attempt: Attempt, prepared: Prepare) -> None:
     verdict = _verdict(attempt, prepared(attempt.solves, "pybullet"))
-    texts = verdict.remarks
-    assert verdict.passed == (attempt in RIGHT), texts
-    assert any(attempt.message in text for text in texts), texts
+    assert verdict.passed == (attempt in RIGHT), verdict.remarks
+    assert any(attempt.message in text for text in verdict.remarks), verdict.remarks
 
 
 _HEAD = """
@@ -284,9 +278,8 @@ def test_what_does_not_get_ready_is_not_judged(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(recording, "_CHILD", "import os, sys; os._exit(7)")
     for judgement in exercise.run(SOLUTION).functions:
         assert not judgement.judged
-        text = _one(judgement)
         assert_in(
-            text,
+            _one(judgement),
             "nothing could be judged: the judge itself ended the process with code 7",
             "Your code was not run",
         )
@@ -294,20 +287,20 @@ def test_what_does_not_get_ready_is_not_judged(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.slow
 def test_a_file_that_sleeps_is_ended_by_the_clock(tmp_path: Path) -> None:
-    file = tmp_path / "student.py"
     calls = "time.sleep(1e6)", "ctypes.PyDLL(None).sleep(10**6)", "LOCK.acquire()", "sig.pause()"
     waits = "def {}(*_):\n    {}\n"
-    file.write_text(
+    file = written(
+        tmp_path / "student.py",
         "import ctypes, threading, time, signal as sig\nLOCK = threading.Lock(); LOCK.acquire()\n"
-        + "".join(waits.format(*pair) for pair in zip(JUDGES, calls, strict=True))
+        + "".join(waits.format(*pair) for pair in zip(JUDGES, calls, strict=True)),
     )
     before = time.monotonic()
     grade = exercise.run(file, time_limit=1.0, wall_limit=4.0)
     assert time.monotonic() - before < 60
     for line, judgement in zip((4, 6, 8, 10), grade.functions, strict=True):
         assert not judgement.judged
-        assert _one(judgement).startswith(f"line {line}: nothing could be judged: it took ")
-        assert "longer than 12 s on the clock" in _one(judgement)
+        says = rf"^line {line}: nothing could be judged: it took .*longer than 12 s on the clock"
+        assert re.search(says, _one(judgement))
 
 
 @pytest.mark.slow
@@ -326,14 +319,15 @@ def test_a_right_answer_passes_on_a_busy_machine() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) -> None:
-    file = tmp_path / "student.py"
     here = tmp_path / "temporary"
     here.mkdir()
     waits = "def {0}(*_):\n    open('begun', 'w').close()\n    time.sleep(60)\n"
-    file.write_text("import time\n" + "".join(map(waits.format, JUDGES)))
-    command = [sys.executable, "-m", "statemachine", "check", str(file)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(here)}
-    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) as process:
+    file = written(tmp_path / "student.py", "import time\n" + "".join(map(waits.format, JUDGES)))
+    with subprocess.Popen(
+        [sys.executable, "-m", "statemachine", "check", str(file)],
+        env={**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(here)},
+        stderr=subprocess.PIPE,
+    ) as process:
         assert soon(lambda: len(list(here.glob("*/*/*/scratch/begun"))) >= len(JUDGES), 60)
         assert len(processes_with(here)) >= len(JUDGES)
         process.send_signal(number)
@@ -437,10 +431,7 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
     file.write_text(content, encoding="latin-1")
     worlds, rights = prepared("demo_gravity", "mujoco")
     answers = answers_of_file(file, "demo_gravity", worlds)
-    verdict = judged("demo_gravity", worlds, rights, answers)
-    (remark,) = verdict.remarks
-    assert message in remark
-    assert not verdict.passed
+    assert message in _one(judged("demo_gravity", worlds, rights, answers))
 
 
 def test_the_solution_passes_on_every_backend(here: Cli, backend: str) -> None:
@@ -450,10 +441,10 @@ def test_the_solution_passes_on_every_backend(here: Cli, backend: str) -> None:
 
 
 def test_the_students_file_is_still_to_be_written(here: Cli) -> None:
-    found = json.loads(here("check", str(STUDENT), "--json", code=1).stdout)
+    found = json.loads(here("check", str(TEMPLATE), "--json", code=1).stdout)
     assert (found["right"], found["passed"]) == (0, False)
-    assert [each["function"] for each in found["functions"]] == list(JUDGES)
-    assert {each["written"] for each in found["functions"]} == {False}
+    functions = [(each["function"], each["written"]) for each in found["functions"]]
+    assert functions == [(name, False) for name in JUDGES]
 
 
 def test_a_missing_engine_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -475,22 +466,21 @@ def test_the_exercise_runs_as_a_program(
         assert ended.value.code == 2 or max(map(len, lines)) <= 80
         return int(ended.value.code or 0), lines
 
-    code, lines = run(STUDENT)
-    assert code == 0
-    assert sum("TODO(you)" in line for line in lines) == 4
-    assert run(STUDENT, "--gravity") == (
+    code, lines = run(TEMPLATE)
+    assert (code, sum("TODO(you)" in line for line in lines)) == (0, 4)
+    assert run(TEMPLATE, "--gravity") == (
         1,
         ["demo_gravity: TODO(you): leave the arm alone, with servos and without"],
     )
-    assert run(STUDENT, "--state", "--backend", "mujcoo")[0] == 2
+    assert run(TEMPLATE, "--state", "--backend", "mujcoo")[0] == 2
     shown = {name: run(SOLUTION, f"--{name}") for name in ("gravity", "state", "forward", "replay")}
-    shown |= {name: run(STUDENT, f"--{name}") for name in ("hold", "speed")}
+    shown |= {name: run(TEMPLATE, f"--{name}") for name in ("hold", "speed")}
     assert {code for code, _ in shown.values()} == {0}
     assert shown["replay"][1][-2:] == ["largest difference: 0.0e+00", "you say: equal"]
 
 
 def test_an_error_in_a_script_is_one_line_and_all_of_it_if_asked(tmp_path: Path) -> None:
-    text = re.sub(r"raise .*read the fingertip.*", "return [dta.qpos]", STUDENT.read_text())
+    text = re.sub(r"raise .*read the fingertip.*", "return [dta.qpos]", TEMPLATE.read_text())
     script = str(written(tmp_path / "step_loop.py", text))
     run = "import runpy, sys; sys.argv = {!r}; runpy.run_path(sys.argv[0], run_name='__main__')"
     short, full = (
@@ -553,9 +543,7 @@ def _places(found: Any) -> list[tuple[Any, Any]]:
     if not isinstance(found, (dict, list)):
         return []
     keys = list(found) if isinstance(found, dict) else range(len(found))
-    return [(found, key) for key in keys] + [
-        place for key in keys for place in _places(found[key])
-    ]  # fmt: skip
+    return [place for key in keys for place in ((found, key), *_places(found[key]))]
 
 
 OTHERS = [

@@ -6,6 +6,8 @@ import csv
 import io
 import json
 import os
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,21 +34,33 @@ from statemachine.page import Figures, Text
 from statemachine.report.grading import class_page, gradescope_results
 from statemachine.runs.whole import csv_text, replace_csv
 
-from .conftest import ROOT, Cli, assert_has, assert_in, one_line, refused, written, written_all
+from .conftest import (
+    ROOT,
+    Cli,
+    assert_has,
+    assert_in,
+    blocks,
+    one_line,
+    refused,
+    written,
+    written_all,
+)
+from .exercises import SOLUTION, TEMPLATE
 
-TEMPLATE = ROOT / "exercises" / "step_loop.py"
-SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
+
+def _table(entries: Sequence[ClassEntry]) -> list[dict[str, str]]:
+    """The rows of a table of grades, as a program reads them."""
+    return list(csv.DictReader(io.StringIO(csv_text(rows_of(entries)))))
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Files and folders as students hand them in."""
-    home = tmp_path / "class"
-    (home / ".git").mkdir(parents=True)
     one_function = "def demo_gravity(model): ...\n"
     return written_all(
-        home,
+        tmp_path / "class",
         {
+            ".git/HEAD": "",
             "ann/my_solution.py": SOLUTION.read_text(),
             "ann/helper.py": "X = 1\n",
             "bob/deep/step_loop.py": TEMPLATE.read_text(),
@@ -98,15 +112,17 @@ def test_what_is_a_submission(folder: Path) -> None:
 
 
 def test_the_folder_of_one_student_is_no_class(tmp_path: Path, judged: list[str]) -> None:
-    texts = {
-        "step_loop.py": SOLUTION.read_text(),
-        "test_arm.py": "def test_nothing(): ...\n",
-        "helper.py": "X = 1\n",
-    }
-    ida = written_all(tmp_path / "ida", texts)
+    ida = written_all(
+        tmp_path / "ida",
+        {
+            "step_loop.py": SOLUTION.read_text(),
+            "test_arm.py": "def test_nothing(): ...\n",
+            "helper.py": "X = 1\n",
+        },
+    )
     assert is_one_students(ida)
     (found,) = submissions([ida])
-    assert (found.name, found.path, found.folder) == ("ida", ida / "step_loop.py", ida)
+    assert_has(found, name="ida", path=ida / "step_loop.py", folder=ida)
     assert [each.name for each in submissions([ida, tmp_path / "ida"])] == [ida.as_posix()]
     assert not_looked_at([ida]) == []
     written_all(ida, {"old/step_loop.py": TEMPLATE.read_text()})
@@ -156,17 +172,12 @@ def test_what_is_not_looked_at_is_told(folder: Path, judged: list[str]) -> None:
         folder, dict.fromkeys(("gus.ipynb", "hal.zip", ".hidden"), "") | {"IDA.PY": "return 1\n"}
     )
     (folder / "__MACOSX").mkdir()
-    found = submissions([folder])
-    assert "IDA.PY" in [each.name for each in found]
-    assert "__MACOSX" not in [each.name for each in found]
-    ignored = not_looked_at([folder])
+    found, ignored = submissions([folder]), not_looked_at([folder])
+    assert {"IDA.PY", "__MACOSX"} & {each.name for each in found} == {"IDA.PY"}
     assert ignored == ["grades.txt"]
-    texts = [
-        b.text
-        for b in class_page(judge_all(found, "mujoco"), ignored).blocks
-        if isinstance(b, Text)
-    ]
-    assert "No Python files, and not looked at: grades.txt." in texts
+    page = class_page(judge_all(found, "mujoco"), ignored)
+    said = "No Python files, and not looked at: grades.txt."
+    assert said in [text.text for text in blocks(page, Text)]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
@@ -174,8 +185,7 @@ def test_what_was_skipped_is_a_row_with_the_reason(folder: Path, judged: list[st
     written_all(folder, {"gus.ipynb": "{}", "cy/mine.ipynb": "{}", "hal.zip": ""})
     (folder / "ida.py").symlink_to("nowhere.py")
     os.mkfifo(folder / "jo.py")
-    entries = judge_all(submissions([folder]), "mujoco")
-    rows = {row["file"]: row for row in csv.DictReader(io.StringIO(csv_text(rows_of(entries))))}
+    rows = {row["file"]: row for row in _table(judge_all(submissions([folder]), "mujoco"))}
     for name, reason in (
         ("gus.ipynb", "a notebook: save it as a Python file"),
         ("cy", "has one of the functions. mine.ipynb is a notebook"),
@@ -192,8 +202,7 @@ def test_a_remark_is_told_as_far_as_there_is_room() -> None:
     said = "time after the reset to keyframe 0 should be 6 s, you return 0: that is a new Data"
     words = [few_words(Judgement("demo", True, False, (text,))) for text in (said, 9 * said)]
     assert words[0] == said
-    assert words[1].startswith(said)
-    assert words[1].endswith(" …")
+    assert re.fullmatch(f"{said}.* …", words[1])
 
 
 def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path) -> None:
@@ -208,7 +217,7 @@ def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path
         for k, (name, text) in enumerate(zip(JUDGES, texts, strict=True))
     )
     entry = ClassEntry("ann.py", "1" * 64, marks, "", "mujoco")
-    (row,) = csv.DictReader(io.StringIO(csv_text(rows_of([entry]))))
+    (row,) = _table([entry])
     assert row["remarks"] == (
         "state: ctrl was written ([0 0]): here it must stay; forward: …; replay: not written; "
         "please look at this: it reads a.txt"
@@ -227,12 +236,11 @@ def test_a_roster_gives_every_student_a_row(
             ("Lee_Bo_41017_assignment.py", "x_41018.py", "x_again_41018.py"), "return 1\n"
         ),
     )
-    roster = tmp_path / "roster.csv"
+    roster, table = tmp_path / "roster.csv", tmp_path / "t.csv"
     roster.write_text(
         "name;number;file\nAnn Smith;1;ann\nBo Lee;41017\nCy;41018\n\nZoë;99;\n",
         encoding="utf-8-sig",
     )
-    table = tmp_path / "t.csv"
     for _ in range(2):  # a row without a file is not a verdict on another one
         main(["check", str(folder), "--roster", str(roster), "--csv", str(table)])
         assert "4 students have all functions right" in capsys.readouterr().out
@@ -277,14 +285,16 @@ def test_tests_and_predictions_are_in_the_same_table(
     monkeypatch.setattr(classroom, "examine", examined)
     answers = [{"lesson": "a", "question": str(k), "right": k > 0} for k in range(3)]
     record = {"kind": "statemachine predictions", "score": 99, "answers": answers}
-    texts = {
-        "ann/test_arm.py": "good",
-        "bob/test_arm.py": "bad",
-        "cy/test_arm.py": "good",
-        "ann/lesson.json": json.dumps(record),
-        "bob/lesson.json": "{}",
-    }
-    written_all(folder, texts)
+    written_all(
+        folder,
+        {
+            "ann/test_arm.py": "good",
+            "bob/test_arm.py": "bad",
+            "cy/test_arm.py": "good",
+            "ann/lesson.json": json.dumps(record),
+            "bob/lesson.json": "{}",
+        },
+    )
     table = tmp_path / "t.csv"
     for _ in range(2):
         main(["check", str(folder), "--csv", str(table), "--tests"])
@@ -332,8 +342,7 @@ def test_functions_that_are_alike_are_told_whatever_is_named_how(
     assert entries["ann"].alike.startswith("100% ")
     assert entries["bob"].alike == ""  # it is not written yet
     assert float(entries["hal.py"].alike.partition("%")[0]) < 50
-    (row,) = (row for row in csv.DictReader(io.StringIO(csv_text(rows_of([entries["gus.py"]])))))
-    assert row["alike"] == "100% ann"
+    assert [row["alike"] for row in _table([entries["gus.py"]])] == ["100% ann"]
 
 
 def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
@@ -341,8 +350,7 @@ def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
     written_all(folder, {"helper.py": "ANSWER = 1\n", "gus.py": text, "ann/my_solution.py": text})
     found = [each for each in submissions([folder]) if each.name in ("ann", "gus.py")]
     ann, gus = judge_all(found, "mujoco")
-    assert ann.right == 4
-    assert not gus.judged
+    assert (ann.right, gus.judged) == (4, False)
     assert "helper.py, which was not handed in with it" in gus.functions[0].remarks[0]
 
 
@@ -385,8 +393,7 @@ def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> 
 
 def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -> None:
     evil = written(tmp_path / '=HYPERLINK("x").py', "return 'refuse'\n")
-    entries = judge_all([Submission(evil.name, evil)], "mujoco")
-    (row,) = csv.DictReader(io.StringIO(csv_text(rows_of(entries))))
+    (row,) = _table(judge_all([Submission(evil.name, evil)], "mujoco"))
     assert_has(row, file=f"'{evil.name}", remarks="it is refused")
 
 
@@ -409,9 +416,8 @@ def test_what_gradescope_reads(judged: list[str]) -> None:
     read = json.loads(gradescope_results(grade))
     tests = {each["name"]: each for each in read["tests"]}
     assert list(tests) == list(JUDGES)
-    assert [each["score"] for each in tests.values()] == [1, 0, 0, 0]
-    assert {each["max_score"] for each in tests.values()} == {1}
-    assert [each["status"] for each in tests.values()] == ["passed", "failed", "failed", "failed"]
+    told = [(each["score"], each["max_score"], each["status"]) for each in tests.values()]
+    assert told == [(1, 1, "passed"), *[(0, 1, "failed")] * 3]
     assert tests["demo_state"]["output"] == "wrong\nbad\nworse"
     assert tests["demo_replay"]["output"] == "not judged\nbusy"
     refused = json.loads(gradescope_results(None, "there is no file"))

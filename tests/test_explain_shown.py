@@ -18,8 +18,8 @@ from statemachine.report import why
 from statemachine.report.as_json import dumps
 
 from . import test_explain as known
-from .conftest import assert_in, need_engine
-from .explained import ALONE, ARM, changed, write
+from .conftest import assert_in, need_engine, written
+from .explained import ALONE, ARM, FLOOR, changed, with_changes
 
 MOVES = """
 def swing(model, data):
@@ -60,9 +60,9 @@ class Pair:
 
 BALL = (*Pair.words, "--quantity", "ball")
 SAGS = ("--measure", "end", "--quantity", "slides", "--seconds")
-BARE = ARM.replace(known.FLOOR, "")
+BARE = ARM.replace(FLOOR, "")
 DELAYED, _UNDELAYED, *_ = known.EASILY_MISSED["delay on the left"]
-DELAYED = known.with_changes(known.LED, DELAYED)
+DELAYED = with_changes(known.LED, DELAYED)
 # Each way in which figures and values are shown.
 PAIRS = {
     name: Pair(ARM, changed(ARM, ALONE[name]), (*Pair.words, "--quantity", ALONE[name].quantity))
@@ -74,7 +74,7 @@ PAIRS = {
     "interact": Pair(*known.that_interact(0)[:2], (*SAGS, "6"), "zero"),
     "brought over": Pair(*known.BROUGHT_OVER[0][:2], BALL),
     "the same motion": Pair(*known.EQUIVALENT["mocap body fixed"], BALL),
-    "delayed": Pair(DELAYED, known.with_changes(DELAYED, _UNDELAYED), function="turn"),
+    "delayed": Pair(DELAYED, with_changes(DELAYED, _UNDELAYED), function="turn"),
     "across engines": Pair(
         BARE,
         changed(BARE, ALONE["mass"]),
@@ -82,7 +82,7 @@ PAIRS = {
         right_engine="pybullet",
     ),
     "outside the list": Pair(
-        ARM, known.with_changes(ARM, [known.EXTRA]), ("--seconds", "1"), explained=False
+        ARM, with_changes(ARM, [known.EXTRA]), ("--seconds", "1"), explained=False
     ),
 }
 QUICK = ("mass", "the same", "add up")
@@ -110,14 +110,13 @@ def test_json_terminal_and_page_say_what_was_found(name, ran, tmp_path, here):
     """One run of the command; the other forms are of what it found."""
     pair = PAIRS[name]
     need_engine(pair.right_engine)
-    left, right = write(tmp_path, "left.xml", pair.left), write(tmp_path, "right.xml", pair.right)
-    function = f"{write(tmp_path, 'moves.py', MOVES)}:{pair.function}"
+    left = written(tmp_path / "left.xml", pair.left)
+    right = written(tmp_path / "right.xml", pair.right)
+    function = f"{written(tmp_path / 'moves.py', MOVES)}:{pair.function}"
     words = ["compare", function, str(left), f"{right}@{pair.right_engine}", *pair.words, "--why"]
 
-    done = here(*words, "--json")
-    assert done.returncode == (0 if pair.explained else 1)
+    told = json.loads(here(*words, "--json", code=int(not pair.explained)).stdout)
     (found,) = ran
-    told = json.loads(done.stdout)
     assert told.items() >= json.loads(dumps(found)).items()
     assert not any(each["name"].startswith("start") for each in told["shares"])
 
@@ -134,9 +133,9 @@ def test_json_terminal_and_page_say_what_was_found(name, ran, tmp_path, here):
         assert rounding or any(share in line for line in lines)
     assert found.shares or "All that is compared is the same" in text
     tables = [block for block in why.causes(found) if isinstance(block, Table)]
-    shown = [row for table in tables for row in table.rows][: len(rows)]
+    shown = [row for table in tables for row in table.rows]
     cells = [(row[0].partition(" (")[0], row[3].partition(" ±")[0]) for row in shown]
-    assert rounding or cells == rows
+    assert rounding or cells[: len(rows)] == rows
 
     page = tmp_path / "page.html"
     here(*words, "--no-chaos", "--html", page)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 from unittest.mock import Mock
 
 import pytest
@@ -21,8 +22,8 @@ from statemachine.errors import BadInputError
 from statemachine.processes.parallel import forks_for, in_forks
 from statemachine.report.as_json import dumps
 
-from .conftest import ROOT, lives, refused, soon
-from .explained import ALONE, ARM, SWING, changed, explained, write
+from .conftest import ROOT, lives, refused, soon, written, written_all
+from .explained import ALONE, ARM, SWING, changed, explained
 
 forks = pytest.mark.skipif(forks_for(2, 1.0, 2) == 1, reason="no forks here")
 FEW = ("mass", "gains", "gravity", "damping")
@@ -83,12 +84,12 @@ def test_what_cannot_be_run_is_told_alike(tmp_path: Path) -> None:
             raise ZeroDivisionError("of the function")
         return lambda _time, _data: [0.0] * model.nu
 
-    scenario = replace(SWING, controller=failing)
+    how: Any = {"scenario": replace(SWING, controller=failing), "seconds": 0.1, "jobs": 2}
     refused(
         (
             ZeroDivisionError,
             "of the function",
-            lambda: explained(tmp_path, ARM, _apart(ARM), scenario=scenario, seconds=0.1, jobs=2),
+            lambda: explained(tmp_path, ARM, _apart(ARM), **how),
         )
     )
 
@@ -191,25 +192,26 @@ def test_how_many_forks() -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_no_fork_stays(tmp_path: Path, number: int) -> None:
     """After a Ctrl-C, which goes to all, in one line; and where only the parent was killed."""
-    slow = write(
-        tmp_path,
-        "slow.py",
+    slow = written(
+        tmp_path / "slow.py",
         "import os, time\n\n"
         "def slow(model, data):\n"
         f"    open(r'{tmp_path}/' + str(os.getpid()) + '.pid', 'w').close()\n"
         "    time.sleep(0.02)\n"
         "    return None\n",
     )
-    left = str(write(tmp_path, "left.xml", ARM))
-    right = str(write(tmp_path, "right.xml", _apart(ARM)))
-    words = ["compare", f"{slow}:slow", left, right, "--why", "--seconds", "0.1", "--jobs", "2"]
-    command = [sys.executable, "-m", "statemachine", *words]
+    written_all(tmp_path, {"left.xml": ARM, "right.xml": _apart(ARM)})
+    sides = (tmp_path / "left.xml", tmp_path / "right.xml")
+    words = ("compare", f"{slow}:slow", *sides, "--why", "--seconds", "0.1", "--jobs", "2")
     run = subprocess.Popen(
-        command, cwd=ROOT, start_new_session=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, "-m", "statemachine", *words],
+        cwd=ROOT,
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
     )
     assert soon(lambda: len(list(tmp_path.glob("*.pid"))) >= 3)
     (os.killpg if number == signal.SIGINT else os.kill)(run.pid, number)
     _, err = run.communicate(timeout=30)
-    assert run.returncode == (130 if number == signal.SIGINT else -number)
-    assert err.strip() == b""
+    assert (run.returncode, err.strip()) == (130 if number == signal.SIGINT else -number, b"")
     assert soon(lambda: not any(lives(int(each.stem)) for each in tmp_path.glob("*.pid")))
