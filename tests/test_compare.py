@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from collections import defaultdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from statemachine.report import compare as report
 from statemachine.runs import Trace, record, write
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import Cli, assert_has, assert_in, one_line, opened, refused
+from .conftest import Cli, assert_has, assert_in, one_line, opened, refused, written
 from .small_models import NAMELESS_JOINTS, STILL, model_of
 from .test_strange_traces import added, changed
 from .test_strange_traces import named as by_name
@@ -67,8 +68,8 @@ def test_a_shifted_joint_is_found_with_its_size_and_time(hold: Trace) -> None:
 
 def test_a_difference_that_stays_differs(hold: Trace) -> None:
     found = compare(hold, changed(hold, qpos=added(hold.qpos, np.s_[50:, 2], 0.01)))
-    assert by_name(found)["elbow_flex"] is found.worst
-    assert (found.worst.verdict, found.agrees) == ("differs", False)
+    assert_has(found, worst=by_name(found)["elbow_flex"], agrees=False)
+    assert found.worst.verdict == "differs"
 
 
 def test_a_turned_and_moved_box_by_as_much_as_it_was(box: Trace) -> None:
@@ -102,10 +103,10 @@ def test_a_moved_and_turned_fingertip(hold: Trace) -> None:
 
 def test_a_tip_without_a_lever_arm_has_the_tolerance_of_a_slide() -> None:
     """A site in the origin of a cart is 0 from its foot: rounding must not count."""
-    zero = np.zeros(2)
-    assert tolerance_of("tip", zero, zero, 0.0, 0.01).value == QUANTITIES["slide"].tolerance
-    assert tolerance_of("tip", zero, zero, 0.4, 0.01).value == pytest.approx(0.4 * COUNT)
-    assert tolerance_of("tip", zero, zero, 0.0, 0.01, {"tip": 1.0}).value == 1.0
+    zero, slide = np.zeros(2), QUANTITIES["slide"].tolerance
+    for lever, given, value in ((0.0, {}, slide), (0.4, {}, 0.4 * COUNT), (0.0, {"tip": 1.0}, 1.0)):
+        tolerance = tolerance_of("tip", zero, zero, lever, 0.01, given)
+        assert tolerance.value == pytest.approx(value)
 
 
 def test_one_blow_does_not_widen_what_a_force_may_differ(box: Trace) -> None:
@@ -139,8 +140,8 @@ def mean_force(trace: Trace, name: str) -> float:
 
 def test_energy_against_what_the_run_turns_over(hold: Trace) -> None:
     size = 0.02 * np.ptp(hold["energy"].sum(axis=1))
-    energy = added(hold["energy"], np.s_[60:, 1], size)
-    found = by_name(compare(hold, changed(hold, energy=energy)))["energy"]
+    two = changed(hold, energy=added(hold["energy"], np.s_[60:, 1], size))
+    found = by_name(compare(hold, two))["energy"]
     assert_has(found, max=pytest.approx(size, rel=1e-9), verdict="differs")
 
 
@@ -153,10 +154,9 @@ def test_a_touch_that_is_late_and_one_that_never_comes(hold: Trace) -> None:
 
     name = "gripper on floor, first touch"
     assert by_name(compare(hold, later(1)))[name].verdict == "agrees"
-    late = by_name(compare(hold, later(3)))[name]
+    late, never = (by_name(compare(hold, later(rows)))[name] for rows in (3, 10_000))
     assert_has(late, max=pytest.approx(0.015), verdict="differs")
-    never = by_name(compare(hold, later(10_000)))[name]
-    assert (never.verdict, never.note) == ("differs", "never on mujoco (second)")
+    assert_has(never, verdict="differs", note="never on mujoco (second)")
     assert by_name(compare(later(10_000), hold))[name].max == never.max
     assert name not in by_name(compare(later(10_000), later(10_000)))
 
@@ -173,19 +173,15 @@ def test_what_becomes_of_a_contact(box: Trace, hold: Trace) -> None:
 def test_the_whole_force_of_a_contact_is_the_engines(box: Trace, mujoco_box: sm.Model) -> None:
     """Friction and all, added as vectors; on the box the two jaws and its weight balance."""
     row = len(box) - 1
-    with opened(
-        mujoco_box, qpos=box.qpos[row], qvel=box.qvel[row], ctrl=box.ctrl[row], derived=True
-    ) as (
-        _,
-        data,
-    ):
-        found: dict[tuple[int, ...], Any] = {}
+    inputs = {name: getattr(box, name)[row] for name in ("qpos", "qvel", "ctrl")}
+    with opened(mujoco_box, derived=True, **inputs) as (_, data):
+        found: dict[tuple[int, ...], Any] = defaultdict(float)
         for geoms, frame, force in zip(
             data.contacts.geom, data.contacts.frame, data.contacts.force, strict=True
         ):
             bodies = [int(mujoco_box.geom_bodyid[geom]) for geom in geoms]
-            push = frame.reshape(3, 3).T @ force * (1 if bodies[0] < bodies[1] else -1)
-            found[tuple(sorted(bodies))] = found.get(tuple(sorted(bodies)), 0.0) + push
+            sign = 1 if bodies[0] < bodies[1] else -1
+            found[tuple(sorted(bodies))] += frame.reshape(3, 3).T @ force * sign
     given, normal = total_forces(box), normal_forces(box)
     assert len(found) == len(given) == 2
     for bodies, push in found.items():
@@ -212,14 +208,14 @@ def test_how_the_engines_part_in_the_hold() -> None:
     assert touch.left.force > 10
     assert touch.right.last < 0.5
     # They part when the finger meets the floor.
-    assert found["gripper on floor, first touch"].verdict == "agrees"
-    began = found["gripper on floor, first touch"].at
+    first = found["gripper on floor, first touch"]
+    assert first.verdict == "agrees"
     joints = [each for each in found.values() if each.kind == "joint"]
-    assert min(each.since for each in joints if each.since is not None) >= began
+    assert min(each.since for each in joints if each.since is not None) >= first.at
     # FINDINGS: 2.6 degrees in the transient, in contact.
     assert np.degrees(max(each.max for each in joints)) == pytest.approx(2.6, abs=0.1)
-    before = [c for c in series(one, two) if c.kind == "joint"]
-    assert max(c.difference[c.time < began].max() for c in before) < np.radians(1e-6)
+    curves = (curve for curve in series(one, two) if curve.kind == "joint")
+    assert max(c.difference[c.time < first.at].max() for c in curves) < np.radians(1e-6)
 
 
 def test_moments_that_both_have_are_compared_and_no_others() -> None:
@@ -262,31 +258,24 @@ def test_joints_without_names_are_each_compared(tmp_path: Path) -> None:
 
 
 def test_tolerances_are_read_in_their_units(hold: Trace) -> None:
-    words = [
-        "joint=0.5deg",
-        "tip=2mm",
-        "energy=3mJ",
-        "contact=10ms",
-        "force=1N",
-        "tip-rotation=1rad",
-    ]
-    given = parse_tolerances(words)
-    assert given["joint"] == pytest.approx(np.radians(0.5))
-    assert [given[kind] for kind in ("tip", "energy", "contact", "force")] == [2e-3, 3e-3, 1e-2, 1]
-    assert given["tip rotation"] == 1.0
+    words = ("joint=0.5deg", "tip=2mm", "energy=3mJ", "contact=10ms", "force=1N")
+    given = parse_tolerances([*words, "tip-rotation=1rad"])
+    assert given.pop("joint") == pytest.approx(np.radians(0.5))
+    assert given == {"tip": 2e-3, "energy": 3e-3, "contact": 1e-2, "force": 1, "tip rotation": 1}
+    given["joint"] = np.radians(0.5)
     qpos = added(hold.qpos, np.s_[50:, 2], np.radians(0.4))
     found = by_name(compare(hold, changed(hold, qpos=qpos), tolerances=given))["elbow_flex"]
-    assert (found.verdict, found.reason) == ("agrees", "as given")
+    assert_has(found, verdict="agrees", reason="as given")
 
 
 def test_what_cannot_be_compared_is_refused(hold: Trace, no_pybullet: None) -> None:
     names = tuple(f"other_{name}" for name in hold.header.joints)
     other = Trace(dataclasses.replace(hold.header, joints=names), hold.columns)
     request = Request(("hold",), seconds=1.0)  # which was not recorded
-    words = ("", "=", "=x", "=-1", "=nandeg", "=1mm", "=5", "=-1deg")
+    numbers = ("", "=", "=x", "=-1", "=nandeg", "=1mm", "=5", "=-1deg")
+    words = [*(f"joint{number}" for number in numbers), "tip=1deg"]
     refused(
-        *((BadInputError, "", partial(parse_tolerances, [f"joint{word}"])) for word in words),
-        (BadInputError, "", lambda: parse_tolerances(["tip=1deg"])),
+        *((BadInputError, "", partial(parse_tolerances, [word])) for word in words),
         (TraceError, "no joint in common", lambda: compare(hold, other)),
         (UnknownNameError, "kind of quantity", lambda: parse_tolerances(["elbow=1"])),
         (MissingEngineError, "pybullet is not installed", lambda: run_sides(request)),
@@ -300,8 +289,7 @@ def test_what_cannot_be_compared_is_refused(hold: Trace, no_pybullet: None) -> N
 def test_free_of_contact_the_engines_agree() -> None:
     for name in ("droop", "fall", "waves"):
         run = run_sides(name)
-        one, two = run.traces
-        found = compare(one, two)
+        found = compare(*run.traces)
         assert found.agrees, name
         assert not run.said
         joints = [each.max for each in found.agreements if each.kind == "joint"]
@@ -311,8 +299,7 @@ def test_free_of_contact_the_engines_agree() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
-    one, two = run_sides(Request(("hold",), defaults="engine")).traces
-    found = compare(one, two)
+    found = compare(*run_sides(Request(("hold",), defaults="engine")).traces)
     # FINDINGS: POSITION_CONTROL is 13 to 41 degrees off in the transient, at 5 ms.
     assert np.degrees(by_name(found)["elbow_flex"].max) > 13
     assert_in(" ".join(found.notes), "gravity differs: 0 0 -9.81 and 0 0 0", "timesteps differ")
@@ -339,10 +326,8 @@ def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace, tmp_path: Pa
     binary = tmp_path / "hold.mjb"  # which Pinocchio does not read, and nobody as XML
     binary.write_bytes(b"\x00binary")
     assert witness(hold, hold, binary) is None
-    unknown = dataclasses.replace(
-        hold.header,
-        provenance=dataclasses.replace(hold.header.provenance, model_file="no/such.xml"),
-    )
+    nowhere = dataclasses.replace(hold.header.provenance, model_file="no/such.xml")
+    unknown = dataclasses.replace(hold.header, provenance=nowhere)
     assert witness(Trace(unknown, hold.columns), hold) is None
 
 
@@ -360,11 +345,9 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
     no_pybullet: None, name: str, defaults: Any
 ) -> None:
     run = run_sides(Request((name,), defaults=defaults))
-    one, two = run.traces
-    assert not one.header.recorded
-    assert two.header.recorded
+    assert [bool(trace.header.recorded) for trace in run.traces] == [False, True]
     assert "recorded run that comes with the package" in run.said[0]
-    found = compare(one, two)
+    found = compare(*run.traces)
     assert any("single precision" in note for note in found.notes)
     assert ", recorded" in found.right.label
     if defaults == "model":
@@ -391,10 +374,10 @@ def test_the_command(here: Cli) -> None:
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("form", ["html", "plot"])
 def test_a_robot_that_stands_still_agrees_with_itself(form: str, here: Cli, tmp_path: Path) -> None:
-    (tmp_path / "still.xml").write_text(STILL)
+    file = written(tmp_path / "still.xml", STILL)
     out = tmp_path / ("a.html" if form == "html" else "a.svg")
-    done = here("compare", "fall", "--model", tmp_path / "still.xml", f"--{form}", out)
-    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    done = here("compare", "fall", "--model", file, f"--{form}", out, code=0)
+    assert "Traceback" not in done.stderr
     # As it is spelt in the file, or as a page escapes it.
     assert "a$b$c" in out.read_text()
 
@@ -406,10 +389,9 @@ def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
     write(hold, tmp_path / "whole.npz")
     write(changed(hold, xpos=xpos), tmp_path / "nan.npz")
     for pair in (("nan.npz", "whole.npz"), ("whole.npz", "nan.npz")):
-        done = here("compare", *(tmp_path / name for name in pair), "--html", tmp_path / "a.html")
-        assert "Traceback" not in done.stderr
+        assert "Traceback" not in here("compare", *pair, "--html", "a.html").stderr
         assert (tmp_path / "a.html").stat().st_size > 100_000
-    done = here("trace", "film", tmp_path / "nan.npz", "-o", tmp_path / "a.webp")
+    done = here("trace", "film", "nan.npz", "-o", "a.webp")
     one_line(done, "no poses of the bodies that are numbers", done.returncode)
 
 

@@ -27,7 +27,8 @@ from statemachine.report import compare as report
 from statemachine.runs import record, write
 from statemachine.runs.controllers import function_scenario
 
-from .conftest import Cli, assert_has, need_engine, one_line, refused, written, written_all
+from .conftest import ROOT, Cli, assert_has, need_engine, one_line, refused, written, written_all
+from .explained import with_changes
 from .small_models import BENT, TWO_LINKS, TWO_SERVOS
 
 _FUNCTION = """
@@ -126,12 +127,10 @@ def test_a_side_is_read_as_it_is_typed(files: Path) -> None:
     sides = parse_sides(
         [arm, f"{arm}@mujoco timestep=0.001 contacts=off", "so101@mujoco:engine", "gravity=0,0,-1"]
     )
-    assert [side.engine for side in sides] == ["mujoco"] * 3
-    assert [side.defaults for side in sides] == ["model", "model", "engine"]
-    assert [dict(side.options) for side in sides] == [
-        {},
-        {"timestep": 0.001, "contacts": False},
-        {"gravity": [0.0, 0.0, -1.0]},
+    assert [(side.engine, side.defaults, dict(side.options)) for side in sides] == [
+        ("mujoco", "model", {}),
+        ("mujoco", "model", {"timestep": 0.001, "contacts": False}),
+        ("mujoco", "engine", {"gravity": [0.0, 0.0, -1.0]}),
     ]
     assert sides[1].label == "arm.xml@mujoco timestep=0.001 contacts=off"
     assert sides[1].load().timestep == 0.001
@@ -139,12 +138,13 @@ def test_a_side_is_read_as_it_is_typed(files: Path) -> None:
 
 
 def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
-    odd = written(files / "a b@mujoco timestep=1.xml", (files / "arm.xml").read_text())
-    (side,) = parse_sides([str(odd)])
-    assert (side.file, side.engine, dict(side.options)) == (str(odd), "mujoco", {})
-    spaced = written(files / "my arm.xml", (files / "arm.xml").read_text())
-    (side,) = parse_sides([f"{spaced} timestep=0.001"])
-    assert (side.file, dict(side.options)) == (str(spaced), {"timestep": 0.001})
+    for name, more, options in (
+        ("a b@mujoco timestep=1.xml", "", {}),
+        ("my arm.xml", " timestep=0.001", {"timestep": 0.001}),
+    ):
+        file = str(written(files / name, (files / "arm.xml").read_text()))
+        (side,) = parse_sides([file + more])
+        assert (side.file, side.engine, dict(side.options)) == (file, "mujoco", options)
 
 
 @pytest.mark.parametrize(
@@ -208,8 +208,7 @@ def test_two_sides_on_one_engine_are_called_by_what_tells_them_apart(
 def test_one_file_on_two_engines(files: Path) -> None:
     arm = str(files / "arm.xml")
     _, found = ran("hold", Side(arm), Side(arm, "pybullet"))
-    assert found.agrees
-    assert (found.left.short, found.right.short) == ("mujoco", "pybullet")
+    assert (found.agrees, found.left.short, found.right.short) == (True, "mujoco", "pybullet")
     as_it_comes = Side(arm, "pybullet", "engine")
     run, found = ran("hold", Side(arm, options={"timestep": 1 / 240}), as_it_comes)
     assert not found.agrees
@@ -217,11 +216,9 @@ def test_one_file_on_two_engines(files: Path) -> None:
 
 
 def test_an_mjcf_against_its_own_urdf() -> None:
-    root = Path(sm.__file__).parent.parent / "models"
-    if not root.is_dir():
-        pytest.skip("no checkout")
-    run = run_sides(asked("fall", Side("so101"), Side(str(root / "so101" / "so101.urdf"))))
-    names = {each.name for each in compare(run.left, run.right).agreements}
+    urdf = str(ROOT / "models" / "so101" / "so101.urdf")
+    run, found = ran("fall", Side("so101"), Side(urdf))
+    names = {each.name for each in found.agreements}
     assert {"shoulder_pan", "elbow_flex", "gripper", "energy"} <= names
     (line,) = run.unmatched
     assert line.startswith("only so101.xml has actuators shoulder_pan, ")
@@ -258,45 +255,44 @@ def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_a_tool_frame_that_the_right_calls_otherwise(files: Path, here: Cli) -> None:
-    renamed = (files / "renamed.xml").read_text().replace("gripperframe", "tcp")
-    (files / "renamed.xml").write_text(renamed)
+    renamed = files / "renamed.xml"
+    written(renamed, renamed.read_text().replace("gripperframe", "tcp"))
     words = ("compare", "hold", "arm.xml", "renamed.xml@pybullet", "--seconds", "0.2", "--json")
-    found = json.loads(here(*words, "--no-chaos").stdout)
-    assert found["only"][1] == {"joint": [], "actuator": [], "site": []}  # found by its place
-    assert "site 'gripperframe' on the left is taken for 'tcp'" in " ".join(found["unmatched"])
-    names = [each["name"] for each in found["comparison"]["agreements"]]
-    assert "gripperframe, position" in names
-    mapped = json.loads(here(*words, "--no-chaos", "--map", "gripperframe=tcp").stdout)
-    tip = {each["name"]: each["max"] for each in mapped["comparison"]["agreements"]}
-    assert tip["gripperframe, position"] < 1e-9
+    for more in ((), ("--map", "gripperframe=tcp")):
+        found = json.loads(here(*words, "--no-chaos", *more).stdout)
+        tip = {each["name"]: each["max"] for each in found["comparison"]["agreements"]}
+        assert tip["gripperframe, position"] < 1e-9
+        assert found["only"][1] == {"joint": [], "actuator": [], "site": []}  # found by its place
+        said = "site 'gripperframe' on the left is taken for 'tcp'"
+        assert (said in " ".join(found["unmatched"])) == (not more)
 
 
 def test_what_cannot_be_matched_is_said(files: Path) -> None:
-    extra = (files / "arm.xml").read_text()
-    extra = extra.replace(
-        "</worldbody>",
-        '<body name="ball" pos="1 0 1"><freejoint name="ball"/><geom size=".1"/></body>'
-        "</worldbody>",
-    ).replace('qpos=".2 -.3"', 'qpos=".2 -.3 1 0 1 1 0 0 0"')
-    (files / "more.xml").write_text(extra)
-    run, found = ran("hold", Side(str(files / "arm.xml")), Side(str(files / "more.xml")))
+    ball = '<body name="ball" pos="1 0 1"><freejoint name="ball"/><geom size=".1"/></body>'
+    changes = [
+        ("</worldbody>", f"{ball}</worldbody>"),
+        ('qpos=".2 -.3"', 'qpos=".2 -.3 1 0 1 1 0 0 0"'),
+    ]
+    more = written(files / "more.xml", with_changes((files / "arm.xml").read_text(), changes))
+    run, found = ran("hold", Side(str(files / "arm.xml")), Side(str(more)))
     assert run.unmatched[0] == "only more.xml has joint ball: not compared"
-    names = {each.name for each in found.agreements}
-    assert {"shoulder", "elbow", "gripperframe, position"} <= names
-    assert "energy" not in names  # that of the ball is in it
-    assert {each.max for each in found.agreements} == {0.0}
+    gaps = {each.name: each.max for each in found.agreements}
+    assert {"shoulder", "elbow", "gripperframe, position"} <= set(gaps)
+    assert "energy" not in gaps  # that of the ball is in it
+    assert set(gaps.values()) == {0.0}
 
 
 def test_sides_that_do_not_fit_are_refused_before_anything_runs(files: Path) -> None:
-    (files / "ball.xml").write_text(
+    ball = written(
+        files / "ball.xml",
         '<mujoco><worldbody><body name="b" pos="0 0 1"><freejoint/><geom size=".1"/></body>'
-        "</worldbody></mujoco>"
+        "</worldbody></mujoco>",
     )
-    arm, ball = str(files / "arm.xml"), Side(str(files / "ball.xml"))
+    arm = str(files / "arm.xml")
     other = Side(arm, options={"timestep": 1 / 240})
     refused(
         (TraceError, r"no joint in common.*--map LEFT=RIGHT",
-         lambda: run_sides(asked("gravity", Side(arm), ball))),
+         lambda: run_sides(asked("gravity", Side(arm), Side(str(ball))))),
         (TraceError, r"timestep=0\.002 behind the right",
          lambda: run_sides(asked("hold", Side(arm), other, seconds=0.1))),
     )  # fmt: skip
@@ -405,8 +401,8 @@ def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
 
 def test_a_recorded_run_is_played_on_both(files: Path, here: Cli) -> None:
     model = sm.load(files / "arm.xml")
-    ctrl = [0.3, -0.2]
-    path = write(record(model, lambda time, data: ctrl, 0.2, qpos=[0.1, 0.2]), files / "run.npz")
+    run = record(model, lambda time, data: [0.3, -0.2], 0.2, qpos=[0.1, 0.2])
+    path = write(run, files / "run.npz")
     sides = Side(str(files / "turned.xml")), Side(str(files / "heavy.xml"))
     run = run_sides(Request((str(path),), sides=sides))
     assert run.commands == "recorded"
@@ -415,8 +411,8 @@ def test_a_recorded_run_is_played_on_both(files: Path, here: Cli) -> None:
         told = dict(zip(trace.header.actuators, trace.ctrl[0], strict=True))
         assert told == {"shoulder": 0.3, "elbow": -0.2}
     # So it is where the sides run again: the two files are one robot.
-    why = json.loads(here("compare", "run.npz", "turned.xml", "arm.xml", "--why", "--json").stdout)
-    assert why["gap"] == 0
+    words = ("compare", "run.npz", "turned.xml", "arm.xml", "--why", "--json")
+    assert json.loads(here(*words).stdout)["gap"] == 0
     same = run_sides(Request((str(path),), sides=(Side(str(files / "arm.xml")),) * 2))
     assert largest(compare(same.left, same.right)) == 0
     refused(
@@ -432,12 +428,14 @@ def test_a_recorded_run_is_played_on_both(files: Path, here: Cli) -> None:
 
 
 def test_words_are_sorted_into_what_and_sides() -> None:
-    assert split_words(["hold"]) == (("hold",), ())
-    assert split_words(["a.npz", "b.npz"]) == (("a.npz", "b.npz"), ())
-    what, sides = split_words(["a.npz", "so101", "timestep=0.001", "so101@mujoco:engine"])
-    assert what == ("a.npz",)
-    assert [dict(side.options) for side in sides] == [{"timestep": 0.001}, {}]
-    assert split_words(["x.py:f", "so101", "so101"])[0] == ("x.py:f",)
+    for words, what, options in (
+        ("hold", ("hold",), []),
+        ("a.npz b.npz", ("a.npz", "b.npz"), []),
+        ("a.npz so101 timestep=0.001 so101@mujoco:engine", ("a.npz",), [{"timestep": 0.001}, {}]),
+        ("x.py:f so101 so101", ("x.py:f",), [{}, {}]),
+    ):
+        found, sides = split_words(words.split())
+        assert (found, [dict(side.options) for side in sides]) == (what, options)
 
 
 def test_the_command_shows_both_loops(files: Path, here: Cli) -> None:
@@ -470,11 +468,11 @@ def test_a_file_without_motors_and_floor_gets_those_of_the_other(tmp_path: Path)
     bare = Side(str(written(tmp_path / "bare.xml", _bare(0.3))))
     got = bare.taking(("actuators", "floor"), whole, {}).load()
     assert (got.nu, got.timestep) == (2, 0.002)
-    raw, own = got.raw, whole.load().raw
+    own = whole.load().raw
     for name in dir(own):
         value = getattr(own, name) if not name.startswith("_") else None
         if isinstance(value, np.ndarray) and "name" not in name:
-            assert np.array_equal(value, getattr(raw, name), equal_nan=True), name
+            assert np.array_equal(value, getattr(got.raw, name), equal_nan=True), name
     lacking = whole.taking(("actuators", "floor"), bare, {}).load()
     assert (lacking.nu, lacking.ngeom) == (0, 1)
 
@@ -502,9 +500,10 @@ def test_parts_that_cannot_be_given_are_one_clear_line(
     monkeypatch.chdir(tmp_path)
     siteless = re.sub("<site.*?/>", "", _bare(0.3))
     written_all(tmp_path, {"whole.xml": _WITH.format(damping=0.3), "nosite.xml": siteless})
-    sides = ("whole.xml", "nosite.xml")
-    one_line(here("compare", "hold", *sides, "--actuators", "left"), "that is 'end'")
     whole: Any = sm.load("whole.xml")
     whole.save_binary(tmp_path / "b.mjb")
-    binary = ("whole.xml", "b.mjb", "--trust-binary")
-    one_line(here("compare", "hold", *binary, "--floor", "left"), "b.mjb is binary")
+    for words, says in (
+        ("nosite.xml --actuators left", "that is 'end'"),
+        ("b.mjb --trust-binary --floor left", "b.mjb is binary"),
+    ):
+        one_line(here("compare", "hold", "whole.xml", *words.split()), says)

@@ -38,10 +38,14 @@ from .conftest import (
     Cli,
     Patch,
     around,
+    assert_has,
+    assert_in,
+    assert_not_in,
     bullet_clients,
     followed_by,
     in_its_own_python,
     need_engine,
+    of_python,
     refused,
     written,
 )
@@ -218,26 +222,28 @@ def test_every_question_has_facts() -> None:
 @pytest.mark.usefixtures("bullet")
 def test_the_figures_are_those_of_closed_forms() -> None:
     """Not what the engines gave before: what they must give."""
-    # A tip at 0.8 m and 0.4 rad is a chord away from where it was.
-    assert figures("write", "mujoco", "the tip")["off by"] == pytest.approx(0.8 * 2 * 0.198669331)
-    # It lags by its way in one step: speed · timestep.
-    assert figures("step", "mujoco", "the contact")["off by"] == pytest.approx(3 * 0.002)
-    assert figures("step", "mujoco", "the tip")["off by"] == pytest.approx(0.8 * 3 * 0.002, 0.02)
-    assert figures("step", "pybullet", "the tip")["off by"] == pytest.approx(0.8 * 3 / 240, 0.02)
+    for words, expected, rel in (
+        # A tip at 0.8 m and 0.4 rad is a chord away from where it was.
+        (("write", "mujoco", "the tip"), 0.8 * 2 * 0.198669331, 1e-6),
+        # It lags by its way in one step: speed · timestep.
+        (("step", "mujoco", "the contact"), 3 * 0.002, 1e-6),
+        (("step", "mujoco", "the tip"), 0.8 * 3 * 0.002, 0.02),
+        (("step", "pybullet", "the tip"), 0.8 * 3 / 240, 0.02),
+    ):
+        assert figures(*words)["off by"] == pytest.approx(expected, rel), words
     held = figures("actuation", "pybullet", "as loaded")
     assert held["moves"] == pytest.approx(0, abs=1e-6)
     assert -held["its motor exerts"] == pytest.approx(9.81 * 0.5)
-    slopes = figures("friction", "pybullet").values()
-    assert all(slope == pytest.approx(0.25 * 0.75, rel=0.05) for slope in slopes)
-    slopes = figures("friction", "mujoco", "equal priority").values()
-    assert all(slope == pytest.approx(0.75, rel=0.05) for slope in slopes)
+    for words, coefficient in ((("pybullet",), 0.25 * 0.75), (("mujoco", "equal priority"), 0.75)):
+        slopes = figures("friction", *words)
+        assert slopes == pytest.approx(dict.fromkeys(slopes, coefficient), rel=0.05)
 
 
 @pytest.mark.slow
 def test_a_second_look_sees_the_same() -> None:
     """Bit by bit: nothing is random, and no probe leaves a trace in the next."""
-    found = available()[0]
-    assert probe(found) == probe(found)
+    engines_here = available()[0]
+    assert probe(engines_here) == probe(engines_here)
 
 
 def test_the_limp_pendulum_keeps_its_energy() -> None:
@@ -257,8 +263,8 @@ def test_no_two_orders_of_the_joints_are_the_same() -> None:
 
 def test_what_nothing_explains_is_undecided() -> None:
     assert closest({"a": 0.1, "b": 1.0, "c": 2.0}) == ("a", 0.1, 1.0)
-    assert closest({"a": 0.9, "b": 1.0})[0] == UNDECIDED
-    assert closest({"a": 0.0, "b": 0.0})[0] == UNDECIDED
+    for a, b in ((0.9, 1.0), (0.0, 0.0)):
+        assert closest({"a": a, "b": b})[0] == UNDECIDED
 
 
 # An engine that behaved otherwise would get another answer.
@@ -476,8 +482,7 @@ def test_no_world_and_no_file_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 def test_every_call_works(engine: str) -> None:
     table = run_phrases([engine]).engines[engine]
-    assert tuple(call.concept for call in table) == CONCEPTS
-    assert [call.said for call in table if not call.works] == []
+    assert [(call.concept, call.works) for call in table] == [(name, True) for name in CONCEPTS]
 
 
 def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
@@ -485,8 +490,8 @@ def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> No
     own = room(engine).phrases()
     file = written(tmp_path / own.file[0], own.file[1])
     lines = [f"file = {str(file)!r}", *(own.cells[name].code for name in CONCEPTS)]
-    done = in_its_own_python("\n".join([*lines, "print(len(worlds))"]), tmp_path)
-    assert done.returncode == 0, done.stderr
+    lines.append("print(len(worlds))")
+    done = of_python("-c", "\n".join(lines), folder=tmp_path, code=0)
     assert done.stdout.splitlines()[-1] == "3"
 
 
@@ -496,9 +501,9 @@ def test_a_cell_that_does_nothing_is_found_out(
 ) -> None:
     cells: Any = room(engine).phrases().cells
     monkeypatch.setitem(cells, concept, dataclasses.replace(cells[concept], code="pass"))
-    found = {call.concept: call for call in run_phrases([engine]).engines[engine]}
-    assert not found[concept].works
-    assert not report.calls_page(run_phrases([engine])).holds
+    table = run_phrases([engine])
+    assert concept in [call.concept for call in table.engines[engine] if not call.works]
+    assert not report.calls_page(table).holds
 
 
 # The command.
@@ -514,8 +519,8 @@ def test_the_page_reads_well_piped(cli: Cli, arguments: tuple[str, ...]) -> None
     lines = done.stdout.splitlines()
     assert max(map(cell_len, lines)) <= 80
     assert all(line == line.rstrip() for line in lines)
-    assert all(word not in done.stdout for word in ("\x1b", "✗", UNDECIDED))
-    assert all(name in done.stdout for name in ENGINES)
+    assert_not_in(done.stdout, "\x1b", "✗", UNDECIDED)
+    assert_in(done.stdout, *ENGINES)
 
 
 @pytest.mark.parametrize("more", [(), ("--calls",)])
@@ -532,12 +537,12 @@ def test_all_engines_are_missing(cli: Cli, without: Any) -> None:
 
 
 def test_a_call_that_fails_is_the_exit_code() -> None:
-    spoilt = (
+    done = in_its_own_python(
         "import mujoco, sys\nfrom statemachine.cli import main\n"
         "mujoco.mj_forward = lambda m, d: None\n"
-        "sys.exit(main(('conventions', '--calls', '--backend', 'mujoco')))"
+        "sys.exit(main(('conventions', '--calls', '--backend', 'mujoco')))",
+        ROOT,
     )
-    done = in_its_own_python(spoilt, ROOT)
     assert (done.returncode, done.stderr) == (1, "")
     assert "✗ mujoco, recompute: it ran, and what it should do did not happen" in done.stdout
 
@@ -565,7 +570,7 @@ def test_a_room_of_another_package_may_have_some_of_the_methods(
     assert answers("gravity", "theirs") == {"": "told 0 0 -50, felt 0 0 -1"}
     assert ask("timestep", "theirs") is None
     (phrase,) = run_phrases(["theirs"]).engines["theirs"]
-    assert (phrase.concept, phrase.works, phrase.said) == ("load", True, "")
+    assert_has(phrase, concept="load", works=True, said="")
     refused((UnknownNameError, "calls can be recorded", lambda: record("", "theirs")))
 
 

@@ -59,10 +59,8 @@ def test_what_is_fast_is_no_divergence(tmp_path: Path, timestep: float) -> None:
 def test_no_motor_drives_a_joint_beyond_the_bound(
     tmp_path: Path, actuator: str, fastest: float
 ) -> None:
-    text = ROTOR.format(timestep=0.01, actuator=actuator).replace(
-        '<geom type="cylinder"', '<geom type="cylinder" mass=".31416"'
-    )
-    model = loaded(tmp_path, text)
+    text = ROTOR.format(timestep=0.01, actuator=actuator)
+    model = loaded(tmp_path, text.replace('"cylinder"', '"cylinder" mass=".31416"'))
     assert bound(model)[0] == pytest.approx(fastest, rel=1e-3)
     after(model, 100, ctrl=1)
 
@@ -70,8 +68,8 @@ def test_no_motor_drives_a_joint_beyond_the_bound(
 def test_the_bound_follows_the_timestep_and_the_size(tmp_path: Path) -> None:
     """1000 rad, or 1000 times the extent, in a timestep."""
     model = loaded(tmp_path, ROTOR.format(timestep=1e-4, actuator=""), gravity=[0, 0, 0])
-    extent = float(model.compiled.stat.extent)
-    assert bound(model) == pytest.approx([1e7] + [1e7 * extent] * 4 + [1e7] * 3)
+    slide = 1e7 * float(model.compiled.stat.extent)
+    assert bound(model) == pytest.approx([1e7, *[slide] * 4, *[1e7] * 3])
     assert bound(model.replace(timestep=2e-4))[0] == pytest.approx(5e6)
     assert bound(model.replace(substeps=2))[0] == pytest.approx(2e7)
 
@@ -92,12 +90,14 @@ def explode(model: sm.Model) -> DivergedError:
 
 def test_an_explosion_is_raised_early(tmp_path: Path) -> None:
     model = loaded(tmp_path, STUCK_POST)
-    error = explode(model)
+    # Set lower it raises before; set as high as positions may be, later.
+    lower, error, higher = (
+        explode(variant)
+        for variant in (model.replace(max_qvel=10), model, model.replace(max_qvel=HUGE))
+    )
+    assert lower.time < error.time < higher.time < 0.1
     assert "went beyond max_qvel, 5e+05, at time" in str(error)
     assert error.quantity == "qvel"
-    # Set lower it raises before; set as high as positions may be, later.
-    lower, higher = explode(model.replace(max_qvel=10)), explode(model.replace(max_qvel=HUGE))
-    assert lower.time < error.time < higher.time < 0.1
 
 
 def test_the_bound_can_be_set(tmp_path: Path) -> None:
@@ -164,9 +164,6 @@ def test_both_sides_may_diverge(tmp_path: Path) -> None:
       <general joint="wheel" gainprm="1" biastype="affine" biasprm=".1 0 2" ctrlrange="-1 1"/>
       </actuator></mujoco>""",
     )
-    one, two = run_sides(Request(("droop",), model=str(path))).traces
-    found = compare_traces(one, two)
-    assert found.left.trace.header.ended
-    assert found.right.trace.header.ended
-    headline = report.page(found).headline
-    assert "ended early" in headline.text
+    traces = run_sides(Request(("droop",), model=str(path))).traces
+    assert all(trace.header.ended for trace in traces)
+    assert "ended early" in report.page(compare_traces(*traces)).headline.text
