@@ -60,21 +60,21 @@ def test_public_arm_agrees(menagerie: Path) -> None:
 def test_batch_is_the_single_pose_many_times() -> None:
     kinematics = sm.Kinematics("so101")
     qpos = np.random.default_rng(1).uniform(-1, 1, (20, 6))
-    for kind, name in (("site", "gripperframe"), ("body", "wrist")):
-        batch = kinematics.poses(qpos, name, kind)  # pyright: ignore[reportArgumentType]
-        assert (batch.pos.shape, batch.mat.shape) == ((20, 3), (20, 3, 3))
-        for k in range(20):
-            pose = kinematics.pose(qpos[k], name, kind)  # pyright: ignore[reportArgumentType]
-            assert np.array_equal(pose.pos, batch.pos[k])
-            assert np.array_equal(pose.mat, batch.mat[k])
+    kinds: Any = (("gripperframe", "site"), ("wrist", "body"))
+    for frame in kinds:
+        batch = kinematics.poses(qpos, *frame)
+        poses = [kinematics.pose(row, *frame) for row in qpos]
+        assert np.array_equal(batch.pos, [pose.pos for pose in poses])
+        assert np.array_equal(batch.mat, [pose.mat for pose in poses])
     assert kinematics.poses(np.zeros((0, 6)), "gripperframe").pos.shape == (0, 3)
 
 
 def test_joints_can_come_in_another_order() -> None:
-    names = sm.load("so101").joint_names
-    qpos = np.arange(6) / 10
-    straight = sm.Kinematics("so101").pose(qpos, "gripperframe")
-    turned = sm.Kinematics("so101", joint_names=names[::-1]).pose(qpos[::-1], "gripperframe")
+    names, qpos = sm.load("so101").joint_names, np.arange(6) / 10
+    straight, turned = (
+        sm.Kinematics("so101", joint_names=names[::way]).pose(qpos[::way], "gripperframe")
+        for way in (1, -1)
+    )
     assert np.array_equal(straight.pos, turned.pos)
 
 
@@ -271,21 +271,17 @@ TRAPS = {
 def _poses_agree(model: sm.Model, kinematics: sm.Kinematics) -> float:
     """The largest gap of any body and site to the engine's."""
     worst = 0.0
-    sites, bodies = kinematics.site_names, kinematics.body_names
-    assert (len(sites), len(bodies)) == (model.nsite, model.nbody)
     for qpos in np.random.default_rng(0).normal(size=(4, model.nq)):
         with opened(model, qpos=qpos, derived=True) as (_, data):
             kinds: Any = (
-                ("site", sites, data.site_xpos, data.site_xmat),
-                ("body", bodies, data.xpos, matrix_from_quat(data.xquat)),
+                ("site", kinematics.site_names, data.site_xpos, data.site_xmat),
+                ("body", kinematics.body_names, data.xpos, matrix_from_quat(data.xquat)),
             )
             for kind, names, places, mats in kinds:
-                poses = [kinematics.pose(data.qpos, name, kind) for name in names]
-                gaps = [pose.pos - place for pose, place in zip(poses, places, strict=True)]
-                gaps += [
-                    pose.mat.ravel() - mat.ravel() for pose, mat in zip(poses, mats, strict=True)
-                ]
-                worst = max(worst, *(float(np.abs(gap).max()) for gap in gaps))
+                for name, place, mat in zip(names, places, mats, strict=True):
+                    pose = kinematics.pose(data.qpos, name, kind)
+                    gaps = (pose.pos - place, pose.mat.ravel() - mat.ravel())
+                    worst = max(worst, *(float(np.abs(gap).max()) for gap in gaps))
     return worst
 
 
@@ -332,8 +328,7 @@ def test_an_attached_file_is_read(
     part = _write(tmp_path, ATTACHED.format(order=order), "parts/arm.xml")
     model = sm.load(_write(tmp_path, STAND.format(inside=inside, beside=beside, name=name)))
     own = sm.Kinematics(model.path)
-    assert own.grade == "own reading"
-    assert set(own.joint_names) == set(model.joint_names)
+    assert (own.grade, {*own.joint_names}) == ("own reading", {*model.joint_names})
     assert _poses_agree(model, own) < 1e-12
     assert any(text.startswith("<attach> written out") for text in own.prepared)
     before = model_digest(model.path)
@@ -386,8 +381,7 @@ def test_a_place_that_pinocchio_drops_is_said_to_be_kept(tmp_path: Path) -> None
     raw = pinocchio.buildModelFromMJCF(str(file))
     data = raw.createData()
     pinocchio.framesForwardKinematics(raw, data, pinocchio.neutral(raw))
-    alone = data.oMf[raw.getFrameId("s")].translation
-    ours = sm.Kinematics(file)
+    ours, alone = sm.Kinematics(file), data.oMf[raw.getFrameId("s")].translation
     assert ours.pose(np.zeros(ours.nq), "s").pos - alone == pytest.approx([0.3, 0.0, 1.2])
     places, sites = ours.prepared
     assert (places[-1], sites[-1]) == ("1", "1")
@@ -397,10 +391,10 @@ def test_a_place_that_pinocchio_drops_is_said_to_be_kept(tmp_path: Path) -> None
 
 def test_included_files_are_found_as_mujoco_finds_them(tmp_path: Path) -> None:
     """From the main file's folder; where nothing is there, from that of the file itself."""
-    site = "<site name='s' pos='{}'/>"
+    part, site = "<include file='parts/arm.xml'/>", "<site name='s' pos='{}'/>"
     body = f"<x><body name='b' pos='1 0 0'>{BODY}<joint name='j'/>{site}</body></x>"
     texts = {
-        "robot.xml": "<mujoco><include file='parts/arm.xml'/></mujoco>",
+        "robot.xml": f"<mujoco>{part}</mujoco>",
         "parts/arm.xml": "<mujoco><include file='inner/joint.xml'/><worldbody>"
         "<include file='inner/body.xml'/></worldbody></mujoco>",
         "parts/inner/joint.xml": "<mujoco><default><joint axis='1 2 3'/></default></mujoco>",
@@ -412,27 +406,23 @@ def test_included_files_are_found_as_mujoco_finds_them(tmp_path: Path) -> None:
     again = sm.load(main)
     assert again.site_pos[0].tolist() == [0, 0, 5]
     assert _poses_agree(again, sm.Kinematics(main)) < 1e-12
-    twice = _write(tmp_path, "<mujoco>{0}{0}</mujoco>".format("<include file='parts/arm.xml'/>"))
-    refused((ModelError, "more than once", lambda: sm.Kinematics(twice)))
+    _write(tmp_path, f"<mujoco>{2 * part}</mujoco>")
+    refused((ModelError, "more than once", lambda: sm.Kinematics(main)))
 
 
 def test_a_urdf_with_a_floating_link_and_meshes_elsewhere(tmp_path: Path) -> None:
     mass = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>"
-    link = f"<link name='{{}}'>{mass}</inertial>{{}}</link>"
     mesh = "<visual><geometry><mesh filename='package://nowhere/a.stl'/></geometry></visual>"
     joint = (
         "<joint name='{}' type='{}'><origin xyz='1 2 3' rpy='.1 .2 .3'/><axis xyz='0 1 1'/>"
         "<parent link='{}'/><child link='{}'/><limit lower='-1' upper='1' effort='1' velocity='1'/>"
         "</joint>"
     )
-    joints = [
-        ("f", "floating", "a", "b"),
-        ("z", "revolute", "b", "c"),
-        ("y", "prismatic", "c", "d"),
-    ]
     text = "<robot name='r'>{}</robot>".format(
-        "".join(link.format(name, "{0}") for name in "abcd")
-        + "".join(joint.format(*j) for j in joints)
+        "".join(f"<link name='{name}'>{mass}</inertial>{{0}}</link>" for name in "abcd")
+        + joint.format("f", "floating", "a", "b")
+        + joint.format("z", "revolute", "b", "c")
+        + joint.format("y", "prismatic", "c", "d")
     )
     model = sm.load(_write(tmp_path, text.format(""), "r.urdf"))
     own = sm.Kinematics(_write(tmp_path, text.format(mesh), "m.urdf"), model.joint_names)
@@ -440,14 +430,15 @@ def test_a_urdf_with_a_floating_link_and_meshes_elsewhere(tmp_path: Path) -> Non
     assert "floating joints" in said
     for qpos in np.random.default_rng(0).normal(size=(4, model.nq)):
         with opened(model, qpos=qpos, derived=True) as (_, data):
-            for name in "bcd":
-                gap = own.pose(data.qpos, name, "body").pos - data.xpos[model.body_id(name)]
-                assert np.abs(gap).max() < 1e-12
+            places = [own.pose(data.qpos, name, "body").pos for name in "bcd"]
+            assert np.abs(places - data.xpos[[*map(model.body_id, "bcd")]]).max() < 1e-12
 
 
 def test_sites_of_the_world_and_of_the_base(tmp_path: Path) -> None:
-    text = _robot("pos='0 0 1'", world="<site name='w' pos='0 5 0'/>")
-    kinematics = sm.Kinematics(_write(tmp_path, text))
-    assert kinematics.pose([0.3], "w").pos.tolist() == [0, 5, 0]
-    assert kinematics.pose([0.3], "low").pos.tolist() == [1, 0, 1]
-    assert sm.Kinematics("so101").pose(np.zeros(6), "baseframe").pos.tolist() == [0, 0, 0]
+    file = _write(tmp_path, _robot("pos='0 0 1'", world="<site name='w' pos='0 5 0'/>"))
+    for model, qpos, site, place in (
+        (file, [0.3], "w", [0, 5, 0]),
+        (file, [0.3], "low", [1, 0, 1]),
+        ("so101", np.zeros(6), "baseframe", [0, 0, 0]),
+    ):
+        assert sm.Kinematics(model).pose(qpos, site).pos.tolist() == place

@@ -14,7 +14,7 @@ from mutants import __main__ as run
 from mutants.covered import Covered
 from mutants.draw import Mutant, Site, all_sites, find, sites
 
-from .conftest import ROOT
+from .conftest import ROOT, assert_in, written, written_all
 
 SOURCE = '''"""A module."""
 LIMIT = 3
@@ -44,15 +44,8 @@ def test_each_kind_of_fault_is_put_in_its_place(tmp_path: Path) -> None:
     }  # fmt: skip
     texts = {site.source(tmp_path).decode() for site in found}
     assert len(texts) == len(found)
-    for line in (
-        "LIMIT = 4",
-        "= 0.55)",
-        "        pass\n",
-        "(x + 1 <= LIMIT)",
-        "f(-x, x)",
-        "f(x, (x))",
-    ):
-        assert any(line in text for text in texts), line
+    lines = ("LIMIT = 4", "= 0.55)", "        pass\n", "(x + 1 <= LIMIT)", "f(-x, x)", "f(x, (x))")
+    assert_in("\0".join(texts), *lines)
     for text in texts:
         compile(text, "arm.py", "exec")
 
@@ -62,10 +55,10 @@ def test_a_fault_is_found_where_its_code_went(tmp_path: Path) -> None:
     (tmp_path / "statemachine" / "arm.py").unlink()
     _module(tmp_path, "moved.py", SOURCE.replace("LIMIT:", "LIMIT + 1:"))
     standing = {site.mutant.code: [site] for site in all_sites(tmp_path)}
-    found = {mutant: find(mutant, standing) for mutant in mutants}
-    gone = {mutant.statement for mutant, site in found.items() if site is None}
+    found = [(mutant.statement, find(mutant, standing)) for mutant in mutants]
+    gone = {statement for statement, site in found if site is None}
     assert gone == {"LIMIT = 3", "if x + 1 < LIMIT:"}  # short, without a function; and changed
-    assert {site.mutant.file for site in found.values() if site} == {"statemachine/moved.py"}
+    assert {site.mutant.file for _, site in found if site} == {"statemachine/moved.py"}
 
 
 def test_every_fault_of_the_list_still_compiles() -> None:
@@ -74,8 +67,7 @@ def test_every_fault_of_the_list_still_compiles() -> None:
     standing: dict[tuple[str, str, int, str], list[Site]] = {}
     for site in all_sites(ROOT):
         standing.setdefault(site.mutant.code, []).append(site)
-    fields = Mutant.__dataclass_fields__
-    mutants = [Mutant(**{name: row[name] for name in fields}) for row in rows]
+    mutants = [Mutant(**{n: row[n] for n in Mutant.__dataclass_fields__}) for row in rows]
     found = [site for mutant in mutants if (site := find(mutant, standing))]
     assert found
     for site in found:
@@ -84,24 +76,22 @@ def test_every_fault_of_the_list_still_compiles() -> None:
 
 def test_tests_are_chosen_by_line_room_and_time(tmp_path: Path) -> None:
     data = CoverageData(str(tmp_path / "data"))
-    for context, line in (
-        ("tests/test_arm.py::slow (call)", 8),
-        ("tests/test_other.py::quick (call)", 8),
-        ("tests/test_other.py::elsewhere (call)", 9),
-        ("tests/test_other.py::fails (call)", 8),
-        ("tests/test_page.py::first (setup)", 8),
-        ("tests/test_golden.py::frozen (call)", 8),
+    seconds = {"tests/test_page.py::second": 2}
+    for test, phase, line, took in (
+        ("tests/test_arm.py::slow", "call", 8, 5),
+        ("tests/test_other.py::quick", "call", 8, 1),
+        ("tests/test_other.py::elsewhere", "call", 9, 1),
+        ("tests/test_other.py::fails", "call", 8, 1),
+        ("tests/test_page.py::first", "setup", 8, 2),
+        ("tests/test_golden.py::frozen", "call", 8, 1),
     ):
-        data.set_context(context)
+        data.set_context(f"{test} ({phase})")
         data.add_lines({"statemachine/arm.py": [line]})
+        seconds[test] = took
     data.write()
-    seconds = {"tests/test_arm.py::slow": 5, "tests/test_other.py::quick": 1}
-    seconds |= {f"tests/test_other.py::{name}": 1 for name in ("elsewhere", "fails")}
-    seconds |= {f"tests/test_page.py::{name}": 2 for name in ("first", "second")}
-    seconds |= {"tests/test_golden.py::frozen": 1}
     fixtures = {"tests/test_page.py": 40.0}
     times = {"seconds": seconds, "fixtures": fixtures, "failed": ["tests/test_other.py::fails"]}
-    (tmp_path / "times.json").write_text(json.dumps(times), "utf-8")
+    written(tmp_path / "times.json", json.dumps(times))
     found = list(sites(_module(tmp_path), tmp_path))
     inside = next(site for site in found if site.lines == range(8, 9))
     covered = Covered(tmp_path)
@@ -118,16 +108,16 @@ def test_a_fault_is_killed_survives_or_runs_out_of_time(
     tree = tmp_path / "tree"
     source = "def count(n):\n    while n > 0:\n        n = n - 1\n    return n\n"
     file = _module(tree, "count.py", source)
-    (tree / "tests").mkdir()
-    test = "from statemachine.count import count\n\ndef test_count():\n    assert count(3) < 1\n"
-    (tree / "tests" / "test_count.py").write_text(test, "utf-8")
+    text = "from statemachine.count import count\n\ndef test_count():\n    assert count(3) < 1\n"
+    written_all(tree, {"tests/test_count.py": text})
     monkeypatch.setattr(run, "SECONDS", 15)
-    outcomes = {}
-    for site in sites(file, tree):
-        tests = ["tests/test_count.py::test_count"]
-        outcomes[site.mutant.kind, site.mutant.statement] = run._tried(site, tests, tree)
+    test = "tests/test_count.py::test_count"
+    outcomes = {
+        (site.mutant.kind, site.mutant.statement): run._tried(site, [test], tree)
+        for site in sites(file, tree)
+    }
     assert outcomes["comparison", "while n > 0:"] == ("survived", "")  # one more turn
-    assert outcomes["number", "while n > 0:"] == ("killed", "tests/test_count.py::test_count")
+    assert outcomes["number", "while n > 0:"] == ("killed", test)
     assert outcomes["sign", "n = n - 1"] == ("timed out", "")
     assert file.read_text("utf-8") == source
     outside = replace(next(sites(file, tree)), called=True)
