@@ -72,32 +72,27 @@ def _is_closed(shape: Surface | Part) -> bool:
 def test_round_shapes_approach_their_closed_forms(make, volume, area, half) -> None:
     """Inscribed, so too small, and with twice the corners by a quarter as much."""
     coarse, fine = make(32), make(64)
-    errors = [volume - _volume(shape) for shape in (coarse, fine)]
-    assert 0 < errors[0] < 0.03 * volume
-    assert errors[0] / errors[1] == pytest.approx(4, rel=0.03)
-    if area is not None:
-        missing = [area - area_of(shape) for shape in (coarse, fine)]
-        assert 0 < missing[0] < 0.02 * area
-        assert missing[0] / missing[1] == pytest.approx(4, rel=0.03)
+    for measured, whole in ((_volume, volume), (area_of, area)):
+        if whole is not None:
+            errors = [whole - measured(shape) for shape in (coarse, fine)]
+            assert 0 < errors[0] < 0.03 * whole
+            assert errors[0] / errors[1] == pytest.approx(4, rel=0.03)
     for shape in (coarse, fine):
         assert _is_closed(shape)
-        np.testing.assert_allclose(shape.vertices.max(axis=0), half, rtol=1e-6)
-        np.testing.assert_allclose(shape.vertices.min(axis=0), -np.array(half), rtol=1e-6)
+        ends = [shape.vertices.max(axis=0), -shape.vertices.min(axis=0)]
+        np.testing.assert_allclose(ends, [half, half], rtol=1e-6)
 
 
 def test_flat_shapes_are_exact() -> None:
     box = shapes.box([0.1, 0.2, 0.3])
     assert _is_closed(box)
     assert _volume(box) == pytest.approx(8 * 0.1 * 0.2 * 0.3)
-    assert area_of(box) == pytest.approx(8 * (0.1 * 0.2 + 0.2 * 0.3 + 0.3 * 0.1))
     rectangle = shapes.rectangle(2, 3)
-    assert area_of(rectangle) == pytest.approx(24)
-    a, b, c = rectangle.vertices[rectangle.faces[0]]
-    assert np.cross(b - a, c - a)[2] > 0
     tilted = shapes.terrain([[0, 1, 2], [0, 1, 2]], 1, 1)  # a plane that rises 1 m a metre
-    assert area_of(tilted) == pytest.approx(4 * math.sqrt(2))
-    a, b, c = tilted.vertices[tilted.faces[-1]]
-    assert np.cross(b - a, c - a)[2] > 0
+    areas = [8 * (0.1 * 0.2 + 0.2 * 0.3 + 0.3 * 0.1), 24, 4 * math.sqrt(2)]
+    assert [area_of(shape) for shape in (box, rectangle, tilted)] == pytest.approx(areas)
+    for a, b, c in (rectangle.vertices[rectangle.faces[0]], tilted.vertices[tilted.faces[-1]]):
+        assert np.cross(b - a, c - a)[2] > 0
 
 
 def test_welding_keeps_the_surface_and_drops_what_is_there_twice() -> None:
@@ -106,8 +101,8 @@ def test_welding_keeps_the_surface_and_drops_what_is_there_twice() -> None:
     loose = np.arange(len(soup)).reshape(-1, 3)
     sliver = [(0, 0, 0)]  # of no area
     welded = shapes.welded(np.concatenate([soup, [(9, 9, 9)]]), np.concatenate([loose, sliver]))
-    assert len(welded.vertices) == len(sphere.vertices)
-    assert len(welded.faces) == len(sphere.faces)
+    assert welded.vertices.shape == sphere.vertices.shape
+    assert welded.faces.shape == sphere.faces.shape
     assert _volume(welded) == pytest.approx(_volume(sphere))
     assert _is_closed(welded)
     refused((ValueError, "", lambda: welded.vertices.fill(0)))
@@ -121,8 +116,8 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[sm.Model, Draw
 
 def test_every_kind_of_geom_is_drawn_and_the_hidden_are_not(everything) -> None:
     model, drawing = everything
-    kinds = {model.geom_names[part.geom]: part.kind for part in drawing.parts}
-    assert kinds == {
+    parts = {model.geom_names[part.geom]: part for part in drawing.parts}
+    assert {name: part.kind for name, part in parts.items()} == {
         "ground": "plane",
         "table": "plane",
         "hill": "hfield",
@@ -133,9 +128,7 @@ def test_every_kind_of_geom_is_drawn_and_the_hidden_are_not(everything) -> None:
         "brick": "box",
         "wedge": "mesh",
     }
-    parts = {model.geom_names[part.geom]: part for part in drawing.parts}
-    assert parts["ground"].endless
-    assert not parts["table"].endless
+    assert [name for name, part in parts.items() if part.endless] == ["ground"]
     assert np.ptp(parts["table"].vertices[:, :2], axis=0).tolist() == [4, 6]
     assert parts["hill"].vertices[:, 2].max() == pytest.approx(0.5)
     assert parts["ball"].rgba == pytest.approx((0.1, 0.2, 0.3, 0.4))
@@ -149,19 +142,16 @@ def test_parts_are_where_the_engine_has_them(everything) -> None:
     model, drawing = everything
     data = mujoco.MjData(model.raw)
     mujoco.mj_forward(model.raw, data)
-    compared = 0
-    for part in drawing.parts:
-        if part.body == 0:
-            continue
+    moving = [part for part in drawing.parts if part.body]
+    assert len(moving) == 6
+    for part in moving:
         turn = rotations.matrix_from_quat(data.xquat[part.body])
         points = part.vertices @ turn.T + data.xpos[part.body]
         own = (points - data.geom_xpos[part.geom]) @ data.geom_xmat[part.geom].reshape(3, 3)
-        centre, half = model.raw.geom_aabb[part.geom, :3], model.raw.geom_aabb[part.geom, 3:]
-        np.testing.assert_allclose(own.max(axis=0), centre + half, atol=2e-6)
-        np.testing.assert_allclose(own.min(axis=0), centre - half, atol=2e-6)
-        compared += 1
-    assert compared == 6
-    wedge = next(part for part in drawing.parts if part.kind == "mesh")
+        centre, half = np.split(model.raw.geom_aabb[part.geom], 2)
+        ends = [own.max(axis=0), own.min(axis=0)]
+        np.testing.assert_allclose(ends, [centre + half, centre - half], atol=2e-6)
+    (wedge,) = (part for part in moving if part.kind == "mesh")
     assert _volume(wedge) == pytest.approx(1 / 6, rel=1e-5)
     np.testing.assert_allclose(wedge.vertices.min(axis=0), (0.5, 0, 0), atol=1e-6)
 
@@ -169,10 +159,8 @@ def test_parts_are_where_the_engine_has_them(everything) -> None:
 @pytest.mark.parametrize("name", ["so101", "so101/scene_box"])
 def test_the_whole_arm_is_there(name: str) -> None:
     model = sm.load(name)
-    drawing = drawing_of(model)
-    raw = model.raw
-    expected = {g for g in range(raw.ngeom) if raw.geom_group[g] < 3}
-    assert {part.geom for part in drawing.parts} == expected
+    drawing, raw = drawing_of(model), model.raw
+    assert {part.geom for part in drawing.parts} == {*np.flatnonzero(raw.geom_group < 3).tolist()}
     assert sum(part.kind == "mesh" for part in drawing.parts) == raw.nmesh == 22
     assert set(range(1, 9)) <= set(drawing.bodies)
     # Closed, outward: its parts overlap, so the sum is above the solid's volume.
@@ -183,9 +171,9 @@ def test_the_whole_arm_is_there(name: str) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_a_model_of_another_engine_has_the_same_drawing() -> None:
-    one = drawing_of(sm.load("so101/scene_box"))
-    two = drawing_of(sm.load("so101/scene_box", backend="pybullet"))
-    assert len(one.parts) == len(two.parts)
+    one, two = (
+        drawing_of(sm.load("so101/scene_box", backend=name)) for name in ("mujoco", "pybullet")
+    )
     for a, b in zip(one.parts, two.parts, strict=True):
         assert (a.body, a.geom, a.rgba) == (b.body, b.geom, b.rgba)
         np.testing.assert_array_equal(a.vertices, b.vertices)
@@ -194,13 +182,11 @@ def test_a_model_of_another_engine_has_the_same_drawing() -> None:
 def test_the_eye_is_where_the_engines_camera_is(mujoco_box: sm.Model) -> None:
     drawing = drawing_of(mujoco_box)
     assert (drawing.azimuth, drawing.elevation) == (140, -18)
-    camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
+    camera, raw = mujoco.MjvCamera(), mujoco_box.raw
     camera.azimuth, camera.elevation, camera.distance = drawing.azimuth, drawing.elevation, 0.7
     camera.lookat[:] = drawing.center
-    scene = mujoco.MjvScene(mujoco_box.raw, 1000)
-    data = mujoco.MjData(mujoco_box.raw)
-    everything = mujoco.mjtCatBit.mjCAT_ALL.value
-    mujoco.mjv_updateScene(mujoco_box.raw, data, option, None, camera, everything, scene)
+    scene, whole = mujoco.MjvScene(raw, 1000), mujoco.mjtCatBit.mjCAT_ALL.value
+    mujoco.mjv_updateScene(raw, mujoco.MjData(raw), mujoco.MjvOption(), None, camera, whole, scene)
     eye = (scene.camera[0].pos + scene.camera[1].pos) / 2  # of the two eyes
     np.testing.assert_allclose(
         Camera(drawing.center, 0.7, drawing.azimuth, drawing.elevation).eye, eye, atol=1e-6
@@ -208,10 +194,8 @@ def test_the_eye_is_where_the_engines_camera_is(mujoco_box: sm.Model) -> None:
 
 
 def test_what_only_touches_is_drawn_where_nothing_else_is(tmp_path: Path) -> None:
-    assert [part.kind for part in drawing_of(model_of(tmp_path, TOUCHING_ONLY)).parts] == [
-        "plane",
-        "box",
-    ]
+    drawing = drawing_of(model_of(tmp_path, TOUCHING_ONLY))
+    assert [part.kind for part in drawing.parts] == ["plane", "box"]
 
 
 def test_what_is_not_drawn_is_said(tmp_path: Path) -> None:

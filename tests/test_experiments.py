@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import random
+import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +23,20 @@ from statemachine.models import models_dir
 from statemachine.page import Figures, Verdict
 from statemachine.runs.header import provenance
 
-from .conftest import around, assert_has, lesson_result, opened, refused, started, written
+from .conftest import around, assert_has, blocks, lesson_result, opened, refused, started, written
 from .small_models import BALL_AND_SLIDE, loaded, model_of
 
 
 def test_provenance_covers_included_files(tmp_path: Path) -> None:
-    home = models_dir() / "so101"
-    made = provenance(sm.load("so101/scene_box"))
-    files = ("scene_box", "scene", "so101")
-    content = b"".join((home / f"{name}.xml").read_bytes() for name in files)
-    assert_has(
-        made, model_sha256=hashlib.sha256(content).hexdigest(), model_file="so101/scene_box.xml"
-    )
+    files = (models_dir() / "so101" / f"{name}.xml" for name in ("scene_box", "scene", "so101"))
+    digest = hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+    found = provenance(sm.load("so101/scene_box"))
+    assert_has(found, model_sha256=digest, model_file="so101/scene_box.xml")
 
 
 def test_milestones() -> None:
-    assert (milestones(4.0), milestones(0.5)) == ([0, 1, 2, 3, 4], [0, 0.5])
-    assert milestones(60) == [0, 1, 2, 3, 4, 10, 20, 30, 50, 60]
+    rows = {4.0: [0, 1, 2, 3, 4], 0.5: [0, 0.5], 60: [0, 1, 2, 3, 4, 10, 20, 30, 50, 60]}
+    assert {seconds: milestones(seconds) for seconds in rows} == rows
 
 
 def test_forces_sum_with_the_bias_on_the_other_side() -> None:
@@ -67,7 +65,7 @@ def test_hold_tracks_the_worst_joint_and_the_speed() -> None:
     found = lesson_result("hold", sm.load("so101/scene"), seconds=0.2)
     assert np.array_equal(found.error, np.abs(found.qpos - found.goal).max(axis=1))
     assert np.abs(found.speed).max() > 1.0
-    assert np.abs(found.speed - ((found.qpos[-1] - found.qpos[-2]) / 0.005)).max() < 1e-9
+    assert found.speed == pytest.approx((found.qpos[-1] - found.qpos[-2]) / 0.005, abs=1e-9)
 
 
 def test_hold_that_ends_at_the_first_touch_says_so() -> None:
@@ -125,26 +123,23 @@ def test_what_is_smaller_than_the_noise_is_not_told(monkeypatch: pytest.MonkeyPa
     assert equal.null.low < 1 < equal.null.high
     # Once, something else takes the machine while it measures one way.
     disturbed = _times(monkeypatch, lambda n, k: n * (1.0 if k != 3 else 500.0))
-    assert not disturbed.told_apart
-    assert disturbed.loop.median == 1
+    assert (disturbed.told_apart, disturbed.loop.median) == (False, 1)
     dear = _times(monkeypatch, lambda n, _: n + 0.3 + noise.uniform(-0.1, 0.1))
     assert dear.told_apart
-    assert dear.loop.median == pytest.approx(1.28, abs=0.05)
-    assert dear.null.median == pytest.approx(1.0, abs=0.05)
+    assert (dear.loop.median, dear.null.median) == pytest.approx((1.28, 1.0), abs=0.05)
 
 
 def test_few_rounds_tell_nothing() -> None:
-    ratio = in_turns.Ratio.of("dear", [3.0] * 4, [1.0] * 4)
     null = in_turns.Ratio.of("null", [1.0] * 20, [1.0] * 20)
-    assert (ratio.median, ratio.rounds) == (3.0, 4)
-    assert not ratio.differs_from(null)
-    assert in_turns.Ratio.of("dear", [3.0] * 5, [1.0] * 5).differs_from(null)
-    assert in_turns.Ratio.of("once", [3.0], [1.0]).median == 3.0
+    for rounds in (1, 4, 5):
+        ratio = in_turns.Ratio.of("dear", [3.0] * rounds, [1.0] * rounds)
+        assert_has(ratio, median=3.0, rounds=rounds)
+        assert ratio.differs_from(null) == (rounds >= 5)
 
 
 def test_every_way_has_its_turn_in_every_round() -> None:
     order: list[str] = []
-    times = in_turns.in_turns({name: functools.partial(order.append, name) for name in "abc"}, 10)
+    times = in_turns.in_turns({name: partial(order.append, name) for name in "abc"}, 10)
     assert {name: len(each) for name, each in times.items()} == dict.fromkeys("abc", 10)
     turns = [tuple(order[k : k + 3]) for k in range(0, 30, 3)]
     assert all(sorted(turn) == ["a", "b", "c"] for turn in turns)
@@ -156,13 +151,8 @@ def test_forward_compares_bits() -> None:
 
 
 def test_state_of_every_type_of_joint(tmp_path: Path) -> None:
-    joints = {
-        joint.name: joint
-        for joint in lesson_result(
-            "state",
-            model_of(tmp_path, BALL_AND_SLIDE),
-        ).joints
-    }
+    found = lesson_result("state", model_of(tmp_path, BALL_AND_SLIDE))
+    joints = {joint.name: joint for joint in found.joints}
     assert_has(joints["b"], qpos_start=7, qpos_stop=11, qvel_start=6, qvel_stop=9)
     assert joints["s"].type == "slide"
 
@@ -185,8 +175,7 @@ def _off(
 class TestCertificate:
     def test_poses_are_drawn_within_the_limits_by_the_seed(self) -> None:
         model = sm.load("so101")
-        ids = range(model.njnt)
-        one, again, other = (random_qpos(model, ids, 50, seed) for seed in (1, 1, 2))
+        one, again, other = (random_qpos(model, range(6), 50, seed) for seed in (1, 1, 2))
         assert np.array_equal(one, again)
         assert not np.array_equal(one, other)
         assert not one[0].any()
@@ -207,18 +196,11 @@ class TestCertificate:
         assert not found.agrees
 
     def test_a_witness_without_a_joint_that_moves_the_tip_is_refused(self, tmp_path: Path) -> None:
-        lines = (models_dir() / "so101" / "so101.xml").read_text().splitlines()
-        kept = [ln for ln in lines if "mesh" not in ln and 'joint name="wrist_roll"' not in ln]
-        file = written(
-            tmp_path / "other.xml", "\n".join(ln for ln in kept if 'joint="wrist_roll"' not in ln)
-        )
-        refused(
-            (
-                BadInputError,
-                "wrist_roll",
-                lambda: fingertip.certify(sm.load("so101"), poses=5, witness=file),
-            )
-        )
+        text = (models_dir() / "so101" / "so101.xml").read_text()
+        text = re.sub(r'.*(mesh|joint name="wrist_roll"|joint="wrist_roll").*\n', "", text)
+        file = written(tmp_path / "other.xml", text)
+        certify = partial(fingertip.certify, sm.load("so101"), poses=5, witness=file)
+        refused((BadInputError, "wrist_roll", certify))
 
     def test_a_free_robot_has_a_certificate_too(self, tmp_path: Path) -> None:
         inertial = "<inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/>"
@@ -249,13 +231,10 @@ class TestCertificate:
         assert np.abs(drawn[:, 0]).max() == pytest.approx(np.pi, rel=0.01)
         assert np.abs(drawn[:, 1]).max() == pytest.approx(1, rel=0.01)  # a slide's metres
         assert [tip.site for tip in fingertip.certify(model, poses=50, site="a").tips] == ["a"]
-        still = written(
-            tmp_path / "still.xml", "<mujoco><worldbody><body name='b'/></worldbody></mujoco>"
-        )
-        refused(
-            (BadInputError, "moved by a joint", lambda: fingertip.certify(sm.load(still), poses=5))
-        )
-        assert fingertip.certify(sm.load(still), poses=5, site="b").agrees
+        still = model_of(tmp_path, "<mujoco><worldbody><body name='b'/></worldbody></mujoco>")
+        certify = partial(fingertip.certify, still, poses=5)
+        refused((BadInputError, "moved by a joint", certify))
+        assert certify(site="b").agrees
 
     def test_one_tip_of_many_that_is_elsewhere_is_enough(
         self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
@@ -273,17 +252,15 @@ class TestCertificate:
             "radius='.01'/>"
         )
         file = written(tmp_path / "m.xml", self.ENDS.format(cloth))
-        found = fingertip.certify(sm.load(file), poses=20)
+        certify = partial(fingertip.certify, sm.load(file), poses=20)
+        found = certify()
         assert_has(found, agrees=True, grade="same reading")
         assert "<flexcomp>" in found.reason
-        shown = page({"mujoco": found})
-        assert not any(isinstance(block, Verdict) for block in shown.blocks)
+        assert not blocks(page({"mujoco": found}), Verdict)
         _off(monkeypatch, lambda pos, _: pos)
-        shown = page({"mujoco": fingertip.certify(sm.load(file), poses=20)})
-        assert not shown.holds
+        assert not page({"mujoco": certify()}).holds
         # Asked for, it is not replaced.
-        asked = functools.partial(fingertip.certify, sm.load(file), poses=20, witness=file)
-        refused((ModelError, "<flexcomp>", asked))
+        refused((ModelError, "<flexcomp>", partial(certify, witness=file)))
 
     def test_mjcf_against_urdf_of_the_same_robot(self) -> None:
         arm = models_dir() / "so101"

@@ -13,6 +13,8 @@ import statemachine as sm
 from statemachine.cli import main
 from statemachine.runs import read, record, write
 
+from .conftest import assert_has, written, written_all
+
 ARM = """
 <mujoco model="arm"><option integrator="implicitfast"/><worldbody>
 <body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="{damping}"/>
@@ -65,8 +67,7 @@ SLIDING = """
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    (tmp_path / "f.py").write_text(FUNCTIONS, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(written_all(tmp_path, {"f.py": FUNCTIONS}))
     return tmp_path
 
 
@@ -121,18 +122,14 @@ def test_what_is_explained_is_what_differs(folder: Path, capsys: Any) -> None:
     """The joint's damping differs by less than a tolerance; the box slides, or does not."""
     file(folder, "l.xml", more=SLIDING.format(".2"), qpos=".8 0 1 .06 1 0 0 0")
     file(folder, "r.xml", damping=".02001", more=SLIDING.format(".6"), qpos=".8 0 1 .06 1 0 0 0")
+    words = ("f.py:none", "l.xml", "r.xml", "--why", "--seconds", "1")
     for floor in ((), ("--uncertainty", "0.1deg")):
-        code, found = asked(
-            capsys, "f.py:none", "l.xml", "r.xml", "--why", "--seconds", "1", *floor
-        )
+        code, found = asked(capsys, *words, *floor)
         assert (code, found["quantity"]) == (0, "box")
         shares = {each["name"]: each["share"] for each in found["shares"]}
         assert shares["friction of gb"] > 0.95
         assert abs(shares["damping of j1"]) < 0.02
-    code, found = asked(
-        capsys, "f.py:none", "l.xml", "r.xml", "--why", "--seconds", "1", "--quantity", "joints"
-    )
-    assert found["quantity"] == "joints"
+    assert asked(capsys, *words, "--quantity", "joints")[1]["quantity"] == "joints"
 
 
 SENSOR = '<sensor><jointpos name="p" joint="j1" {}/></sensor>'
@@ -166,9 +163,8 @@ def test_one_cause_explains_all(folder: Path, capsys: Any, name: str) -> None:
     sides = file(folder, "l.xml", **left), file(folder, "r.xml", **right)
     code, found = asked(capsys, f"f.py:{function}", *sides, "--why", "--no-chaos")
     (cause,) = found["shares"]
-    assert (code, cause["name"], cause["values"]) == (0, known, values)
-    assert cause["share"] == pytest.approx(1.0)
-    assert main(["compare", "--models", *sides]) == models
+    assert_has(cause, name=known, values=values, share=pytest.approx(1.0))
+    assert (code, main(["compare", "--models", *sides])) == (0, models)
     assert "keyframe k time" in capsys.readouterr().out or known != "time of the start"
 
 
@@ -177,8 +173,7 @@ def test_another_sensor_counts_where_a_function_may_read_it(folder: Path, capsys
     file(folder, "l.xml", sensor=sensor)
     file(folder, "v.xml", sensor=sensor.replace("jointpos", "jointvel"))
     code, found = asked(capsys, "f.py:sensed", "l.xml", "v.xml", "--why", "--no-chaos")
-    assert code == 1
-    assert found["unexplained"] == 1.0
+    assert (code, found["unexplained"]) == (1, 1.0)
     assert found["shares"][0]["name"] == "sensor of p"
     # By themselves sensors move nothing.
     code, found = asked(capsys, "f.py:none", "l.xml", "v.xml", "--why", "--no-chaos")
@@ -196,16 +191,13 @@ def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
         '<framepos name="q" objtype="body" objname="a"/></sensor>'
     )
     text = (folder / file(folder, "l.xml", sensor=sensor)).read_text(encoding="utf-8")
-    for name, other in (("j1", "hinge"), ("a", "arm")):
-        text = text.replace(f'"{name}"', f'"{other}"')
-    (folder / "r.xml").write_text(text, encoding="utf-8")
+    written(folder / "r.xml", text.replace('"j1"', '"hinge"').replace('"a"', '"arm"'))
     one, two = (sm.load(folder / name) for name in ("l.xml", "r.xml"))
     assert sensors_of(match_models(one, two, {"j1": "hinge"})) == []
 
 
 def test_forces_of_a_function_leave_no_open_loop(folder: Path, capsys: Any) -> None:
-    file(folder, "l.xml")
-    words = ("f.py:pushed", "l.xml", "l.xml", "damping=0.02", "--seconds", "0.5")
+    words = ("f.py:pushed", file(folder, "l.xml"), "l.xml", "damping=0.02", "--seconds", "0.5")
     code, found = asked(capsys, *words)
     assert (code, found["commands"]) == (0, "more than ctrl")
 
@@ -216,17 +208,10 @@ def test_recorded_runs_are_explained_by_the_models_that_their_headers_name(
     file(folder, "l.xml")
     file(folder, "r.xml", damping=".2")
     for side in ("l", "r"):
-        model = sm.load(f"{side}.xml").replace(timestep=0.004)
-        run = record(
-            model,
-            lambda time, _d: [np.sin(6 * time)],
-            0.6,
-            keyframe="k",
-            options={"timestep": 0.004},
-        )
-        write(run, f"{side}.npz")
-        push = record(model, lambda _t, _d: [0.5], 0.6, options={"timestep": 0.004})
-        write(push, f"{side}_push.npz")
+        model, options = sm.load(f"{side}.xml").replace(timestep=0.004), {"timestep": 0.004}
+        wave, push = (lambda time, _d: [np.sin(6 * time)]), (lambda _t, _d: [0.5])
+        write(record(model, wave, 0.6, keyframe="k", options=options), f"{side}.npz")
+        write(record(model, push, 0.6, options=options), f"{side}_push.npz")
 
     def why(*words: str) -> tuple[int, dict[str, Any]]:
         return main(["compare", *words, "--why", "--no-chaos", "--json"]), json.loads(
