@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -35,19 +36,14 @@ from .conftest import (
     refused,
     runs_in_silence,
     started,
-    written,
 )
+from .small_models import loaded, model_of
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 BODY = """<mujoco><option timestep="0.005" integrator="{integrator}"/>
 <worldbody><body name="b" pos="0 0 1"><freejoint name="f"/>
 <geom name="g" type="box" size=".1 .2 .05" pos="{centre}" mass="1"/>
 <site name="s" pos=".2 0 0"/></body></worldbody></mujoco>"""
-
-
-@pytest.fixture
-def model(backend: str) -> Model:
-    return sm.load("so101", backend=backend)
 
 
 @pytest.fixture
@@ -78,14 +74,14 @@ def test_a_fresh_data_was_never_computed(box: Model) -> None:
             assert found["site_xmat"].gaps == (Gap(None, "rad", ""),)
             assert sizes(found["contacts"].gaps) == {"appears": 4.0}
             # The fingertip of the lesson's first table, from the origin.
-            tip = np.linalg.norm((0.3914, -0.001, 0.2463))
+            tip = math.hypot(0.3914, -0.001, 0.2463)
             assert sizes(found["site_xpos"].gaps)["m"] == pytest.approx(tip, abs=1e-4)
             sm.forward(box, data)
 
 
-def test_each_array_has_its_own_inputs(model: Model) -> None:
+def test_each_array_has_its_own_inputs(arm: Model) -> None:
     """Found by value: poses do not hear of qvel and ctrl, nor the bias of ctrl."""
-    with opened(model, qpos=TARGET, ctrl=TARGET, derived=True) as (_, data):
+    with opened(arm, qpos=TARGET, ctrl=TARGET, derived=True) as (model, data):
         data.ctrl[1] += 1e-3
         by_ctrl = set(sm.freshness(model, data).stale)
         # kp · 0.001 rad, unsaturated: the servo is affine in ctrl.
@@ -124,15 +120,14 @@ def test_a_step_is_found_by_going_back(backend: str, substeps: int, nstep: int) 
         assert sm.freshness(model, data)["xpos"].of == "an earlier state"
 
 
-def test_a_step_is_found_behind_a_later_write(model: Model) -> None:
+def test_a_step_is_found_behind_a_later_write(arm: Model) -> None:
     """What hangs on the written joint was written; what carries it is one step old."""
-    with opened(model, ctrl=0.3, nstep=20) as (_, data):
+    with opened(arm, ctrl=0.3, nstep=20) as (model, data):
         data.qpos[model.joint_id("elbow_flex")] += 0.4
         found = sm.freshness(model, data)
     assert found["xpos"].of == "1 step ago"
-    text = " ".join(str(found).split())
     assert_in(
-        text,
+        " ".join(str(found).split()),
         "gives the poses of shoulder, upper_arm, to",
         "lower_arm, wrist, gripper and 2 more match neither moment",
     )
@@ -140,15 +135,12 @@ def test_a_step_is_found_behind_a_later_write(model: Model) -> None:
 
 def test_a_write_is_no_step(box: Model, held: Data) -> None:
     """Written to where a step did not come from: no moment is claimed."""
-    sm.forward(box, held)
-    held.qpos[0] += 1e-4
-    found = sm.freshness(box, held)
-    assert found["xpos"].of == "an earlier state"
     # Nor where all is so near that rounding could have it lead here.
-    held.qvel[:] = 0
-    sm.forward(box, held)
-    held.qpos[0] += 1e-13
-    assert sm.freshness(box, held)["xpos"].of == "an earlier state"
+    for speed, gap in ((1, 1e-4), (0, 1e-13)):
+        held.qvel[:] *= speed
+        sm.forward(box, held)
+        held.qpos[0] += gap
+        assert sm.freshness(box, held)["xpos"].of == "an earlier state"
 
 
 def test_a_body_in_the_air(box: Model) -> None:
@@ -156,19 +148,20 @@ def test_a_body_in_the_air(box: Model) -> None:
     place = int(box.jnt_qposadr[box.joint_id("box")])
     with sm.make_data(box) as data:
         data.qpos[place + 2] = 1.0
-        found = sm.freshness(box, data)["qacc"].gaps
-        assert sizes(found)["m/s²"] == pytest.approx(9.81)
-        assert {gap.unit: gap.where for gap in found}["m/s²"] == "box"
-        assert {gap.unit: gap.where for gap in found}["rad/s²"] != "box"
-        assert "need be age" not in str(sm.freshness(box, data))  # nothing touches
+        found = sm.freshness(box, data)
+        assert "need be age" not in str(found)  # nothing touches
+        fall, turn = sorted(found["qacc"].gaps, key=lambda gap: gap.unit)
+        assert_has(fall, unit="m/s²", size=pytest.approx(9.81), where="box")
+        assert turn.where != "box"
 
 
 @pytest.mark.filterwarnings("ignore:PyBullet. the integrator RK4")
 @pytest.mark.parametrize("integrator", ["Euler", "RK4"])
 @pytest.mark.parametrize("centre", ["0 0 0", ".1 0 0"])
 def test_a_body_that_turns(backend: str, integrator: str, centre: str, tmp_path: Path) -> None:
-    path = written(tmp_path / "body.xml", BODY.format(integrator=integrator, centre=centre))
-    with opened(sm.load(path, backend=backend), qvel=range(1, 7), nstep=7) as (model, data):
+    text = BODY.format(integrator=integrator, centre=centre)
+    turning = model_of(tmp_path, text, backend=backend)
+    with opened(turning, qvel=range(1, 7), nstep=7) as (model, data):
         found = sm.freshness(model, data)
         spin = data.qvel[3:].copy()
     row = found["xquat"]
@@ -178,41 +171,36 @@ def test_a_body_that_turns(backend: str, integrator: str, centre: str, tmp_path:
     semi_implicit = integrator == "Euler" or backend == "pybullet"
     at_its_centre = centre == "0 0 0" or backend == "mujoco"
     if semi_implicit and at_its_centre:
-        assert (row.of, row.steps) == ("1 step ago", 1)
+        assert_has(row, of="1 step ago", steps=1)
         turned = 0.005 * np.linalg.norm(spin)  # of the velocity after the step
         assert sizes(row.gaps)["rad"] == pytest.approx(turned, rel=1e-9)
         assert set(sizes(found["qacc"].gaps)) <= {"m/s²", "rad/s²"}
     else:
-        assert (row.of, row.steps) == ("an earlier state", None)
+        assert_has(row, of="an earlier state", steps=None)
         assert ("fourth stage" in str(found)) == (backend == "mujoco")
 
 
 @pytest.mark.parametrize("name", ["qacc", "qfrc_bias"])
 def test_a_vector_counts_by_its_length(tmp_path: Path, name: str) -> None:
     """As a position does; two joints without a name are not one vector."""
-    path = written(
-        tmp_path / "body.xml",
-        "<mujoco><worldbody><body><freejoint name='f'/><geom size='.1'/></body>"
+    model = loaded(
+        tmp_path,
+        "<body><freejoint name='f'/><geom size='.1'/></body>"
         "<body><joint name='b' type='ball'/><geom size='.1' pos='1 0 0'/></body>"
         "<body><joint/><joint axis='0 1 0'/><geom size='.1' pos='1 0 0'/></body>"
-        "<body><joint name='s' type='slide'/><geom size='.1'/></body></worldbody></mujoco>",
+        "<body><joint name='s' type='slide'/><geom size='.1'/></body>",
     )
-    model = sm.load(path)
     units = ("m/s²", "rad/s²") if name == "qacc" else ("N", "N·m")
-
-    def found(*entries: tuple[int, float]) -> dict[str, tuple[float | None, str]]:
-        now = np.zeros(model.nv)
-        for k, value in entries:
-            now[k] = value
-        return {
-            gap.unit: (gap.size, gap.where) for gap in gaps(model, name, np.zeros(model.nv), now)
-        }
-
-    assert found((0, 1.0), (1, -2.0), (2, 2.0)) == {units[0]: (pytest.approx(3.0), "f")}
-    assert found((4, 3.0), (5, 4.0)) == {units[1]: (pytest.approx(5.0), "f")}
-    assert found((6, 3.0), (8, -4.0), (10, 4.5)) == {units[1]: (pytest.approx(5.0), "b")}
-    assert found((9, 3.0), (10, 4.0)) == {units[1]: (4.0, "")}
-    assert found((11, -1e-200)) == {units[0]: (1e-200, "s")}
+    for entries, unit, size, where in (
+        ({0: 1.0, 1: -2.0, 2: 2.0}, 0, pytest.approx(3.0), "f"),
+        ({4: 3.0, 5: 4.0}, 1, pytest.approx(5.0), "f"),
+        ({6: 3.0, 8: -4.0, 10: 4.5}, 1, pytest.approx(5.0), "b"),
+        ({9: 3.0, 10: 4.0}, 1, 4.0, ""),
+        ({11: -1e-200}, 0, 1e-200, "s"),
+    ):
+        now = np.array([entries.get(k, 0.0) for k in range(model.nv)])
+        (gap,) = gaps(model, name, np.zeros(model.nv), now)
+        assert_has(gap, unit=units[unit], size=size, where=where)
 
 
 def test_data_is_untouched_and_so_is_its_future(box: Model) -> None:
@@ -223,32 +211,25 @@ def test_data_is_untouched_and_so_is_its_future(box: Model) -> None:
             for k in range(40):
                 sm.step(box, data)
                 if ask and k % 10 == 0:
-                    arrays = data.qpos, data.qvel, data.ctrl
-                    before, said = sm.get_state(box, data), bits(data)
+                    arrays = [id(array) for array in (data.qpos, data.qvel, data.ctrl)]
+                    before = sm.get_state(box, data), bits(data)
                     sm.freshness(box, data)
                     with sm.watch_freshness(box, data) as watch:
                         _ = data.xpos, data.contacts
                         assert sm.freshness(box, data)["xpos"].of == "1 step ago"
                     assert watch.reads == 2
-                    assert sm.get_state(box, data) == before
-                    assert bits(data) == said
-                    assert all(
-                        one is two
-                        for one, two in zip(arrays, (data.qpos, data.qvel, data.ctrl), strict=True)
-                    )
+                    assert (sm.get_state(box, data), bits(data)) == before
+                    assert [id(array) for array in (data.qpos, data.qvel, data.ctrl)] == arrays
             ends.append((sm.get_state(box, data), bits(data)))
     assert ends[0] == ends[1]
 
 
-def test_every_scratch_is_closed(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_scratch_is_closed(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Data] = []
-
-    def make_data(model: Model) -> Data:
-        made.append(sm.make_data(model))
-        return made[-1]
-
-    monkeypatch.setattr(freshness, "make_data", make_data)
-    with sm.make_data(model) as data:
+    monkeypatch.setattr(
+        freshness, "make_data", lambda model: made.append(sm.make_data(model)) or made[-1]
+    )
+    with opened(arm) as (model, data):
         sm.freshness(model, data)
         with sm.watch_freshness(model, data):
             sm.freshness(model, data)
@@ -289,16 +270,11 @@ def test_what_cannot_be_asked_is_said(backend: str) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_an_engine_that_does_not_tell_forces() -> None:
-    with opened(
-        sm.load("so101/scene", backend="pybullet", defaults="engine"), ctrl=0.3, nstep=10
-    ) as (model, data):
+    native = sm.load("so101/scene", backend="pybullet", defaults="engine")
+    with opened(native, ctrl=0.3, nstep=10) as (model, data):
         found = sm.freshness(model, data)
-        assert [row.name for row in found.rows] == [
-            *POSES,
-            "qfrc_bias",
-            "qfrc_actuator",
-            "contacts",
-        ]
+        told = [*POSES, "qfrc_bias", "qfrc_actuator", "contacts"]
+        assert [row.name for row in found.rows] == told
         assert found["site_xpos"].of == "1 step ago"
         sm.forward(model, data)
         assert sm.freshness(model, data)
@@ -437,8 +413,8 @@ def test_a_watch_counts_writes_and_steps(box: Model) -> None:
         assert row("xpos") == ("never computed", None, None)
 
 
-def test_a_watch_begins_with_what_can_be_found(model: Model) -> None:
-    with opened(model, ctrl=0.3, nstep=10) as (_, data):
+def test_a_watch_begins_with_what_can_be_found(arm: Model) -> None:
+    with opened(arm, ctrl=0.3, nstep=10) as (model, data):
         with sm.watch_freshness(model, data):
             data.qpos[0] += 0.1
             assert sm.freshness(model, data)["xpos"].of == "1 step and 1 write ago"
@@ -468,8 +444,7 @@ def test_a_stale_read_raises_and_says_what_to_do(box: Model) -> None:
         assert (error.name, error.steps, error.writes) == ("site_xpos", 0, 1)
         assert 1e3 * error.gaps[0].size == pytest.approx(270, abs=1)
         refused((StaleReadError, r"^contacts is of 2 writes ago .*appear", lambda: data.contacts))
-        data.qpos[1] = 0.0
-        data.qvel[0] = 0.0
+        data.qpos[1] = data.qvel[0] = 0.0
         _ = data.contacts  # everything is back
         sm.step(box, data, 3)
         refused((StaleReadError, r"is of 1 step ago \(.* mm at", lambda: data.xpos))
@@ -552,26 +527,23 @@ def test_rotations_are_compared_as_rotations(mujoco_arm: sm.Model) -> None:
     two = one.copy()
     two[2] = (np.cos(0.1), np.sin(0.1), 0, 0)
     (gap,) = gaps(mujoco_arm, "xquat", one, two)
-    assert (gap.size, gap.where) == (pytest.approx(0.2), mujoco_arm.body_names[2])
+    assert_has(gap, size=pytest.approx(0.2), where=mujoco_arm.body_names[2])
     (gap,) = gaps(mujoco_arm, "xquat", one, -one)
     assert gap.size == 0
-    mats = matrix_from_quat(two)[: mujoco_arm.nsite].reshape(-1, 9)
-    (gap,) = gaps(
-        mujoco_arm, "site_xmat", np.tile(np.eye(3).ravel(), (mujoco_arm.nsite, 1)), -mats + 0
-    )
+    mats = matrix_from_quat(one)[: mujoco_arm.nsite].reshape(-1, 9)
+    (gap,) = gaps(mujoco_arm, "site_xmat", mats, -mats + 0)
     assert gap.size != 0
 
 
 def test_a_model_without_names_sites_or_motors(tmp_path: Path) -> None:
     """A ball and a slide, and nothing that could be named."""
-    path = written(
-        tmp_path / "plain.xml",
-        '<mujoco><worldbody><body><joint type="ball" damping="1e-3"/>'
-        '<geom size=".1" pos=".2 0 0" mass="1"/>'
+    plain_one = loaded(
+        tmp_path,
+        '<body><joint type="ball" damping="1e-3"/><geom size=".1" pos=".2 0 0" mass="1"/>'
         '<body pos=".4 0 0"><joint type="slide" axis="0 1 0"/><geom size=".05" mass="1"/>'
-        "</body></body></worldbody></mujoco>",
+        "</body></body>",
     )
-    with opened(sm.load(path), qvel=(1, 2, 3, 0.5), nstep=30) as (model, data):
+    with opened(plain_one, qvel=(1, 2, 3, 0.5), nstep=30) as (model, data):
         found = sm.freshness(model, data)
         assert found["xpos"].of == "1 step ago"
         assert "the poses of body 1, body 2" in " ".join(str(found).split())
