@@ -141,7 +141,7 @@ def _grade(folder: Path, *functions: str, limit: float = 5.0) -> dict[str, Judge
     return {each.function.removeprefix("demo_"): each for each in grade.functions}
 
 
-def _one(judgement: Judgement) -> str:
+def _one(judgement: Any) -> str:
     assert not judgement.passed
     (remark,) = judgement.remarks
     assert "\n" not in remark

@@ -155,8 +155,8 @@ def test_a_trace_has_a_floor_where_it_is_played_on_two_sides(here: Cli, tmp_path
 def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> Figures:
     usual = {"integrator": "implicitfast", "flag": "", "mass": "0.1", "height": "0.3"}
     usual["touch"] = 'contype="0" conaffinity="0"'
-    texts = (FALLING_BAR.format(**usual | change) for change in changes)
-    return convergence_of(*(sm.load(written(folder / "m.xml", text)) for text in texts), seconds)
+    one, two = (model_of(folder, FALLING_BAR.format(**usual | change)) for change in changes)
+    return convergence_of(one, two, seconds)
 
 
 def convergence_of(one: sm.Model, two: sm.Model, seconds: float) -> Figures:

@@ -43,6 +43,12 @@ def pair(tmp_path: Path) -> Pair:
     return write
 
 
+def _compared(folder: Path, texts: dict[str, str]) -> Figures:
+    """What two files of these texts differ in."""
+    one, two = (written_all(folder, texts) / name for name in texts)
+    return compare(one, two)
+
+
 def _differ(result: Figures) -> list[Figures]:
     return [each for each in result.differences if each.matters]
 
@@ -274,8 +280,7 @@ def test_other_frames_of_links_are_no_difference_of_the_robot(tmp_path: Path) ->
         ('pos="0.1 0 0"', 'pos="0.05 0 0"'),
         ('pos="0.3 0 0"', 'pos="0.25 0 0"'),
     ]
-    texts = enumerate((body, with_changes(body, changes)))
-    result = compare(*(written(tmp_path / f"{k}.xml", text) for k, text in texts))
+    result = _compared(tmp_path, {"one.xml": body, "two.xml": with_changes(body, changes)})
     assert result.equal, _differ(result)
     assert any("'a' is put elsewhere on the same solid, 50 mm" in note for note in result.notes)
     assert result.posed.distance < 1e-15
@@ -339,7 +344,7 @@ def test_a_capsule_in_three_pieces(tmp_path: Path) -> None:
         "c.xml": '<mujoco><worldbody><body name="a">'
         '<geom type="capsule" size="0.02 0.05" mass="0"/></body></worldbody></mujoco>',
     }
-    result = compare(*(written_all(tmp_path, texts) / name for name in texts))
+    result = _compared(tmp_path, texts)
     assert result.equal, _differ(result)
 
 
@@ -523,7 +528,7 @@ PLAIN = {
 def _pendula(folder: Path, **changes: str) -> list[Figures]:
     sides = {"one.xml": PLAIN, "two.xml": PLAIN | changes}
     texts = {name: PENDULUM.format(**side) for name, side in sides.items()}
-    return _differ(compare(*(written_all(folder, texts) / name for name in texts)))
+    return _differ(_compared(folder, texts))
 
 
 @pytest.mark.parametrize(
