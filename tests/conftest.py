@@ -37,6 +37,13 @@ ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 REQUIRED = set(filter(None, os.environ.get("STATEMACHINE_REQUIRE", "").split(",")))
 _Block = TypeVar("_Block")
+# Options with which a lesson of many steps is a short one.
+QUICK = {
+    "worlds": ("--most", "4"),
+    "speed": ("--steps", "200"),
+    "gravity": ("--longer", "0"),
+    "replay": ("--steps", "100"),
+}
 
 
 def of_python(

@@ -89,8 +89,7 @@ class ExampleModel(HiddenModel):
         engine = inner
         if inner.substeps > 1 or inner.actuator_delay.any():
             # A HiddenData delays commands itself; the world gets those that act.
-            told = inner.replace(substeps=1, timestep=timestep, latency=0)
-            engine = cast("MujocoModel", told)
+            engine = cast("MujocoModel", inner.replace(substeps=1, timestep=timestep, latency=0))
         names = ("engine_version", "path", "raw", "capabilities", "timestep", "substeps")
         super().__init__(
             partial(ExampleWorld, engine),

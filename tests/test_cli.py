@@ -19,16 +19,9 @@ from rich.cells import cell_len
 from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import ROOT, Cli, assert_has, assert_in, assert_not_in, written
+from .conftest import QUICK, ROOT, Cli, assert_has, assert_in, assert_not_in, written
 from .explained import with_changes
 from .small_models import mjcf
-
-QUICK = {
-    "worlds": ("--most", "4"),
-    "speed": ("--steps", "200"),
-    "gravity": ("--longer", "0"),
-    "replay": ("--steps", "100"),
-}
 
 
 def _json(cli: Cli, *arguments: str) -> Any:

@@ -21,19 +21,15 @@ from statemachine.measures import (
     text,
     together,
 )
-from statemachine.runs import Trace, record, record_scenario, shipped
+from statemachine.runs import record, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import Cli
 from .small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
 
 
-@pytest.fixture(scope="module")
-def trace() -> Trace:
-    return record_scenario(SCENARIOS["hold"], sm.load("so101/scene"), seconds=0.5)
-
-
-def test_a_recorded_trace_has_the_same_names(trace: Trace) -> None:
+def test_a_recorded_trace_has_the_same_names(mujoco_scene: sm.Model) -> None:
+    trace = record_scenario(SCENARIOS["hold"], mujoco_scene, seconds=0.5)
     assert set(shipped("hold", "pybullet").touches()) == set(trace.touches())
 
 
@@ -48,15 +44,11 @@ def test_who_comes_first_and_what_has_no_name(tmp_path: Path) -> None:
 
 
 def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
-    trace = record(
-        model_of(tmp_path, WALL_AND_FLOOR),
-        seconds=0.05,
-    )
+    trace = record(model_of(tmp_path, WALL_AND_FLOOR), seconds=0.05)
     pairs = trace.contact_pairs
     assert set(pairs) == {"box on floor", "box on wall"}
-    assert sorted(np.concatenate(list(pairs.values())).tolist()) == list(
-        range(len(trace["contact_row"]))
-    )
+    rows = np.concatenate(list(pairs.values())).tolist()
+    assert sorted(rows) == list(range(len(trace["contact_row"])))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from contextlib import closing
 from functools import partial
@@ -82,9 +83,8 @@ def test_the_target_is_in_the_picture(task: str) -> None:
             rows, columns = np.nonzero(violet)
             assert violet[row - 1 : row + 2, column - 1 : column + 2].all()
             assert np.hypot(rows - row, columns - column).max() < 20
-    fresh = _make(task, "mujoco", render_mode="rgb_array")
-    with fresh as env, pytest.raises(ResetNeeded, match="before render"):
-        env.unwrapped.render()
+    with _make(task, "mujoco", render_mode="rgb_array") as env:
+        refused((ResetNeeded, "before render", env.unwrapped.render))
 
 
 def test_an_observation_is_of_the_present(backend: str) -> None:
@@ -142,13 +142,24 @@ def test_the_box_is_held_by_the_action_0_and_dropped_by_open_jaws(backend: str) 
             _, reward, terminated, truncated, info = env.step(np.eye(6, dtype=np.float32)[5])
             steps += 1
             assert steps < 60
-        assert reward == -info["distance"]
-        assert not info["is_success"]
-        assert not info["diverged"]
+        assert_has(info, distance=-reward, is_success=False, diverged=False)
 
 
-def _against_single(task: str, backend: str, mode: AutoresetMode, workers: int, steps: int) -> int:
-    """Ours against Gymnasium's own loop over single ones; how many episodes ended."""
+# One way of each to start anew is quick enough for every run of the tests.
+_QUICK = (REACH, AutoresetMode.NEXT_STEP, 2)
+
+
+@pytest.mark.parametrize(
+    ("task", "mode", "workers"),
+    [
+        pytest.param(*case, marks=() if case == _QUICK else pytest.mark.slow)
+        for case in itertools.product(IDS, AutoresetMode, (1, 2, 3))
+    ],
+)
+def test_a_world_is_a_single_env_bit_for_bit(
+    task: str, mode: AutoresetMode, workers: int, backend: str
+) -> None:
+    """Ours against Gymnasium's own loop over single ones, in every way to start anew."""
     ours = _make_vec(task, backend, 3, workers=workers, autoreset_mode=mode, max_episode_steps=9)
     theirs = _make_vec(
         task, backend, 3, vectorization_mode="sync", max_episode_steps=9,
@@ -166,7 +177,7 @@ def _against_single(task: str, backend: str, mode: AutoresetMode, workers: int, 
         assert data_equivalence(ours.reset(seed=3), theirs.reset(seed=3), exact=True)
         ours.action_space.seed(0)
         ended = 0
-        for _ in range(steps):
+        for _ in range(30):
             actions = ours.action_space.sample()
             one, two = ours.step(actions), theirs.step(actions)
             assert data_equivalence(one, two, exact=True)
@@ -179,21 +190,7 @@ def _against_single(task: str, backend: str, mode: AutoresetMode, workers: int, 
         seeds: Any = ours.np_random_seed
         assert tuple(seeds) == theirs.np_random_seed
         assert data_equivalence(ours.reset(), theirs.reset(), exact=True)
-    return ended
-
-
-def test_a_world_is_a_single_env_bit_for_bit(backend: str) -> None:
-    assert _against_single(REACH, backend, AutoresetMode.NEXT_STEP, 2, 12) >= 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2, 3])
-@pytest.mark.parametrize("mode", list(AutoresetMode))
-@pytest.mark.parametrize("task", IDS)
-def test_every_way_to_start_anew_is_gymnasiums(
-    task: str, mode: AutoresetMode, workers: int, backend: str
-) -> None:
-    assert _against_single(task, backend, mode, workers, 30) >= 6
+    assert ended >= 6
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
@@ -208,12 +205,10 @@ def test_a_world_that_diverges_starts_anew_and_the_others_go_on(mode: str, backe
         assert not terminated.any()
         assert np.isfinite(after).all()
         assert np.isfinite(rewards).all()
-        if mode == "SameStep":
-            assert infos["final_info"]["diverged"].tolist() == [False, True, False]
-            assert np.array_equal(infos["final_obs"][1], seen[1])
-        else:
-            assert infos["diverged"].tolist() == [False, True, False]
-            assert np.array_equal(after[1], seen[1])
+        same = mode == "SameStep"
+        final, last = (infos["final_info"], infos["final_obs"]) if same else (infos, after)
+        assert final["diverged"].tolist() == [False, True, False]
+        assert np.array_equal(last[1], seen[1])
         after, _, _, truncated, infos = envs.step(still)
         assert not truncated.any()
         assert not infos["diverged"].any()
@@ -228,12 +223,13 @@ def test_one_that_diverges_or_leaves_the_space_is_truncated(
     with _make(REACH, backend) as env:
         seen, _ = env.reset(seed=0)
         getattr(env.unwrapped.data, name)[1] = value  # a position beyond its range is finite
-        after, reward, terminated, truncated, info = env.step(np.zeros(6, dtype=np.float32))
+        still = np.zeros(6, dtype=np.float32)
+        after, reward, terminated, truncated, info = env.step(still)
         assert (terminated, truncated, info["diverged"]) == (False, True, True)
         assert np.array_equal(after, seen)
         assert np.isfinite(reward)
         env.reset(seed=0)
-        assert not env.step(np.zeros(6, dtype=np.float32))[3]
+        assert not env.step(still)[3]
 
 
 @pytest.mark.slow
@@ -241,13 +237,12 @@ def test_one_that_diverges_or_leaves_the_space_is_truncated(
 def test_no_command_within_the_ranges_leaves_the_space(task: str, backend: str) -> None:
     """The hardest ones: from end to end of every joint."""
     with _make(task, backend) as env:
-        rng, action = np.random.default_rng(0), np.zeros(6, dtype=np.float32)
+        rng = np.random.default_rng(0)
         for seed in range(6):
             env.reset(seed=seed)
+            actions = rng.choice([-1.0, 1.0], (8, 6)).astype(np.float32)
             for k in range(60):
-                if k % 8 == 0:
-                    action = rng.choice([-1.0, 1.0], 6).astype(np.float32)
-                seen, _, terminated, truncated, info = env.step(action)
+                seen, _, terminated, truncated, info = env.step(actions[k // 8])
                 assert seen in env.observation_space
                 assert not info["diverged"]
                 if terminated or truncated:
@@ -271,13 +266,11 @@ def test_the_scripted_policy_comes_within_a_centimetre(task: str, backend: str) 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
 def test_an_episode_is_the_same_however_the_next_one_starts(mode: str) -> None:
-    runs = []
+    runs, zero = [], np.zeros((4, 6), dtype=np.float32)
     for each in ("NextStep", mode):
-        with closing(
-            _make_vec(HELD_BOX, "mujoco", 4, autoreset_mode=each, max_episode_steps=6)
-        ) as envs:
-            zero = np.zeros((4, 6), dtype=np.float32)
-            runs.append(play(envs, lambda _seen, zero=zero: zero, 0))
+        how: Any = {"autoreset_mode": each, "max_episode_steps": 6}
+        with closing(_make_vec(HELD_BOX, "mujoco", 4, **how)) as envs:
+            runs.append(play(envs, lambda _seen: zero, 0))
     for name in ("returned", "distance", "success", "steps", "diverged"):
         assert np.array_equal(*(getattr(run, name) for run in runs))
 
@@ -307,17 +300,14 @@ def test_faults_are_one_clear_line(backend: str) -> None:
         each.reset(seed=0)
         bad, nan = action.copy(), r"action\[\d+\] = nan is not a finite number"
         bad[..., 2] = np.nan
-        before = (env.data if each is env else envs.worlds).ctrl.copy()
+        commanded = env.data if each is env else envs.worlds
+        before = commanded.ctrl.copy()
         refused(
-            (
-                BadInputError,
-                r"action wants .* got shape \(5,\)",
-                partial(each.step, np.zeros(5, np.float32)),
-            ),
+            (BadInputError, r"action wants .* got shape \(5,\)", partial(each.step, still[:5])),
             (BadInputError, nan, partial(each.step, bad)),
         )
         # The engine never saw it: the next step is as if nothing had been.
-        assert np.array_equal((env.data if each is env else envs.worlds).ctrl, before)
+        assert np.array_equal(commanded.ctrl, before)
         assert np.isfinite(each.step(action)[0]).all()
     refused(
         (BadInputError, "seed wants 2 seeds", lambda: envs.reset(seed=[1, 2, 3])),
@@ -342,13 +332,10 @@ def test_an_ended_world_must_be_reset_where_nobody_else_does() -> None:
 
 
 def test_without_gymnasium_the_extra_is_named() -> None:
-    code = (
+    runs_in_silence(
         "import sys; sys.modules['gymnasium'] = None\n"
         "try:\n    import statemachine.gym\n"
-        "except ImportError as error:\n    print(type(error).__name__, error)\n"
-    )
-    runs_in_silence(
-        code,
+        "except ImportError as error:\n    print(type(error).__name__, error)\n",
         ROOT,
         "MissingEngineError the tasks need Gymnasium: pip install 'statemachine-sim[gym]'\n",
     )
@@ -370,6 +357,5 @@ def test_what_is_closed_says_so_and_starts_nothing() -> None:
 
 def test_seeds_may_be_an_array_of_numbers() -> None:
     with closing(_make_vec(REACH, "mujoco", 2)) as envs:
-        listed, _ = envs.reset(seed=[3, 4])
-        as_array, _ = envs.reset(seed=np.array([3, 4]))
+        listed, as_array = (envs.reset(seed=seed)[0] for seed in ([3, 4], np.array([3, 4])))
         assert np.array_equal(listed, as_array)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
-from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
+from typing import Any
 
 import pytest
 
@@ -32,34 +33,25 @@ def _sources() -> dict[str, str]:
 
 
 def _docstrings(tree: ast.Module) -> set[ast.expr]:
-    found: set[ast.expr] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            match node.body:
-                case [ast.Expr(value=ast.Constant(value=str()) as text), *_]:
-                    found.add(text)
-    return found
+    bodies: list[Any] = [
+        node.body
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        and ast.get_docstring(node) is not None
+    ]
+    return {body[0].value for body in bodies}
 
 
-def _imported(node: ast.Import | ast.ImportFrom) -> Iterator[str]:
-    """Each word of what is imported: "mujoco_backend" has "mujoco" in it."""
-    names = [alias.name for alias in node.names]
-    names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
-    for name in names:
-        for part in name.split("."):
-            yield from part.split("_")
-
-
-def engines_named(tree: ast.Module) -> set[str]:
+def engines_named(tree: ast.Module) -> frozenset[str]:
     """The engines that a module names in code: as a string, or in an import."""
-    docstrings = _docstrings(tree)
-    found: set[str] = set()
+    docstrings, found = _docstrings(tree), set[str]()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
-            found |= NAMES.intersection(_imported(node))
+            # Each word: "mujoco_backend" has "mujoco" in it.
+            found.update(re.findall(r"[^\W_]+", ast.unparse(node)))
         elif isinstance(node, ast.Constant) and node not in docstrings:
-            found |= NAMES & {node.value} if isinstance(node.value, str) else set()
-    return found
+            found.add(str(node.value))
+    return NAMES & found
 
 
 def test_engines_are_named_in_their_rooms_alone() -> None:

@@ -16,19 +16,13 @@ import pytest
 
 from statemachine.lessons import LESSONS
 
-from .conftest import ROOT, need_engine, of_python
+from .conftest import QUICK, ROOT, need_engine, of_python
 
 TABLE = Path(__file__).with_suffix(".json")
-OPTIONS = {
-    "speed": "--steps 200",
-    "worlds": "--most 4",
-    "gravity": "--longer 0",
-    "replay": "--steps 100",
-}
 MAY_BE_NULL = {"data_bytes", "world_bytes"}  # memory grows by pages, and freed ones are used again
 ITSELF = "--backends mujoco mujoco --seconds 0.2"
 COMMANDS = [
-    *(f"lesson {name} {OPTIONS.get(name, '')}".strip() for name in LESSONS),
+    *(shlex.join(("lesson", name, *QUICK.get(name, ()))) for name in LESSONS),
     "doctor",
     "conventions quaternion gravity --backend mujoco",
     "conventions --calls --backend mujoco",

@@ -352,12 +352,10 @@ def _stl(edge: float) -> str:
     """A cube about the origin, in ASCII."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * edge / 2
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    lines = ["solid cube"]
-    for a, b, c, d in faces:
-        for triangle in ((a, b, c), (a, c, d)):
-            points = "".join(f"vertex {' '.join(map(str, corners[i]))}\n" for i in triangle)
-            lines.append(f"facet normal 0 0 0\nouter loop\n{points}endloop\nendfacet")
-    return "\n".join([*lines, "endsolid cube"])
+    triangles = [triangle for a, b, c, d in faces for triangle in ((a, b, c), (a, c, d))]
+    facet = "facet normal 0 0 0\nouter loop\n" + "vertex {} {} {}\n" * 3 + "endloop\nendfacet\n"
+    facets = "".join(facet.format(*corners[[*triangle]].ravel()) for triangle in triangles)
+    return f"solid cube\n{facets}endsolid cube"
 
 
 def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
