@@ -260,7 +260,8 @@ def test_a_value_is_in_the_range_of_its_joint(model: Any) -> None:
 def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
     robot = model(SEVERAL)
     names = ("o.x", "o.y", "o.z", "p.position", "p.velocity", "m", "s", "i")
-    assert_has(robot, actuator_names=names, nu=len(robot.keyframes[0].ctrl))
+    assert robot.actuator_names == names
+    assert robot.nu == len(names) == len(robot.keyframes[0].ctrl)
     assert robot.actuator_jntid.tolist() == [-1, -1, -1, 1, 1, 1, 1, 1]
     assert np.flatnonzero(np.isfinite(robot.actuator_kp)).tolist() == [6]
     assert np.flatnonzero(np.isfinite(robot.actuator_gain)).tolist() == [5]

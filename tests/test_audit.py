@@ -309,12 +309,13 @@ def asked(
 ) -> list[Figures]:
     """What a question finds of an engine and of the interface to it, in few steps."""
     model = sm.load(SCENE, backend=backend)
-    places = tuple(point for point in points(model, 0)[0] if point.name in only)
-    found: list[Figures] = []
-    for driver in drivers_of(model, 0):
-        for point in places:
-            found += QUESTIONS[question](driver, driver.run(point, 30))
-    return found
+    return [
+        finding
+        for driver in drivers_of(model, 0)
+        for point in points(model, 0)[0]
+        if point.name in only
+        for finding in QUESTIONS[question](driver, driver.run(point, 30))
+    ]
 
 
 def broken(findings: Iterable[Figures]) -> set[tuple[str, str]]:
