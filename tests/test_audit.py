@@ -309,11 +309,11 @@ def asked(
 ) -> list[Figures]:
     """What a question finds of an engine and of the interface to it, in few steps."""
     model = sm.load(SCENE, backend=backend)
+    places = [point for point in points(model, 0)[0] if point.name in only]
     return [
         finding
         for driver in drivers_of(model, 0)
-        for point in points(model, 0)[0]
-        if point.name in only
+        for point in places
         for finding in QUESTIONS[question](driver, driver.run(point, 30))
     ]
 
