@@ -8,7 +8,6 @@ from a compiled model's numbers: other code, and the same reading of the file.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -20,7 +19,7 @@ from .errors import BadInputError, ModelError, check_name, refuse
 from .installed import require
 from .interface import Array, Model
 from .interface.options import as_numbers, as_vector
-from .models import resolve
+from .models import AnyPath, resolve
 from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz
 from .witness import Segment, WitnessModel, read_file, read_numbers
 
@@ -61,9 +60,7 @@ class Kinematics:
         BadInputError: `joint_names` are not names.
     """
 
-    def __init__(
-        self, model: str | os.PathLike[str], joint_names: Sequence[str] | None = None
-    ) -> None:
+    def __init__(self, model: AnyPath, joint_names: Sequence[str] | None = None) -> None:
         pin, path = require("pinocchio"), resolve(model)
         self._hold(pin, path, read_file(pin, path), joint_names)
 

@@ -28,6 +28,8 @@ from .errors import (
     unknown_name,
 )
 
+AnyPath = str | os.PathLike[str]
+
 # Robots by name, through packages that know where public models are.
 #
 # `menagerie:NAME` or `menagerie:NAME/ENTRY` is of mujoco-menagerie, `robot_descriptions:NAME`, or
@@ -166,7 +168,7 @@ def model_names() -> list[str]:
     return sorted(names, key=lambda name: (not name.startswith("so101/"), len(name), name))
 
 
-def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | None = None) -> Path:
+def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
     """The file of a model.
 
     Args:
@@ -216,7 +218,7 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     raise unknown_name("model", text, model_names())
 
 
-def _as_text(name: str | os.PathLike[str]) -> str:
+def _as_text(name: AnyPath) -> str:
     text = os.fspath(name) if isinstance(name, os.PathLike) else name
     if not isinstance(text, str):
         raise TypeError(f"a model is given by its name or a path; got {shown(name)}")

@@ -149,8 +149,8 @@ PYBULLET_FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...
     # The suite's only model of several trees cannot be loaded then: no check gets to fail.
     "files are cached": (files_are_cached, set(), (ours.test_two_free_bodies_are_two,)),
     "friction of contacts the other way": (
-        around("world.World", "contact_points")(
-            lambda right, self: [(*p[:10], -p[10], p[11], -p[12], p[13]) for p in right(self)]
+        around("pb", "getContactPoints")(
+            lambda right, **of: [(*p[:10], -p[10], p[11], -p[12], p[13]) for p in right(**of)]
         ),
         {"contact_forces_lean_against_a_push"},
         (),

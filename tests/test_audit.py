@@ -429,7 +429,7 @@ FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
     ),
     "a read perturbs": (
         "look",
-        followed_by(MujocoData, "_find_contacts", nudge),
+        followed_by(MujocoData, "_derive", lambda data, _: nudge(data)),
         ("interface", "reading what is derived"),
     ),
     "a read of PyBullet perturbs": (

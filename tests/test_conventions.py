@@ -22,14 +22,12 @@ from statemachine.installed import ENGINES, available, require
 from statemachine.probes.calls import record
 from statemachine.probes.conventions import (
     CONCEPTS,
-    NO_ANSWER,
     QUESTIONS,
-    UNDECIDED,
     ask,
     probe,
     run_phrases,
 )
-from statemachine.probes.conventions.answers import closest
+from statemachine.probes.conventions.answers import NO_ANSWER, UNDECIDED, closest
 from statemachine.probes.conventions.frames import FIXED, ORDERS
 from statemachine.report import conventions as report
 

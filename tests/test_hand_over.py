@@ -43,7 +43,7 @@ class Other:
         self._model, self._data = model, data
         self._go, self._done = threading.Semaphore(0), threading.Semaphore(0)
         object.__setattr__(data, "_advance", self._watched(data._advance))
-        for name in ("_find_contacts", "_reset"):
+        for name in ("_derive", "_reset"):
             right = getattr(MujocoData, name)
             patch(MujocoData, name, lambda *args, right=right: self._watched(right)(*args))
         self._thread = threading.Thread(target=self._work, daemon=True)

@@ -71,10 +71,14 @@ def changes_with(*names: str) -> Patch:
 def contacts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """A fault in one array of the contacts."""
 
-    @around(MujocoData, "_find_contacts")
-    def faulty(right: Any, self: MujocoData) -> Any:
-        found = right(self)
-        return dataclasses.replace(found, **{part: change(np.array(getattr(found, part)))})
+    @around(MujocoData, "_derive")
+    def faulty(right: Any, self: MujocoData, name: str) -> Any:
+        found = right(self, name)
+        return (
+            dataclasses.replace(found, **{part: change(np.array(getattr(found, part)))})
+            if name == "contacts"
+            else found
+        )
 
     return faulty
 

@@ -12,14 +12,15 @@ import os
 import warnings
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Literal, Protocol, cast
+from typing import Any, Protocol, cast
 
 from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
+from ..interface.records import Defaults
 from ..measures import ContactNames, overlaps
 from ..measures.text import few
-from ..models import resolve
+from ..models import AnyPath, resolve
 from ..releases import is_release, version_of
 from ._hidden_data import HiddenData, HiddenModel
 from ._hidden_world import HiddenWorld, Moment
@@ -49,7 +50,7 @@ class Loader(Protocol):
     the others `load` applies them.
     """
 
-    def __call__(self, path: os.PathLike[str], defaults: Literal["model", "engine"]) -> Model: ...
+    def __call__(self, path: os.PathLike[str], defaults: Defaults) -> Model: ...
 
 
 # Where each is, as "package.module:function"; ours go by the names of their engines.
@@ -113,11 +114,11 @@ def loaders() -> dict[str, str]:
 
 
 def load(
-    model: str | os.PathLike[str],
+    model: AnyPath,
     backend: str = DEFAULT,
     *,
-    defaults: Literal["model", "engine"] = "model",
-    menagerie: str | os.PathLike[str] | None = None,
+    defaults: Defaults = "model",
+    menagerie: AnyPath | None = None,
     trust_binary: bool = False,
     **options: Any,
 ) -> Model:

@@ -96,6 +96,7 @@ class Tendons:
         bent: Places of those that go through space.
         moments: By number, the moment (n,) of each.
         armature, damping: (t,), of those that are linear sums.
+        lengths: (t,) at the positions of the last `take`.
         near: (n, n) the pairs of degrees of freedom of which one carries the other: MuJoCo's
             matrices have no room for others.
         stiff, limited, rubs: Whether any has a spring, a limit, dry friction.
@@ -137,12 +138,15 @@ class Tendons:
         self._range = bounds_of(raw.tendon_range[ids] + margin, fenced)
         self._stop = soft(raw.tendon_solref_lim[ids], raw.tendon_solimp_lim[ids], weight, shortest)
 
-    def bend(self, q: Sequence[float]) -> Array:
-        """Take the paths of those that go through space, where the tree's qpos are q.
+    def take(self, q: Sequence[float], angles: Array) -> Array | None:
+        """Take the lengths and paths, where the tree's qpos are q and its angles (n,).
 
         Returns:
-            What they damp (n, n).
+            What those damp that go through space (n, n); None if none does.
         """
+        self.lengths = dense.times(self._moment, angles)
+        if not self.bent:
+            return None
         raw, data = self._raw, self._world.still
         data.qpos[self._tree.qpos] = q
         for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon):
@@ -152,30 +156,22 @@ class Tendons:
             row = np.zeros(raw.nv)
             row[raw.ten_J_colind[start : start + count]] = data.ten_J[start : start + count]
             self._moment[place] = row[self._tree.dofs]
+            self.lengths[place] = data.ten_length[self.ids[place]]
         self._across = self._moment.T.copy()
         return self.squared(self._bent_damping)
-
-    def lengths(self, angles: Array) -> Array:
-        """(t,), as they are at the positions of the last `bend`."""
-        lengths = dense.times(self._moment, angles)
-        for place in self.bent:
-            lengths[place] = self._world.still.ten_length[self.ids[place]]
-        return lengths
 
     def squared(self, weight: Array) -> Array:
         """Jᵀ·W·J (n, n) of weights (t,)."""
         return dense.product(self._across * weight, self._moment)
 
-    def spring_force(self, angles: Array) -> Array:
+    def spring_force(self) -> Array:
         """(n,) what springs do where they are beyond their slack."""
-        length = self.lengths(angles)
-        slack = np.minimum(np.maximum(length, self._slack[0]), self._slack[1])
-        return dense.times(self._across, self._stiffness * (slack - length))
+        slack = np.minimum(np.maximum(self.lengths, self._slack[0]), self._slack[1])
+        return dense.times(self._across, self._stiffness * (slack - self.lengths))
 
-    def stops(self, angles: Array, speed: Array) -> list[SoftRow]:
+    def stops(self, speed: Array) -> list[SoftRow]:
         """Rows of the limits that tendons are beyond."""
-        rows = []
-        length, rate = self.lengths(angles), dense.times(self._moment, speed)
+        rows, rate, length = [], dense.times(self._moment, speed), self.lengths
         for k, (low, high) in enumerate(zip(*self._range, strict=True)):
             for side, gap in ((1.0, length[k] - low), (-1.0, high - length[k])):
                 if gap < 0:

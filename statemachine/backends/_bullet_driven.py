@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 from ..interface import DERIVED, POSES, Array
+from ..interface.records import Arrays
 from ..rotations import matrix_from_quat, wxyz_from_xyzw
 from . import _dense as dense
 from ._bullet_client import pb
@@ -162,7 +163,7 @@ class DrivenWorld(HiddenWorld):
         self.step(afresh=True)
         self.read()
 
-    def kinematics(self, moment: Moment, name: str) -> dict[str, Array]:
+    def kinematics(self, moment: Moment, name: str) -> Arrays:
         """By the engine's own, in a world that is never stepped."""
         with HiddenWorld.lock:
             ghost = ghost_of(self._plan)
@@ -173,7 +174,7 @@ class DrivenWorld(HiddenWorld):
         """Contacts, which the step found before it moved; or accelerations and forces."""
         world, raw = self.raw, self._plan.raw
         if name == "contacts":
-            points = world.contact_points()
+            points = pb.getContactPoints(physicsClientId=world.client)
             return {name: contacts_of(raw, points, world.geoms_of_links, world.geom_turns, read)}
         values = {name: np.zeros(raw.nv) for name in DERIVED if name not in POSES}
         for arm in self._arms:
@@ -218,7 +219,7 @@ class Motors:
         positions, speed = self._world.read_tree(self.tree)
         self.positions, self.speed = np.array(positions), np.array(speed)
 
-    def forces(self) -> dict[str, Array]:
+    def forces(self) -> Arrays:
         """What the engine tells: its bias, and the torque of its motors in the last step."""
         positions, speed = (array.tolist() for array in self._before)
         bias = self._world.needed(self.tree, positions, speed, [0.0] * len(speed))
@@ -260,7 +261,7 @@ class Ghost(World):
         self._known: dict[bool, list[tuple[Array, Array]]] = {}  # of the sites, and of the bodies
         self._known_at, self._rest = b"?", np.zeros(plan.raw.nv)
 
-    def poses(self, qpos: Array, name: str) -> dict[str, Array]:
+    def poses(self, qpos: Array, name: str) -> Arrays:
         """Poses of bodies, or of sites, by the engine's own forward kinematics.
 
         Centres of mass and their axes are what PyBullet reports in double precision; a

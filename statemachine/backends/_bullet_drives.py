@@ -147,13 +147,12 @@ class Drives:
 
     def _bend(self, angles: Array, speed: Array, acting: Array) -> Array:
         """The feedback (m,) where lengths or gains are curves; the gains and slopes with it."""
-        lengths = self._tendons.lengths(angles)
         for column, gear, tendon in self._paths:
             self._gear[:, column] = gear * self._tendons.moments[self._tendons.ids[tendon]]
         self._across = self._gear.T.copy()
         length, rate = dense.times(self._across, angles), dense.times(self._across, speed)
         for column, gear, tendon in self._paths:
-            length[column] = gear * lengths[tendon]
+            length[column] = gear * self._tendons.lengths[tendon]
         least, per_length, damping = self._bias.T.copy()
         feedback = least + per_length * length + damping * rate
         for k, _, gain, rest, _ in self._muscles:

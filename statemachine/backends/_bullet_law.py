@@ -33,6 +33,7 @@ import mujoco
 import numpy as np
 
 from ..interface import Array
+from ..interface.records import Arrays
 from ..rotations import matrix_from_quat
 from . import _dense as dense
 from ._bullet_constraints import (
@@ -158,7 +159,7 @@ class Law:
             self._contact = np.array(self._world.needed(self.tree, q, v, rate)) - self._torque
         return self._contact
 
-    def forces(self) -> dict[str, Array]:
+    def forces(self) -> Arrays:
         """Accelerations and forces of the last step, by their names in the contract."""
         bias, actuator, passive, friction, limit, equality = self._parts
         total = actuator + passive + friction + limit + equality + self.contact
@@ -200,7 +201,7 @@ class Law:
         q, speed = self._angles, x[n:-1]
         linear = dense.times(self._linear, x)
         passive, damped = linear[:n], linear[n : 2 * n]
-        slope = self._tendons.bend(self._q) if self._tendons.bent else None
+        slope = self._tendons.take(self._q, x[:n]) if self._tendons.ids else None
         actuator, inertia = self.drives.forces(linear[2 * n :], x[:n], speed)
         if slope is not None:
             passive = passive - dense.times(slope, speed)
@@ -214,7 +215,7 @@ class Law:
         dense.factored(explicit)
         dense.factored(implicit)
         if self._tendons.stiff:
-            passive = passive + self._tendons.spring_force(x[:n])
+            passive = passive + self._tendons.spring_force()
         others = actuator + passive - bias + contact
         limit = equality = self._nothing
         stops = self._stops_reached(q, x[:n], speed)
@@ -300,7 +301,7 @@ class Law:
     def _stops_reached(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
         """Rows of the limits that joints and tendons are beyond."""
         low, high = self._ranges
-        rows = self._tendons.stops(angles, speed) if self._tendons.limited else []
+        rows = self._tendons.stops(speed) if self._tendons.limited else []
         if all(map(le, low, q)) and all(map(ge, high, q)):
             return rows
         for i, (least, place, most) in enumerate(zip(low, q, high, strict=True)):

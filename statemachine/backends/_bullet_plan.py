@@ -290,7 +290,11 @@ def _kept_hull(vertices: bytes, faces: bytes) -> Hull:
 
 def hull_of(raw: mujoco.MjModel, geom: int) -> Hull:
     """The hull of a geom; one for all geoms and models that have the same."""
-    vertices, faces = _solid(raw, geom)
+    if raw.geom_type[geom] == ELLIPSOID:
+        vertices, faces = _sphere()
+        vertices = vertices * raw.geom_size[geom]
+    else:
+        vertices, faces = _mesh_hull(raw, int(raw.geom_dataid[geom]))
     return _kept_hull(vertices.tobytes(), faces.astype(np.int64).tobytes())
 
 
@@ -300,15 +304,8 @@ def roughness(size: Array) -> float:
     return float((np.linalg.norm(ball, axis=1).max() - 1) * size.max())
 
 
-def _solid(raw: mujoco.MjModel, geom: int) -> tuple[Array, Faces]:
-    """Vertices (n, 3) [m] and triangles (m, 3), which turn outwards."""
-    if raw.geom_type[geom] == ELLIPSOID:
-        ball, faces = _sphere()
-        return ball * raw.geom_size[geom], faces
-    return _mesh_hull(raw, int(raw.geom_dataid[geom]))
-
-
 def _mesh_hull(raw: mujoco.MjModel, mesh: int) -> tuple[Array, Faces]:
+    """Vertices (n, 3) [m] and triangles (m, 3), which turn outwards."""
     start, count = int(raw.mesh_vertadr[mesh]), int(raw.mesh_vertnum[mesh])
     vertices = np.array(raw.mesh_vert[start : start + count], dtype=np.float64)
     # Vertices, triangles, two tables of vertices, one of edges, and the triangles by vertex.

@@ -51,14 +51,14 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
         as_it_comes: Whether nothing is emulated: then the law of the tree is not there either.
     """
     raw = plan.raw
-    problems = _of_the_whole(raw)
-    rows = [*_of_joints(raw), *_of_bodies(plan), *_of_actuators(raw), *_of_ties(raw)]
+    whole = {"flex": raw.nflex, "plugin": raw.nplugin}
+    problems = [(feature, f"the model has {count}") for feature, count in whole.items() if count]
     if as_it_comes:
         problems += _of_the_law(raw)
-    rows += _of_geoms(plan)
+    rows = *_of_joints(raw), *_of_bodies(plan), *_of_actuators(raw), *_of_ties(raw)
     problems += [
         (feature, f"{kind} {_name(raw, kind, k)} {says}")
-        for kind, feature, which, says in rows
+        for kind, feature, which, says in (*rows, *_of_geoms(plan))
         for k in np.flatnonzero(which).tolist()
     ]
     if not problems:
@@ -72,16 +72,6 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
         reason=reason,
         features=tuple(dict.fromkeys(what for what, _ in problems)),
     )
-
-
-def _of_the_whole(raw: mujoco.MjModel) -> list[tuple[str, str]]:
-    """Whole kinds of elements, and settings of the model, with what is to be said of them."""
-    counts = {
-        "flex": raw.nflex,
-        "plugin": raw.nplugin,
-    }
-    problems = [(feature, f"the model has {count}") for feature, count in counts.items() if count]
-    return problems
 
 
 def _of_the_law(raw: mujoco.MjModel) -> list[tuple[str, str]]:
@@ -131,10 +121,9 @@ def _of_bodies(plan: Plan) -> Rows:
 def _of_actuators(raw: mujoco.MjModel) -> Rows:
     own = (raw.actuator_armature != 0) | (raw.actuator_damping != 0)
     own |= raw.actuator_dampingpoly.any(axis=1)
-    used, joints = in_force(raw), raw.actuator_trnid[:, 0]
+    used, joints = in_force(raw) & ~_sticks(raw), raw.actuator_trnid[:, 0]
     on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
     on_tendon = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
-    used &= ~_sticks(raw)
     turning = np.zeros(raw.nactuator, dtype=bool)
     turning[on_joint] = np.isin(raw.jnt_type[joints[on_joint]], (_FREE, _BALL))
     between = (raw.actuator_delay != 0) & (raw.actuator_history[:, 1] != 0)
@@ -230,7 +219,12 @@ def ignored(plan: Plan) -> list[str]:
         "the margin of a pair": touches and raw.pair_margin.any(),
         "the second friction of a pair": touches and np.ptp(slide, axis=1).any(),
         "the second rolling friction of a pair": touches and np.ptp(roll, axis=1).any(),
-        "solref, solimp or solreffriction of a pair": touches and _own_softness(raw),
+        "solref, solimp or solreffriction of a pair": touches
+        and (
+            (raw.pair_solref != _SOLREF).any()
+            or (raw.pair_solimp != _SOLIMP).any()
+            or raw.pair_solreffriction.any()
+        ),
     }
     sentences += [f"{what} has no effect" for what, there in settings.items() if there]
     if raw.jnt_springyield.any():
@@ -256,12 +250,6 @@ def ignored(plan: Plan) -> list[str]:
 def _sticks(raw: mujoco.MjModel) -> Any:
     """(nactuator,) bool: which actuators act on the contacts of a body alone."""
     return raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_BODY)
-
-
-def _own_softness(raw: mujoco.MjModel) -> bool:
-    """Whether a pair of geoms has a softness of its own."""
-    own = (raw.pair_solref != _SOLREF).any() or (raw.pair_solimp != _SOLIMP).any()
-    return bool(own or raw.pair_solreffriction.any())
 
 
 def _bounces(plan: Plan) -> list[str]:

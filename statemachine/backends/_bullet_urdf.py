@@ -143,8 +143,7 @@ class Names:
     """
 
     def __init__(self, raw: mujoco.MjModel) -> None:
-        links: set[str] = set()
-        joints: set[str] = set()
+        self._taken = links, joints = set[str](), set[str]()
         bodies = range(raw.nbody)
         self.links = {b: _once(raw.body(b).name or f"body_{b}", links) for b in bodies}
         self.joints = {j: _once(raw.joint(j).name or f"joint_{j}", joints) for j in range(raw.njnt)}
@@ -154,9 +153,7 @@ class Names:
         self.between = {j: _once(f"{name}_link", links) for j, name in self.joints.items()}
         self.fixed = {b: _once(f"{name}_fixed", joints) for b, name in self.links.items()}
         self.tips_fixed = {s: _once(f"{name}_fixed", joints) for s, name in self.tips.items()}
-
         self._parts: dict[tuple[int, int], tuple[str, str]] = {}
-        self._taken = links, joints
 
     def part(self, body: int, part: int) -> tuple[str, str]:
         """Of the link of a part of a body, and of its fixed joint."""

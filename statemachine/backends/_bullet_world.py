@@ -107,6 +107,7 @@ class World:
 
     Attributes:
         client: What PyBullet's functions want as `physicsClientId`.
+        close: Gives the client back. Idempotent.
         trees: The trees of the model, the world's own geoms first.
         geoms_of_links: By PyBullet's body and link, MuJoCo's body and its geoms that touch.
         geom_turns: By geom that touches, the matrix (3, 3) from its body's axes into its own.
@@ -127,7 +128,7 @@ class World:
         self._plan, self._raw, self._surfaces = plan, plan.raw, plan.surfaces
         raw = plan.raw
         self.client = connect()
-        self._end = weakref.finalize(self, disconnect, self.client)
+        self.close = weakref.finalize(self, disconnect, self.client)
         pb.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
         self._gravity = gravity(raw).tolist()
         pb.setGravity(*self._gravity, self.client)
@@ -167,14 +168,8 @@ class World:
                     self.needed(tree, [*pose, *zero[tree.base :]], zero, zero)
         if kind == "ghost":
             return
-        if kind == "stepped":
-            pb.setPhysicsEngineParameter(
-                deterministicOverlappingPairs=1, physicsClientId=self.client
-            )
         pb.setTimeStep(raw.opt.timestep, self.client)
         self._add_planes()
-        if kind == "stepped":
-            self._take_surfaces()
         self.geoms_of_links = {
             (body, link): (solid.body, solid.geoms) for body, link, solid in self.solids()
         }
@@ -183,20 +178,20 @@ class World:
             for _, geoms in self.geoms_of_links.values()
             for g in geoms
         }
-        self._solid_links = list(self.geoms_of_links)
+        if kind == "stepped":
+            pb.setPhysicsEngineParameter(
+                deterministicOverlappingPairs=1, physicsClientId=self.client
+            )
+            self._take_surfaces()
         self._homes = [
             (body, pb.getBasePositionAndOrientation(body, self.client))
             for body in (*(tree.body for tree in self.trees), *self._planes.values())
         ]
 
-    def close(self) -> None:
-        """Give the client back."""
-        self._end()
-
     @property
     def closed(self) -> bool:
         """Whether the client was given back; its number may be another's by now."""
-        return not self._end.alive
+        return not self.close.alive
 
     @cached_property
     def still(self) -> mujoco.MjData:
@@ -319,7 +314,7 @@ class World:
         self.soften()
         known = self._surfaces
         self.set_friction(known.slide, known.spin, known.roll)
-        links = [(body, link) for body, link, _ in self.solids()]
+        links = list(self.geoms_of_links)
         for (i, j), meet in known.pairs.items():
             if not meet:  # the others do, as they were loaded
                 (body_a, link_a), (body_b, link_b) = links[i], links[j]
@@ -329,7 +324,7 @@ class World:
 
     def set_collision_groups(self, group: int = 0, mask: int = 0) -> None:
         """Set the group and the mask of all that can touch; by default nothing meets anything."""
-        for body, link in self._solid_links:
+        for body, link in self.geoms_of_links:
             pb.setCollisionFilterGroupMask(body, link, group, mask, self.client)
 
     def place(self, qpos: Array, qvel: Array) -> None:
@@ -572,10 +567,6 @@ class World:
                 forces=force[tree.base :].tolist(),
                 physicsClientId=self.client,
             )
-
-    def contact_points(self) -> list[Any]:
-        """PyBullet's contact points of the last collision detection."""
-        return pb.getContactPoints(physicsClientId=self.client)
 
 
 ENGINE_TIMESTEP = 1 / 240

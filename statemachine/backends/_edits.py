@@ -141,13 +141,16 @@ def servos(m: mujoco.MjModel) -> tuple[Ints, Any]:
     return owner, servo[owner]
 
 
-def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
-    """A copy with options of `Model.replace`, which has checked them.
+def edited(raw: mujoco.MjModel, options: dict[str, Any], timestep: float) -> mujoco.MjModel:
+    """A copy with options of `Model.replace`, which has checked them, and room for a latency.
 
     Args:
         raw: Stays as it is.
-        options: Those of `changes`. Others, `timestep`, `substeps` and `integrator` among
-            them, are left to the backend; when the timestep is set, so is `with_room`.
+        options: Those of `changes`. `integrator` and `max_qvel` are left to the backend.
+        timestep: Of an engine step [s], as `step_length` gives it.
+
+    Raises:
+        BadInputError: As in `with_room`.
     """
     written = changes(raw, options)
     raw = copy.copy(raw)
@@ -155,7 +158,8 @@ def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
         put(raw, name, value)
     if CONSTANTS_FOLLOW & options.keys():
         mujoco.mj_setConst(raw, mujoco.MjData(raw))
-    return raw
+    raw.opt.timestep = timestep
+    return with_room(raw)
 
 
 def put(raw: mujoco.MjModel, name: str, value: Any, index: tuple[Any, ...] = ()) -> None:

@@ -294,7 +294,7 @@ def acting(ctrl: Array, given: Array, delay_steps: Ints) -> Array:
 class HiddenData(Data):
     """A Machine as a Data."""
 
-    __slots__ = ("_layout", "_machine")
+    __slots__ = ("_machine",)
 
     def __init__(self, model: HiddenModel) -> None:
         self._machine = machine = Machine(model)
@@ -307,11 +307,6 @@ class HiddenData(Data):
         self._layout = model._with_fingerprint(layout)
         inputs = {name: getattr(machine, name) for name in (*INPUTS, *MOCAP)}
         super().__init__(model, machine.run, inputs)
-
-    @property
-    def machine(self) -> Machine:
-        """What lies beside the world; to be looked at only."""
-        return self._machine
 
     @property
     def raw(self) -> Any:
@@ -330,9 +325,6 @@ class HiddenData(Data):
         if name in self._machine.world.untold:
             raise unsupported(self._home, "contacts" if name == "contacts" else "forces by part")
         return self._machine.derive(name)
-
-    def _find_contacts(self) -> Contacts:
-        return HiddenData._derive(self, "contacts")  # one reading, for who watches both
 
     def _recompute(self) -> None:
         self._machine.forward()
@@ -360,9 +352,6 @@ class HiddenData(Data):
         if given.size:
             given = state["given"].reshape(given.shape)
         self._machine.restart(state.time, start, given)
-
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        return self._layout
 
     def _set_time(self, time: float) -> None:
         self._machine.time = time

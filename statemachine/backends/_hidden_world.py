@@ -18,6 +18,7 @@ import numpy as np
 
 from ..interface import DERIVED, POSES, Array
 from ..interface.options import HUGE
+from ..interface.records import Sizes
 
 _MANY = HUGE * HUGE
 Read = Callable[[str], Any]
@@ -60,7 +61,7 @@ class HiddenWorld(ABC):
     engine: str
     errors: tuple[type[Exception], ...] = ()
     untold: frozenset[str] = frozenset()
-    memory_layout: tuple[tuple[str, int], ...] = ()
+    memory_layout: Sizes = ()
     kept_memory: Collection[str] = ()
     timestep: float
     qpos0: Array

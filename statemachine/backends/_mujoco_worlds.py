@@ -17,6 +17,7 @@ from mujoco.batch import Batch, SimulationError
 
 from ..interface import Array, Ints, Model, State
 from ..interface.options import check_vector, engine_steps, unsupported
+from ..interface.records import Errors, StateLayout
 from ..interface.worlds import WRITABLE, Worlds, check_memory
 from ._delays import hold, places_of, with_room_of
 from ._mujoco_alarms import (
@@ -53,7 +54,7 @@ class MujocoWorlds(Worlds):
         size: tuple[int, int],
         derived: tuple[str, ...],
         varied: tuple[Mapping[str, Any], bool],
-        layout: Callable[[int], tuple[str, tuple[tuple[str, int], ...]]],
+        layout: Callable[[int], StateLayout],
     ) -> None:
         """Make the worlds.
 
@@ -125,9 +126,9 @@ class MujocoWorlds(Worlds):
         for name in ("_changing", "_before", "_warned", "_told", "_history", "_batch"):
             setattr(self, name, None)
 
-    def _step(self, ids: Ints, nstep: int, forward: bool) -> Mapping[int, Exception]:
+    def _step(self, ids: Ints, nstep: int, forward: bool) -> Errors:
         count = engine_steps(nstep, self._base.substeps)
-        errors: dict[int, Exception] = {}
+        errors: Errors = {}
         if self.model._quaternions:
             qpos = self.qpos if len(ids) == self.n else self.qpos[ids]
             errors.update(self._zero_quaternions(qpos, ids))
@@ -139,13 +140,11 @@ class MujocoWorlds(Worlds):
             errors |= self._forward(ids[~np.isin(ids, list(errors))] if errors else ids)
         return errors
 
-    def _forward(self, ids: Ints) -> Mapping[int, Exception]:
+    def _forward(self, ids: Ints) -> Errors:
         self._before[:] = self._changing
         return self._call(ids, 0, self._batch.forward)
 
-    def _call(
-        self, ids: Ints, count: int, call: Callable[[Ints | None], object]
-    ) -> dict[int, Exception]:
+    def _call(self, ids: Ints, count: int, call: Callable[[Ints | None], object]) -> Errors:
         """Run some worlds and look at what the engine warned of.
 
         Args:
@@ -156,7 +155,7 @@ class MujocoWorlds(Worlds):
         Returns:
             The error of each world that ended.
         """
-        errors: dict[int, Exception] = {}
+        errors: Errors = {}
         if not len(ids):
             return errors
         try:
@@ -170,7 +169,7 @@ class MujocoWorlds(Worlds):
             errors.update(self._attend(count))
         return errors
 
-    def _attend(self, count: int) -> dict[int, Exception]:
+    def _attend(self, count: int) -> Errors:
         """Look at the counters that differ: the errors, and what else was warned of."""
         listen()
         counts = (self._warned - self._told)[:, :, 1]
@@ -188,9 +187,9 @@ class MujocoWorlds(Worlds):
         pass_on(list(texts), stacklevel=7)
         return errors
 
-    def _causes(self, worlds: Ints, count: int) -> dict[int, Exception]:
+    def _causes(self, worlds: Ints, count: int) -> Errors:
         """What ended each of these worlds, from running it again alone."""
-        errors: dict[int, Exception] = {}
+        errors: Errors = {}
         raw = data = None
         for world in worlds.tolist():
             raw = self._batch.get_model(world, raw)
@@ -238,7 +237,7 @@ class MujocoWorlds(Worlds):
         for world, state in zip(ids.tolist(), states, strict=True):
             self._batch.state[world, self._places(world)] = state.vector
 
-    def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+    def _state_layout(self, world: int) -> StateLayout:
         nhistory = self._base.raw.nhistory
         if self._kept is not None:
             nhistory = len(places_of(self.model.raw, self._base.raw, self._kept[world]))
@@ -255,8 +254,8 @@ class MujocoWorlds(Worlds):
 
     def _record(
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
-    ) -> Mapping[int, Exception]:
-        errors: dict[int, Exception] = {}
+    ) -> Errors:
+        errors: Errors = {}
         if engine_steps(every, self._base.substeps) == 1 and len(ids):
             ids = self._roll_out(ids, nstep, arrays, ctrl)
         for k in range(nstep // every if len(ids) else 0):

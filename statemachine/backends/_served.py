@@ -17,6 +17,7 @@ from ..errors import EngineError
 from ..installed import DEFAULT, engine_version
 from ..interface import DERIVED, Array, Contacts
 from ..interface.options import HUGE
+from ..interface.records import Arrays
 from ..processes import PipedChild
 from ..releases import is_release, version_of
 from . import _child_server
@@ -80,7 +81,7 @@ class Server:
 
     def ask(
         self, verb: str, arrays: Mapping[str, Array] = MappingProxyType({}), **job: Any
-    ) -> tuple[dict[str, Any], dict[str, Array]]:
+    ) -> tuple[dict[str, Any], Arrays]:
         """Let it do something; its answer, and arrays by name.
 
         Raises:
@@ -112,7 +113,7 @@ class Server:
         file: str,
         edits: Mapping[str, Array] = MappingProxyType({}),
         **job: Any,
-    ) -> tuple[dict[str, Any], dict[str, Array]]:
+    ) -> tuple[dict[str, Any], Arrays]:
         """Let it load a model; its number and what is said of it, and numeric fields by name.
 
         Args:
@@ -167,7 +168,7 @@ class ServedWorld(HiddenWorld):
         # Steps of a call that have one command take one exchange.
         self._ahead = not compiled.actuator_delay.any()
         self._ctrl = np.zeros(compiled.nu)
-        self._derived: dict[str, Array] | None = None
+        self._derived: Arrays | None = None
         self._begin()
         lengths = [compiled.nq, compiled.nv, *(length for _, length in self.memory_layout)]
         self._places = np.split(np.arange(sum(lengths)), np.cumsum(lengths)[:-1])

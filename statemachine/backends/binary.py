@@ -17,18 +17,19 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import EngineWarning, ModelError
+from ..models import AnyPath
 
 SUFFIX = ".mjb"
 TRUST = "STATEMACHINE_TRUST_BINARY"  # set for a command and its children by --trust-binary
 _trusted: set[str] = set()  # SHA-256, in hexadecimal digits
 
 
-def is_binary(path: str | os.PathLike[str]) -> bool:
+def is_binary(path: AnyPath) -> bool:
     """Whether a file's name says that it is a binary model."""
     return os.fspath(path).lower().endswith(SUFFIX)
 
 
-def write_binary(path: str | os.PathLike[str], content: bytes) -> None:
+def write_binary(path: AnyPath, content: bytes) -> None:
     """Write a binary model that `read_binary` will take back, in other processes too."""
     digest = hashlib.sha256(content).hexdigest()
     _trusted.add(digest)
@@ -41,7 +42,7 @@ def write_binary(path: str | os.PathLike[str], content: bytes) -> None:
     Path(path).write_bytes(content)
 
 
-def read_binary(path: str | os.PathLike[str], trust: bool = False) -> bytes:
+def read_binary(path: AnyPath, trust: bool = False) -> bytes:
     """The bytes of a binary model that may be handed to MuJoCo.
 
     Args:

@@ -7,8 +7,7 @@ an `mjModel`, and give its Model the facts that every other backend gives:
         raw = compile_file(path)
     model = MyModel(raw=..., backend="mine", ..., **facts(raw))
 
-`replace` edits a copy (`edited`), gives the engine's timestep (`step_length`), and then room for
-what a latency needs (`with_room`).
+For `Model.replace`, `_edits` has a copy with other options (`edited`).
 """
 
 from __future__ import annotations
@@ -29,24 +28,10 @@ from ..errors import EngineWarning, ModelError, shown
 from ..interface import Array, Ints, JointType, Keyframe
 from ..interface.options import HUGE, TINY
 from ..measures import ctrl_owners
-from ..models import mesh_file
-from ._delays import delay_steps, from_binary, with_room
-from ._edits import edited, servos, step_length
+from ..models import AnyPath, mesh_file
+from ._delays import delay_steps, from_binary
+from ._edits import servos
 from .binary import is_binary, read_binary
-
-__all__ = [
-    "check_numbers",
-    "compile_file",
-    "compiler_warnings",
-    "contacts_at_start",
-    "edited",
-    "facts",
-    "fastest",
-    "gravity",
-    "read_spec",
-    "step_length",
-    "with_room",
-]
 
 # For `fastest`: in a step [rad, or the model's extent]; at least [rad/s or m/s]; about a day [s].
 _FAR, _FAST, _DAY = 1000.0, 1e5, 1e5
@@ -82,7 +67,7 @@ def compiler_warnings() -> Iterator[list[str]]:
         texts[:] = [text for text in texts if " Time = " not in text]
 
 
-def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
+def compile_file(path: AnyPath) -> mujoco.MjModel:
     """Compile an MJCF, URDF or MJB file; the suffix ".mjb" says that it is binary.
 
     Args:
@@ -277,6 +262,18 @@ def gravity(m: mujoco.MjModel) -> Array:
     return np.array(m.opt.gravity) * (not m.opt.disableflags & off)
 
 
+# What a Model has as the mjModel has it; as int64; and kinds of elements that have names.
+_PLAIN = (
+    *("nq", "nv", "nu", "nbody", "njnt", "nsite", "ngeom", "nmocap", "jnt_range", "dof_armature"),
+    *("dof_damping", "dof_frictionloss", "body_mass", "geom_friction", "site_pos", "site_quat"),
+)
+_WHOLE = (
+    *("jnt_type", "jnt_qposadr", "jnt_dofadr", "jnt_bodyid"),
+    *("body_parentid", "geom_bodyid", "site_bodyid"),
+)
+_NAMED = {"body": "nbody", "joint": "njnt", "site": "nsite", "geom": "ngeom"}
+
+
 def facts(m: mujoco.MjModel) -> dict[str, Any]:
     """What `Model.__init__` wants of a compiled model; see there for shapes and units.
 
@@ -291,24 +288,14 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
     direct = (m.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_NONE))[owner]
     return {
         "gravity": gravity(m),
-        "nq": m.nq,
-        "nv": m.nv,
-        "nu": m.nu,
-        "nbody": m.nbody,
-        "njnt": m.njnt,
-        "nsite": m.nsite,
-        "ngeom": m.ngeom,
-        "nmocap": m.nmocap,
-        "body_names": tuple(m.body(i).name for i in range(m.nbody)),
-        "joint_names": tuple(m.joint(i).name for i in range(m.njnt)),
-        "site_names": tuple(m.site(i).name for i in range(m.nsite)),
-        "geom_names": tuple(m.geom(i).name for i in range(m.ngeom)),
+        **{name: getattr(m, name) for name in _PLAIN},
+        **{name: getattr(m, name).astype(np.int64) for name in _WHOLE},
+        **{
+            f"{kind}_names": tuple(getattr(m, kind)(k).name for k in range(getattr(m, count)))
+            for kind, count in _NAMED.items()
+        },
         "actuator_names": tuple(_control_names(m)),
-        "jnt_type": m.jnt_type.astype(np.int64),
-        "jnt_qposadr": m.jnt_qposadr.astype(np.int64),
-        "jnt_dofadr": m.jnt_dofadr.astype(np.int64),
         "jnt_limited": m.jnt_limited.astype(bool),
-        "jnt_range": m.jnt_range,
         "actuator_jntid": np.where(on_joint, m.actuator_trnid[owner, 0], -1).astype(np.int64),
         "actuator_ctrlrange": _ranges(m.actuator_ctrlrange, m.actuator_ctrllimited),
         "_clamps": not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL),
@@ -320,17 +307,6 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
         "actuator_gain": np.where(fixed & unbiased & direct, gain, np.nan),
         "actuator_delay": delay_steps(m) * m.opt.timestep,
         "actuator_gear": m.actuator_gear[m.actuator_outadr[owner], 0],
-        "dof_armature": m.dof_armature,
-        "dof_damping": m.dof_damping,
-        "dof_frictionloss": m.dof_frictionloss,
-        "body_mass": m.body_mass,
-        "geom_friction": m.geom_friction,
-        "body_parentid": m.body_parentid.astype(np.int64),
-        "jnt_bodyid": m.jnt_bodyid.astype(np.int64),
-        "geom_bodyid": m.geom_bodyid.astype(np.int64),
-        "site_bodyid": m.site_bodyid.astype(np.int64),
-        "site_pos": m.site_pos,
-        "site_quat": m.site_quat,
         "mocap_pos0": m.body_pos[m.body_mocapid >= 0],
         "mocap_quat0": m.body_quat[m.body_mocapid >= 0],
         "keyframes": tuple(

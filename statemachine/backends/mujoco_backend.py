@@ -6,11 +6,11 @@ its own buffers, seen read-only.
 
 from __future__ import annotations
 
-import os
+import copy
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -23,7 +23,6 @@ from ..interface import (
     MOCAP,
     OPTIONS,
     POSES,
-    Array,
     Behaviour,
     Capabilities,
     Contacts,
@@ -32,8 +31,10 @@ from ..interface import (
     State,
 )
 from ..interface.options import HUGE, TINY, check_vector, engine_steps, unsupported
+from ..interface.records import Defaults, StateLayout
+from ..models import AnyPath
 from ._delays import hold, saved
-from ._edits import CONSTANTS_FOLLOW, varied
+from ._edits import CONSTANTS_FOLLOW, edited, step_length, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
 from ._release_child import constraint_part, contact_arrays
 from .binary import write_binary
@@ -41,10 +42,7 @@ from .compiled import (
     check_numbers,
     compile_file,
     compiler_warnings,
-    edited,
     facts,
-    step_length,
-    with_room,
 )
 
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -109,9 +107,7 @@ _COMPONENTS = {
 }
 
 
-def load(
-    path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model"
-) -> MujocoModel:
+def load(path: AnyPath, defaults: Defaults = "model") -> MujocoModel:
     """Compile an MJCF, URDF or MJB file.
 
     Args:
@@ -152,7 +148,7 @@ class MujocoModel(Model):
     def compiled(self) -> mujoco.MjModel:
         return self.raw
 
-    def save_binary(self, path: str | os.PathLike[str]) -> None:
+    def save_binary(self, path: AnyPath) -> None:
         """Write the compiled model as a binary model (.mjb), which this user's `load` takes back.
 
         Args:
@@ -203,7 +199,7 @@ class MujocoModel(Model):
         if "timestep" in given:
             lengths = [step_length(length, count, {}) for length in options["timestep"]]
             given["timestep"] = np.array(lengths)
-        raw = edited(self.raw, {})
+        raw = copy.copy(self.raw)
         # As `_replace` has it, so that a timestep is the same to the last bit.
         raw.opt.timestep = step_length(self.timestep, count, {})
         raw, arrays = varied(raw, given)
@@ -218,21 +214,20 @@ class MujocoModel(Model):
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
         self._check_friction(options)
+        substeps = options.get("substeps", self.substeps)
         try:
-            raw = edited(self.raw, options)
+            raw = edited(self.raw, options, step_length(self.timestep, substeps, options))
         except (MemoryError, mujoco.FatalError) as error:
             raise gave_up(error) from error
         if "integrator" in options:
             raw.opt.integrator = int(INTEGRATORS[options["integrator"]])
-        substeps = options.get("substeps", self.substeps)
-        raw.opt.timestep = step_length(self.timestep, substeps, options)
-        return MujocoModel(with_room(raw), self.path, substeps)
+        return MujocoModel(raw, self.path, substeps)
 
 
 class MujocoData(Data):
     """An MjData. Inputs and derived arrays are views of its memory."""
 
-    __slots__ = ("_alarms", "_layout", "_views")
+    __slots__ = ("_alarms", "_views")
 
     _raw: mujoco.MjData | None
     _alarms: Any  # Alarms; None once closed
@@ -265,10 +260,9 @@ class MujocoData(Data):
     def time(self) -> float:
         return self.raw.time
 
-    def _find_contacts(self) -> Contacts:
-        return Contacts(**contact_arrays(self._home.raw, self.raw))
-
-    def _derive(self, name: str) -> Array:
+    def _derive(self, name: str) -> Any:
+        if name == "contacts":
+            return Contacts(**contact_arrays(self._home.raw, self.raw))
         array = self._views.get(name)
         if array is None:
             array = constraint_part(self._home.raw, self.raw, name)
@@ -305,9 +299,6 @@ class MujocoData(Data):
             self._home.raw, self.raw, state.vector, int(mujoco.mjtState.mjSTATE_INTEGRATION)
         )
         self._alarms.clear()
-
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        return self._layout
 
     def _set_time(self, time: float) -> None:
         self.raw.time = time
@@ -365,7 +356,7 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     return checked_one if len(starts) == 1 else checked
 
 
-def _layout(model: MujocoModel, nhistory: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+def _layout(model: MujocoModel, nhistory: int) -> StateLayout:
     """Fingerprint and layout of States of a model.
 
     Args:

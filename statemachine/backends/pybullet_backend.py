@@ -7,7 +7,6 @@ when fresh, values that a write leaves alone. The capability record says where.
 
 from __future__ import annotations
 
-import os
 import pickle
 import warnings
 from collections.abc import Callable, Mapping
@@ -28,7 +27,9 @@ from ..interface import (
     Capabilities,
 )
 from ..interface.options import HUGE, checked_options
+from ..interface.records import Defaults
 from ..measures.text import few
+from ..models import AnyPath
 from ..releases import version_of
 from . import _bullet_urdf as urdf
 from ._bullet_client import MOST_CLIENTS
@@ -36,6 +37,7 @@ from ._bullet_driven import Act, DrivenWorld
 from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored, softness
 from ._bullet_world import ENGINE_TIMESTEP, World
+from ._edits import edited, step_length
 from ._hidden_data import HiddenModel
 from ._hidden_world import HiddenWorld
 from ._served import ServedEngine, ServedWorld, sent
@@ -43,11 +45,8 @@ from .compiled import (
     check_numbers,
     compile_file,
     compiler_warnings,
-    edited,
     facts,
     fastest,
-    step_length,
-    with_room,
 )
 
 _EMULATED = {
@@ -136,8 +135,8 @@ def _bound(max_qvel: Array | None) -> str:
 
 
 def load(
-    path: str | os.PathLike[str],
-    defaults: Literal["model", "engine"] = "model",
+    path: AnyPath,
+    defaults: Defaults = "model",
     options: Mapping[str, Any] = MappingProxyType({}),
     *,
     there: ServedEngine | None = None,
@@ -171,9 +170,7 @@ def load(
     checked = checked_options(about, options)
     substeps = checked.get("substeps", 1)
     if checked:
-        raw = edited(raw, checked)
-        raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
-        raw = with_room(raw)
+        raw = edited(raw, checked, step_length(float(raw.opt.timestep), substeps, checked))
     plan = Plan(raw)
     check(plan, "pybullet", defaults == "engine")
     model = PybulletModel(
@@ -205,7 +202,7 @@ class PybulletModel(HiddenModel):
     """
 
     plan: Plan
-    defaults: Literal["model", "engine"]
+    defaults: Defaults
     acts: tuple[Act, ...]
     _kind: Literal["stepped", "engine"]
     _asked: Array | None  # max_qvel, where it was set
@@ -216,7 +213,7 @@ class PybulletModel(HiddenModel):
         plan: Plan,
         path: Path,
         substeps: int,
-        defaults: Literal["model", "engine"],
+        defaults: Defaults,
         max_qvel: Array | None = None,
         acts: tuple[Act, ...] = (),
         there: ServedEngine | None = None,
@@ -267,10 +264,9 @@ class PybulletModel(HiddenModel):
         return {name: world for name, world in worlds.items() if world is not None}
 
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
-        raw = edited(self.plan.raw, options)
         substeps = options.get("substeps", self.substeps)
-        raw.opt.timestep = step_length(self.timestep, substeps, options)
-        model = self._of(with_room(raw), substeps, options.get("max_qvel", self._asked))
+        raw = edited(self.plan.raw, options, step_length(self.timestep, substeps, options))
+        model = self._of(raw, substeps, options.get("max_qvel", self._asked))
         if "friction" in options:
             _tell(model.plan, [], stacklevel=4)
         return model

@@ -13,15 +13,17 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from ..errors import EngineError, ModelError, refuse
 from ..installed import DEFAULT, require
-from ..interface import Array, Capabilities
+from ..interface import Capabilities
 from ..interface.options import unsupported
+from ..interface.records import Arrays, Defaults
+from ..models import AnyPath
 from ..releases import engine_of, is_release, python_of, version_of
 from . import _release_child as child
 from ._edits import put
@@ -48,9 +50,7 @@ _NO_EDITS = MappingProxyType[str, Any]({})
 _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mjtEnableBit}
 
 
-def load(
-    path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model", *, release: str
-) -> HiddenModel:
+def load(path: AnyPath, defaults: Defaults = "model", *, release: str) -> HiddenModel:
     """Compile a file in both releases; a release of PyBullet's gets what the installed one gets.
 
     Args:
@@ -84,9 +84,7 @@ def served(
         capabilities: What the backend says of itself; None for what is said of MuJoCo.
     """
 
-    def load_there(
-        path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model"
-    ) -> ServedModel:
+    def load_there(path: AnyPath, defaults: Defaults = "model") -> ServedModel:
         refuse(
             (
                 is_binary(os.fspath(path)),
@@ -168,7 +166,7 @@ def _compiled(engine: ServedEngine, installed: MujocoModel) -> FileReading:
 
 def _loaded(
     server: Server, model: MujocoModel, edits: Mapping[str, Any] = _NO_EDITS, **digest: str
-) -> tuple[dict[str, Any], dict[str, Array]]:
+) -> tuple[dict[str, Any], Arrays]:
     """Let an engine read the file of a model: as `Server.load`.
 
     Args:

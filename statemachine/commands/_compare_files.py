@@ -72,14 +72,13 @@ def checked(options: argparse.Namespace) -> Any:
         from ..report.figures import check_suffix
 
         check_suffix(options.plot)
-    if options.film is not None:
+    if given.get("film") is not None:
         from ..report import film as films
 
         films.check_film(options.film, options.size, options.fps, options.slow)
-    for file in (given.get("junit"), options.plot, options.film):
-        if file is not None:
-            check_place(file)
-    return None if options.film is None else _renderer(options.renderer)
+    for file in filter(None, (given.get("junit"), options.plot, given.get("film"))):
+        check_place(file)
+    return _renderer(options.renderer) if given.get("film") else None
 
 
 def _renderer(name: str | None) -> Any:

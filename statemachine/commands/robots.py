@@ -46,12 +46,11 @@ def run(options: argparse.Namespace) -> int:
     from ..report import robots as words
     from ..report.terminal import progress
     from ..robots import examine_all, find
-    from ..robots.records import check_suffix
+    from ..robots.records import SUFFIXES
     from ..runs.whole import check_place
 
     if options.out is not None:
-        check_suffix(options.out)
-        check_place(options.out)
+        check_place(options.out, SUFFIXES, "a table")
     models = find(options.paths)
     with resumable(options.out, "examined"), progress(f"{len(models)} models") as bar:
         survey = examine_all(

@@ -26,6 +26,7 @@ from ._common import (
     shorten_help,
     show,
 )
+from ._compare_files import checked
 from .compare import experiments
 
 
@@ -212,16 +213,7 @@ def _check(options: argparse.Namespace) -> None:
             f"--floor-cells must not be negative; got {options.floor_cells}",
         ),
     )
-    if options.html is not None:
-        from ..report.html import check_target
-
-        check_target(options.html)
-    if options.plot is not None:
-        from ..report.figures import check_suffix
-        from ..runs.whole import check_place
-
-        check_suffix(options.plot)
-        check_place(options.plot)
+    checked(options)
 
 
 def _report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:

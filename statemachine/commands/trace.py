@@ -217,10 +217,7 @@ def _target(given: str | None, usual: str, suffixes: tuple[str, ...] = ()) -> Pa
     from ..runs.whole import check_place
 
     target = Path(given or usual)
-    known = suffixes or SUFFIXES
-    if target.suffix.lower() not in known:
-        raise BadInputError(f"the output ends in {' or '.join(known)}; got {target.name!r}")
-    check_place(target)
+    check_place(target, suffixes or SUFFIXES)
     return target
 
 

@@ -27,6 +27,7 @@ from ..interface import (
     step,
 )
 from ..interface.options import unsupported
+from ..interface.records import Arrays
 from ..measures.quantities import readings
 from ..page import Figures
 from ..probes.audit.interface_driver import InterfaceDriver
@@ -208,9 +209,9 @@ def require_raises(
     return caught
 
 
-def snapshot(data: Data) -> dict[str, Array]:
+def snapshot(data: Data) -> Arrays:
     """Copies of everything derived that this backend yields, contacts included."""
-    values: dict[str, Array] = {}
+    values: Arrays = {}
     for name, held in readings(data).items():
         if isinstance(held, Contacts):
             values |= {f"contacts.{part}": np.array(array) for part, array in vars(held).items()}
@@ -219,7 +220,7 @@ def snapshot(data: Data) -> dict[str, Array]:
     return values
 
 
-def same(before: dict[str, Array], after: dict[str, Array], what: str) -> None:
+def same(before: Arrays, after: Arrays, what: str) -> None:
     """Two snapshots hold the same bits."""
     require(before.keys() == after.keys(), f"{what}: {sorted(before)} against {sorted(after)}")
     for name, array in before.items():

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
         Dials,
         Edit,
         ModelDifference,
-        Term,
-        WayBack,
     )
 
 _ROOMS: dict[str, str] = {
@@ -111,8 +109,12 @@ class RawEngine:
 
     # The engine as it comes. Nothing here goes through an adapter that emulates the contract.
 
-    def terms(self, model: Model) -> tuple[Term, ...]:
-        """What the engine calls the things of the interface."""
+    def terms(self, model: Model) -> tuple[Figures, ...]:
+        """What the interface calls things, and what the engine does.
+
+        Returns:
+            thing: What is meant; ours: what the interface has for it; engine: what the engine has.
+        """
         return ()
 
     def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[Figures, ...]:
@@ -135,8 +137,14 @@ class RawEngine:
         """
         return ()
 
-    def ways_back(self, model: Model) -> tuple[WayBack, ...]:
-        """Which of the engine's own ways to go back is exact."""
+    def ways_back(self, model: Model) -> tuple[Figures, ...]:
+        """Which of the engine's own ways to go back to an earlier state is exact.
+
+        Returns:
+            name: What is done.
+            difference: Of the second future from the first: the largest of a coordinate; zero
+                means the same bits.
+        """
         return ()
 
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import DivergedError
 from ..interface import Array, Model
+from ..interface.records import Arrays
 from ..measures import JointPlaces
 from ..page import Figures
 from .measured import FutureGap, gap, worst
@@ -120,23 +121,6 @@ class Disturbance:
     act: Callable[[Machine], object]
     promised: bool = True
     instead: bool = False
-
-
-@dataclass(frozen=True)
-class HiddenState:
-    """Ways to save, and changes that show what they forget.
-
-    Attributes:
-        ways: Ways to save, by name.
-        changes: Changes of what is not a position or velocity, by what they change.
-        let_pass: Makes everything pass through everything.
-        best: All that can be read and written.
-    """
-
-    ways: Mapping[str, Save]
-    changes: Mapping[str, Callable[[Machine], None]]
-    let_pass: Callable[[Machine], None]
-    best: SaveMethod
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,8 +238,15 @@ class Driver(ABC):
         """The candidate of some of the components that are left out one at a time."""
         return None
 
-    def hidden_state(self, point: SavePoint) -> HiddenState | None:
-        """What decides the future and is in no position or velocity, to be tried directly."""
+    def hidden_state(self, point: SavePoint) -> Figures | None:
+        """What decides the future and is in no position or velocity, to be tried directly.
+
+        Returns:
+            ways: Ways to save (`Save`), by name.
+            changes: Changes of a machine that show what they forget, by what they change.
+            let_pass: Makes everything in a machine pass through everything.
+            best: The SaveMethod of all that can be read and written.
+        """
         return None
 
     def pools(self) -> Mapping[str, Callable[[SavePoint, int], list[Array]]]:
@@ -318,7 +309,7 @@ class Driver(ABC):
             trace.append(self.read(machine))
         return np.array(trace)
 
-    def futures(self, point: SavePoint, steps: int, way: SaveMethod) -> dict[str, Array]:
+    def futures(self, point: SavePoint, steps: int, way: SaveMethod) -> Arrays:
         """What follows from a restore, by what was restored: as `drive` gives it."""
         futures = {}
         with self.at(point) as machine, way.save(machine) as restore:

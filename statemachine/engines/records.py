@@ -10,29 +10,6 @@ from typing import Any, Literal
 from ..interface import Array, Model
 from ..rotations import Placement
 
-
-@dataclass(frozen=True)
-class Term:
-    """What the interface calls a thing, and what an engine calls it."""
-
-    thing: str
-    ours: str
-    engine: str
-
-
-@dataclass(frozen=True)
-class WayBack:
-    """A way to go back to an earlier state, and how far the second future is from the first.
-
-    Attributes:
-        name: What is done.
-        difference: Largest difference of a coordinate; zero means the same bits.
-    """
-
-    name: str
-    difference: float
-
-
 Setting = Literal["model", "off"]  # of a dial; one that is not named is as it comes
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import refuse
 from ..interface import DERIVED, INPUTS
-from .watch import EngineRun, Inputs, StudentWatch
+from .watch import EngineRun, Inputs, StudentWatch, inputs_of
 
 _MOST = 10_000  # values that a list or a generator may have
 _DEEPEST = 8  # lists within lists, in a record
@@ -79,7 +79,7 @@ def answer_of(result: Any, watch: StudentWatch, changed: dict[str, Any]) -> Answ
         tuple(_live(item, watch.datas) for item in items),
         tuple(watch.runs),
         tuple(watch.forwards),
-        tuple(watch.inputs(data) for data in watch.datas),
+        tuple(inputs_of(k, data) for k, data in enumerate(watch.datas)),
         changed,
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import BadInputError, StateMachineError
+from ..models import AnyPath
 from ..processes import checked_jobs
 from ..processes.parallel import in_parallel
 from ..runs.whole import replace_csv
@@ -58,7 +58,7 @@ class Submission:
         return next((file for file in self.own.values() if file.name == name), None)
 
 
-def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
+def submissions(paths: Sequence[AnyPath]) -> list[Submission]:
     """The submissions among files and folders.
 
     In a folder each Python file is one, and each folder with one Python file that has at least
@@ -89,7 +89,7 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
     return list(by_place.values())
 
 
-def not_looked_at(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
+def not_looked_at(paths: Sequence[AnyPath]) -> list[str]:
     """Names of the files in class folders that nobody hands in."""
     folders = [path for path in map(Path, paths) if path.is_dir() and not is_one_students(path)]
     return [

@@ -8,7 +8,6 @@ the answers and the runs that are asked for. They must be right, so he has to wo
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import sys
@@ -25,6 +24,7 @@ from .. import __version__, errors
 from ..backends import backend_engine
 from ..errors import BadInputError, EngineError, refuse
 from ..installed import DEFAULT, engine_version
+from ..models import AnyPath
 from ..page import Figures
 from ..processes.parallel import in_parallel, unwinding
 from ..releases import is_release
@@ -32,7 +32,6 @@ from .judges import JUDGES, Judgement, judge_of, judged
 from .recording import (
     LARGEST,
     FunctionRecording,
-    Limits,
     digest,
     has_solutions,
     in_folder,
@@ -91,7 +90,7 @@ def grade_of(
 
 
 def run(
-    file: str | os.PathLike[str],
+    file: AnyPath,
     backend: str = DEFAULT,
     time_limit: float = TIME_LIMIT,
     progress: Callable[[float], None] = lambda _: None,
@@ -148,7 +147,7 @@ class ExerciseJudge(ExitStack):
         self.versions = {"statemachine": __version__, "python": sys.version.split()[0]}
         if engine:
             self.versions[engine] = engine_version(engine)
-        self.limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
+        self.limits = Figures(cpu=time_limit, wall=max(wall_limit, _TIMES * time_limit))
         self.stop = threading.Event()
         self._lock = threading.Lock()
         self._key: dict[str, tuple[list[ExerciseWorld], list[Any]]] = {}
@@ -164,7 +163,7 @@ class ExerciseJudge(ExitStack):
 
     def judge(
         self,
-        file: str | os.PathLike[str],
+        file: AnyPath,
         progress: Callable[[float], None] = lambda _: None,
         own: Mapping[str, Path] | None = None,
     ) -> Figures:
@@ -184,15 +183,14 @@ class ExerciseJudge(ExitStack):
         copy = _copied(path, own or named_by(path), folder / "own")
         judgements = self._all(copy, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)
-        limits = self.limits
         return grade_of(
             path.name,
             digest({path.name: path}),
             self.backend,
             self.versions,
             judgements,
-            limits.cpu,
-            limits.wall,
+            self.limits.cpu,
+            self.limits.wall,
         )
 
     def _all(

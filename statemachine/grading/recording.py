@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..page import Figures
 from ..processes import ALONE, sandbox
 from .answers import Answer, decode
 from .calls import FaultError
@@ -36,14 +37,6 @@ _KEPT = (
     "PATH", "SYSTEMROOT", "LANG", "LC_ALL",
     "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHOME", "CONDA_PREFIX",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a function may compute, and what it may take on the clock [s]."""
-
-    cpu: float
-    wall: float
 
 
 @dataclass
@@ -76,7 +69,7 @@ def record(
     own: Path,
     name: str,
     backend: str,
-    limits: Limits,
+    limits: Figures,
     folder: Path,
     stop: threading.Event,
 ) -> FunctionRecording:
@@ -87,7 +80,8 @@ def record(
         own: The folder of all files that belong to it.
         name: Of the function.
         backend: Of the backend.
-        limits: From when the worlds are ready.
+        limits: What it may compute (cpu), and take on the clock (wall), from when the worlds are
+            ready [s].
         folder: A new one for what it writes.
         stop: Ends it.
     """

@@ -20,6 +20,7 @@ from ..engines import room
 from ..errors import ClosedDataError
 from ..installed import require
 from ..interface import INPUTS, Array, Data, Model
+from ..page import Figures
 
 _MOST = 1000  # runs, forwards and Data that are noted
 
@@ -37,14 +38,6 @@ class Inputs:
     qvel: Array
     ctrl: Array
     time: float
-
-    def continues(self, other: Inputs) -> bool:
-        """Whether nobody touched the state since the other moment."""
-        return (
-            self.time == other.time
-            and bool((self.qpos == other.qpos).all())
-            and bool((self.qvel == other.qvel).all())
-        )
 
 
 @dataclass
@@ -66,19 +59,13 @@ class EngineRun:
     ctrl_changed: int | None = None
 
 
-@dataclass(frozen=True)
-class Nudge:
-    """The next double towards something, in one entry of qpos, at the end of a run.
-
-    Attributes:
-        place: The entry.
-        towards: Where to.
-        after: How many steps a run must have.
-    """
-
-    place: int
-    towards: float
-    after: int
+def inputs_of(number: int, data: Any) -> Inputs:
+    """What they are now of a Data, or of the engine's own, of this number."""
+    qpos, qvel, ctrl = (np.array(getattr(data, name)) for name in INPUTS)
+    time = math.nan
+    with suppress(ClosedDataError):  # of which the inputs alone are told
+        time = float(data.time)
+    return Inputs(number, qpos, qvel, ctrl, time)
 
 
 class StudentWatch:
@@ -90,10 +77,15 @@ class StudentWatch:
         datas: Every Data that was used, or the engine's own, in order.
     """
 
-    def __init__(self, model: Model, nudge: Nudge | None) -> None:
+    def __init__(self, model: Model, nudge: Figures | None) -> None:
         """Watch what is done with `model`; every run but the first is pushed by `nudge`.
 
         So that an engine that repeats itself to the bit does not.
+
+        Args:
+            model: What the function got.
+            nudge: Its `place`, an entry of qpos, becomes the next double `towards` something
+                `after` so many steps, or more.
         """
         self.runs: list[EngineRun] = []
         self.forwards: list[Inputs] = []
@@ -117,24 +109,20 @@ class StudentWatch:
         self.datas.append(data)
         return len(self.datas) - 1
 
-    def inputs(self, data: Any) -> Inputs:
-        """What they are now."""
-        qpos, qvel, ctrl = (np.array(getattr(data, name)) for name in INPUTS)
-        time = math.nan
-        with suppress(ClosedDataError):  # of which the inputs alone are told
-            time = float(data.time)
-        return Inputs(self.meet(data), qpos, qvel, ctrl, time)
-
     def recomputed(self, data: Any) -> None:
         """Note that what is derived was."""
         if len(self.forwards) < _MOST:
-            self.forwards.append(self.inputs(data))
+            self.forwards.append(inputs_of(self.meet(data), data))
 
     def step(self, model: Any, data: Any, advance: Callable[[], Any], nstep: int) -> Any:
         """Let `advance` move `data`, and note where from and where to."""
-        now = self.inputs(data)
+        now = inputs_of(self.meet(data), data)
         run = self._current.get(now.data)
-        if run is None or not now.continues(run.end):
+        if run is None or not (
+            now.time == run.end.time
+            and (now.qpos == run.end.qpos).all()
+            and (now.qvel == run.end.qvel).all()
+        ):  # somebody touched the state
             run = EngineRun(self._origin_of(model) == self._origin, now, now)
             if len(self.runs) < _MOST:
                 self.runs.append(run)
@@ -146,7 +134,7 @@ class StudentWatch:
         if self._nudge and run is not self.runs[0] and run.nstep >= self._nudge.after:
             place = self._nudge.place
             data.qpos[place] = np.nextafter(data.qpos[place], self._nudge.towards)
-        run.end = self.inputs(data)
+        run.end = inputs_of(now.data, data)
         return result
 
     def _origin_of(self, model: Any) -> object:
@@ -160,7 +148,7 @@ _watch: StudentWatch | None = None
 
 
 @contextmanager
-def watching(model: Model, nudge: Nudge | None = None) -> Iterator[StudentWatch]:
+def watching(model: Model, nudge: Figures | None = None) -> Iterator[StudentWatch]:
     """What happens meanwhile, where `engine_watched` holds."""
     global _watch  # noqa: PLW0603  (the engine's functions are the process's too)
     _watch = StudentWatch(model, nudge)

@@ -16,8 +16,8 @@ from ..backends import load
 from ..errors import UnsupportedError
 from ..interface import Model
 from ..models import resolve
+from ..page import Figures
 from ..witness.mjcf_text import parse, with_includes
-from .watch import Nudge
 
 ELSEWHERE = "on a scene with a crate before the arm"
 _CRATE = """
@@ -67,7 +67,7 @@ class ExerciseWorld:
     where: str
     model: Model
     arguments: tuple[Any, ...] = ()
-    nudge: Nudge | None = None
+    nudge: Figures | None = None
 
 
 class Scenes:

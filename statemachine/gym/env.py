@@ -146,11 +146,11 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
     ) -> tuple[Array, dict[str, Any]]:
         """Start an episode; the seed decides it, on every backend in the same way."""
         super().reset(seed=seed)
-        start = self.task.start(self.np_random)
-        self._target = start.target[None]
+        qpos, target = self.task.start(self.np_random)
+        self._target = target[None]
         reset(self.model, self.data, keyframe=self.task.keyframe)
-        if start.qpos is not None:
-            self.data.qpos[:] = start.qpos
+        if qpos is not None:
+            self.data.qpos[:] = qpos
         forward(self.model, self.data)
         self._seen = self.task.observed(*self._rows())
         return self._seen[0].copy(), self._judged()[1]

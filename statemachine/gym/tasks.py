@@ -7,8 +7,7 @@ and many worlds get the same bits.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +16,7 @@ from ..backends import load
 from ..errors import check_name
 from ..interface import Array, Model, forward, make_data
 from ..interface.options import as_count, as_vector
+from ..page import Figures
 
 TIP = "gripperframe"  # the site between the tips of the jaws
 _BEYOND_RANGE = 0.5  # rad; joint limits are soft, and random commands go beyond by 0.06
@@ -25,21 +25,8 @@ _UNIT = 1 + 1e-9  # of a quaternion's number, which rounding may leave above 1
 _FAR = 10.0  # m; how far away a point may be in an observation
 
 
-class EpisodeStart(NamedTuple):
-    """Where an episode starts, beyond the task's keyframe: `qpos` (nq,) or None, `target` (3,)."""
-
-    qpos: Array | None
-    target: Array
-
-
-@dataclass(frozen=True, eq=False)
-class StateWorth:
-    """What a state is worth, each (n,): [m], [1], and whether it is so."""
-
-    distance: Array
-    reward: Array
-    success: NDArray[np.bool_]
-    terminated: NDArray[np.bool_]
+# Where an episode starts, beyond the task's keyframe: qpos (nq,) or None; its target (3,).
+EpisodeStart = tuple[Array | None, Array]
 
 
 class Task(ABC):
@@ -110,8 +97,14 @@ class Task(ABC):
         """Draw an episode; the same numbers on every backend."""
 
     @abstractmethod
-    def outcome(self, observations: Array) -> StateWorth:
-        """What observations (n, k) are worth."""
+    def outcome(self, observations: Array) -> Figures:
+        """What observations (n, k) are worth.
+
+        Returns:
+            distance: (n,) from the target [m].
+            reward: (n,).
+            success, terminated: (n,) whether it is so.
+        """
 
     def _bounds(self) -> tuple[Array, Array]:
         model = self.model
@@ -153,13 +146,15 @@ class Reach(Task):
             pose[-1] = 0.0
             tip, _, touching = self._poses(pose)
             if not touching and tip[2] > 0.03:
-                return EpisodeStart(qpos, tip)
+                return qpos, tip
 
-    def outcome(self, observations: Array) -> StateWorth:
+    def outcome(self, observations: Array) -> Figures:
         """It never ends before its time, as the fingertip is to stay there."""
         distance = _length(observations[:, -3:])
         never = np.zeros(len(distance), dtype=np.bool_)
-        return StateWorth(distance, -distance, distance < self.near, never)
+        return Figures(
+            distance=distance, reward=-distance, success=distance < self.near, terminated=never
+        )
 
 
 class HeldBox(Task):
@@ -206,15 +201,17 @@ class HeldBox(Task):
             target = tip + turn @ self._in_hand
             far = np.linalg.norm(target - self._from)
             if not touching and target[2] > self._from[2] and far > 2 * self.near:
-                return EpisodeStart(None, target)
+                return None, target
 
-    def outcome(self, observations: Array) -> StateWorth:
+    def outcome(self, observations: Array) -> Figures:
         """It ends when the box is no longer between the jaws."""
         tip, way = observations[:, -9:-6], observations[:, -3:]
         away = observations[:, self.box : self.box + 3] - tip
         distance, dropped = _length(way), _length(away) > self.lost
         success = (distance < self.near) & ~dropped
-        return StateWorth(distance, ~dropped - distance, success, dropped)
+        return Figures(
+            distance=distance, reward=~dropped - distance, success=success, terminated=dropped
+        )
 
 
 TASKS: dict[str, type[Task]] = {task.name: task for task in (Reach, HeldBox)}

@@ -197,10 +197,9 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         worlds, task = self.worlds, self.task
         reset(worlds, ids=which, keyframe=task.keyframe)
         for world in np.flatnonzero(which).tolist():
-            start = task.start(self._np_random[world])
-            self._targets[world] = start.target
-            if start.qpos is not None:
-                worlds.qpos[world] = start.qpos
+            qpos, self._targets[world] = task.start(self._np_random[world])
+            if qpos is not None:
+                worlds.qpos[world] = qpos
         forward(worlds, ids=which)
         np.copyto(self._seen, self._observed(), where=which[:, None])
         self._steps[which] = 0

@@ -9,20 +9,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 from numpy.typing import ArrayLike
 
 from ..errors import ClosedDataError, DivergedError, ReadOnlyError
 from .model import Model
 from .options import as_scalar, as_vector, check_writable
-from .records import INPUTS, MOCAP, Array, Contacts, State, read_only
+from .records import INPUTS, MOCAP, Array, Contacts, State, StateLayout, read_only
 from .turns import Closable, Turn, alone, refuse_unless_held
 
 # By name, so that type checkers take the inputs for the descriptors below.
 _WRITABLE = (*INPUTS, *MOCAP)
 _ENGINE = ("_advance", "_raw_model", "_raw", "_warned", "_told")
-_SLOTS = ("__weakref__", "_home", "_turn", "_trouble", *_ENGINE, *_WRITABLE)
+_SLOTS = ("__weakref__", "_home", "_turn", "_trouble", "_layout", *_ENGINE, *_WRITABLE)
 
 if TYPE_CHECKING:
 
@@ -37,6 +37,20 @@ if TYPE_CHECKING:
 
         def __get__(self, data: object, owner: object) -> float: ...
         def __set__(self, data: object, value: float) -> None: ...
+
+    class _Derived:
+        """A derived array as a type checker sees it."""
+
+        def __get__(self, data: object, owner: object) -> Array: ...
+
+
+def _derived(name: str, says: str) -> _Derived:
+    """A property of a Data: one of its derived arrays, and what is said of it."""
+
+    def get(data: Data) -> Array:
+        return alone(data, data._derive, name)
+
+    return cast("_Derived", property(get, doc=says))
 
 
 class Data(Closable, ABC):
@@ -74,6 +88,7 @@ class Data(Closable, ABC):
     _home: Model  # the owner
     _turn: Turn
     _trouble: str  # why the Data refuses; "" if it does not
+    _layout: StateLayout  # fingerprint and layout of its States
     _advance: Any  # the engine's own step: (_raw_model, _raw, nstep=1)
     _raw_model: Any  # what that takes; all of `_ENGINE` is None once closed
     _raw: Any
@@ -126,75 +141,32 @@ class Data(Closable, ABC):
     def raw(self) -> Any:
         """The engine's own object, for what this interface does not offer."""
 
-    @property
-    def xpos(self) -> Array:
-        """(nbody, 3) body origins in world axes [m]."""
-        return alone(self, self._derive, "xpos")
-
-    @property
-    def xquat(self) -> Array:
-        """(nbody, 4) body orientations, wxyz."""
-        return alone(self, self._derive, "xquat")
-
-    @property
-    def site_xpos(self) -> Array:
-        """(nsite, 3) site positions in world axes [m]."""
-        return alone(self, self._derive, "site_xpos")
-
-    @property
-    def site_xmat(self) -> Array:
-        """(nsite, 9) site rotation matrices, row by row."""
-        return alone(self, self._derive, "site_xmat")
+    xpos = _derived("xpos", "(nbody, 3) body origins in world axes [m].")
+    xquat = _derived("xquat", "(nbody, 4) body orientations, wxyz.")
+    site_xpos = _derived("site_xpos", "(nsite, 3) site positions in world axes [m].")
+    site_xmat = _derived("site_xmat", "(nsite, 9) site rotation matrices, row by row.")
+    qacc = _derived("qacc", "(nv,) accelerations [rad/s² or m/s²].")
+    qfrc_bias = _derived(
+        "qfrc_bias", "(nv,) gravity, centrifugal and Coriolis [N·m or N]; on the left-hand side."
+    )
+    qfrc_actuator = _derived("qfrc_actuator", "(nv,) what the actuators exert [N·m or N].")
+    qfrc_passive = _derived("qfrc_passive", "(nv,) springs and viscous damping [N·m or N].")
+    qfrc_constraint = _derived(
+        "qfrc_constraint", "(nv,) contact, dry friction and limits together [N·m or N]."
+    )
+    qfrc_contact = _derived(
+        "qfrc_contact", "(nv,) the part of qfrc_constraint that contacts exert."
+    )
+    qfrc_friction = _derived(
+        "qfrc_friction", "(nv,) the part that dry friction in the joints exerts."
+    )
+    qfrc_limit = _derived("qfrc_limit", "(nv,) the part that joint limits exert.")
+    qfrc_equality = _derived("qfrc_equality", "(nv,) the part that equality constraints exert.")
 
     @property
     def contacts(self) -> Contacts:
         """The contacts; see `Contacts`."""
-        return alone(self, self._find_contacts)
-
-    @property
-    def qacc(self) -> Array:
-        """(nv,) accelerations [rad/s² or m/s²]."""
-        return alone(self, self._derive, "qacc")
-
-    @property
-    def qfrc_bias(self) -> Array:
-        """(nv,) gravity, centrifugal and Coriolis [N·m or N]; on the left-hand side."""
-        return alone(self, self._derive, "qfrc_bias")
-
-    @property
-    def qfrc_actuator(self) -> Array:
-        """(nv,) what the actuators exert [N·m or N]."""
-        return alone(self, self._derive, "qfrc_actuator")
-
-    @property
-    def qfrc_passive(self) -> Array:
-        """(nv,) springs and viscous damping [N·m or N]."""
-        return alone(self, self._derive, "qfrc_passive")
-
-    @property
-    def qfrc_constraint(self) -> Array:
-        """(nv,) contact, dry friction and limits together [N·m or N]."""
-        return alone(self, self._derive, "qfrc_constraint")
-
-    @property
-    def qfrc_contact(self) -> Array:
-        """(nv,) the part of qfrc_constraint that contacts exert."""
-        return alone(self, self._derive, "qfrc_contact")
-
-    @property
-    def qfrc_friction(self) -> Array:
-        """(nv,) the part that dry friction in the joints exerts."""
-        return alone(self, self._derive, "qfrc_friction")
-
-    @property
-    def qfrc_limit(self) -> Array:
-        """(nv,) the part that joint limits exert."""
-        return alone(self, self._derive, "qfrc_limit")
-
-    @property
-    def qfrc_equality(self) -> Array:
-        """(nv,) the part that equality constraints exert."""
-        return alone(self, self._derive, "qfrc_equality")
+        return alone(self, self._derive, "contacts")
 
     @property
     def model(self) -> Model:
@@ -271,11 +243,8 @@ class Data(Closable, ABC):
         """Raise what `error`, out of the engine, means for this Data, if it means more."""
 
     @abstractmethod
-    def _derive(self, name: str) -> Array:
-        """A read-only array of `records.DERIVED`; not called while the Data refuses."""
-
-    @abstractmethod
-    def _find_contacts(self) -> Contacts: ...
+    def _derive(self, name: str) -> Any:
+        """A read-only array of `records.DERIVED`, or Contacts; not called while it refuses."""
 
     @abstractmethod
     def _recompute(self) -> None: ...
@@ -289,10 +258,6 @@ class Data(Closable, ABC):
     @abstractmethod
     def _set_state(self, state: State) -> None:
         """Take a State of the right layout; BadInputError only before anything changes."""
-
-    @abstractmethod
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        """Fingerprint and layout of this Data's States."""
 
     @abstractmethod
     def _set_time(self, time: float) -> None: ...

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import BadInputError, ReadOnlyError, unknown_name
 from .options import TINY, checked_options, index_of, unsupported, whole_number
-from .records import Array, Capabilities, Ints, JointType, Keyframe, read_only
+from .records import Array, Capabilities, Ints, JointType, Keyframe, Sizes, StateLayout, read_only
 
 
 class Model(ABC):
@@ -255,9 +255,7 @@ class Model(ABC):
         low, high = self.actuator_ctrlrange.T
         return np.minimum(np.maximum(array, low), high)
 
-    def _with_fingerprint(
-        self, layout: tuple[tuple[str, int], ...]
-    ) -> tuple[str, tuple[tuple[str, int], ...]]:
+    def _with_fingerprint(self, layout: Sizes) -> StateLayout:
         """The layout of this Model's States, after a digest of it and of what it belongs to."""
         identity = (
             self.backend,

@@ -20,7 +20,7 @@ from ..errors import (
     shown,
     unknown_name,
 )
-from .records import Array, JointType, State
+from .records import Array, JointType, Sizes, State
 
 # MuJoCo calls a coordinate beyond this "huge" and the simulation unstable (mjMAXVAL).
 HUGE = 1e10
@@ -122,9 +122,7 @@ def check_writable(array: Array, name: str, owner: str = "data") -> None:
         )
 
 
-def check_state(
-    state: Any, model: Any, fingerprint: str, layout: tuple[tuple[str, int], ...]
-) -> None:
+def check_state(state: Any, model: Any, fingerprint: str, layout: Sizes) -> None:
     """Raise unless `state` is a State that a Data of `model` can take.
 
     Args:
@@ -152,7 +150,7 @@ def check_state(
     check_vector(state.vector, layout, model)
 
 
-def check_vector(vector: Array, layout: tuple[tuple[str, int], ...], model: Any) -> None:
+def check_vector(vector: Array, layout: Sizes, model: Any) -> None:
     """Raise BadInputError for the first number of a State of `model` that is not finite.
 
     A command that is infinite may be there: what acts of it is within its range.

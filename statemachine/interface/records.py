@@ -14,6 +14,11 @@ from ..errors import unknown_name
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Arrays = dict[str, Array]  # by name
+Sizes = tuple[tuple[str, int], ...]  # name and length of each part
+StateLayout = tuple[str, Sizes]  # fingerprint of a Model's States, and what they consist of
+Errors = dict[int, Exception]  # by number of a world
+Defaults = Literal["model", "engine"]  # with the model's contract, or as the engine comes
 INPUTS = ("qpos", "qvel", "ctrl")
 MOCAP = ("mocap_pos", "mocap_quat")  # further inputs: where the mocap bodies of a model are
 # What is derived from them, as far as it is one array; contacts are several.
@@ -194,7 +199,7 @@ class State:
     backend: str
     engine_version: str
     fingerprint: str
-    layout: tuple[tuple[str, int], ...]
+    layout: Sizes
     blob: bytes
 
     def __repr__(self) -> str:

@@ -170,7 +170,7 @@ def set_state(model: Model, data: Data, state: State) -> None:
         ClosedDataError: `data` is closed.
     """
     _admit(model, data)
-    check_state(state, model, *data._state_layout())
+    check_state(state, model, *data._layout)
     alone(data, _overwrite, data, "set_state", data._set_state, state, even_troubled=True)
 
 

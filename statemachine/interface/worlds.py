@@ -21,7 +21,18 @@ from ..errors import (
 from ..processes import free_memory
 from .model import Model
 from .options import HUGE, TINY, as_numbers, as_vector, check_entries, check_writable, whole_number
-from .records import FORCES, INPUTS, MOCAP, POSES, Array, Ints, State, read_only
+from .records import (
+    FORCES,
+    INPUTS,
+    MOCAP,
+    POSES,
+    Array,
+    Errors,
+    Ints,
+    State,
+    StateLayout,
+    read_only,
+)
 from .turns import Closable, Turn
 
 if TYPE_CHECKING:
@@ -62,7 +73,7 @@ class Worlds(Closable, ABC):
     n: int
     workers: int
     derived: tuple[str, ...]
-    _errors: dict[int, Exception]
+    _errors: Errors
     _numbers: Ints
     _process: int
     _home: Model
@@ -163,14 +174,14 @@ class Worlds(Closable, ABC):
         """Give back threads, processes and memory; the arrays are copied already."""
 
     @abstractmethod
-    def _step(self, ids: Ints, nstep: int, forward: bool) -> Mapping[int, Exception]:
+    def _step(self, ids: Ints, nstep: int, forward: bool) -> Errors:
         """Advance these worlds; by its number the error of each where one Data would raise.
 
         With `forward`, recompute what is derived of the others.
         """
 
     @abstractmethod
-    def _forward(self, ids: Ints) -> Mapping[int, Exception]:
+    def _forward(self, ids: Ints) -> Errors:
         """Recompute what is derived, of checked inputs; the error of each that cannot be."""
 
     @abstractmethod
@@ -186,13 +197,13 @@ class Worlds(Closable, ABC):
         """Take States of the right layout; BadInputError only before anything of it changes."""
 
     @abstractmethod
-    def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+    def _state_layout(self, world: int) -> StateLayout:
         """Fingerprint and layout of the States of one world, as a Data of its Model has them."""
 
     @abstractmethod
     def _record(
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
-    ) -> Mapping[int, Exception]:
+    ) -> Errors:
         """Advance by `nstep`, and after each `every` steps write into arrays[name][world, k].
 
         The rows of a world that ends are left as they are from there on.
@@ -218,16 +229,6 @@ class Worlds(Closable, ABC):
         if number is None or not 0 <= number < self.n:
             raise BadInputError(f"there is no world {shown(world)}: they are 0 to {self.n - 1}")
         return number
-
-    def _check_time(self, ids: Ints) -> None:
-        """Raise BadInputError for the first of these worlds whose time is not a finite number."""
-        for world in ids[~np.isfinite(self.time[ids])][:1].tolist():
-            raise BadInputError(
-                f"time[{world}] = {self.time[world]} is not a finite number",
-                quantity="time",
-                index=world,
-                world=world,
-            )
 
     def _check_inputs(self, ids: Ints) -> None:
         """Raise BadInputError for the first entry of these worlds that is not a finite number."""

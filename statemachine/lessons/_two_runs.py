@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..engines.auditing import FRESH, ITSELF, SaveMethod, SavePoint
-from ..engines.records import WayBack
 from ..interface import Array, Model, make_data, reset
 from ..measures import largest
 from ..measures.text import millimetres
@@ -90,13 +89,16 @@ def growth(differences: Mapping[str, Array], bodies: Mapping[str, Array | None])
     ]
 
 
-def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...]:
+def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[Figures, ...]:
     """Go back in each way that the interface has, and compare the futures.
 
     Args:
         model: Started from keyframe 0.
         ctrl: The command (nu,).
         steps: How many before and after the moment to which some ways go back.
+
+    Returns:
+        As `RawEngine.ways_back`.
     """
     key = 0 if model.keyframes else None
     with make_data(model) as data:
@@ -113,16 +115,17 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...
         reset(model, data, keyframe=key)
         data.ctrl = ctrl
         anew = driver.drive(data, start, steps)
-    return (
-        WayBack("reset to the keyframe", driver.off(anew, first_run)),
-        WayBack("a new Data, same keyframe", driver.off(again, first_run)),
-        WayBack("set_state, against going on", driver.off(states[ITSELF], rest)),
-        WayBack("set_state, done twice", driver.off(states[FRESH], states[ITSELF])),
-        WayBack("qpos, qvel, ctrl put back", driver.off(arrays[FRESH], rest)),
-    )
+    futures = {
+        "reset to the keyframe": (anew, first_run),
+        "a new Data, same keyframe": (again, first_run),
+        "set_state, against going on": (states[ITSELF], rest),
+        "set_state, done twice": (states[FRESH], states[ITSELF]),
+        "qpos, qvel, ctrl put back": (arrays[FRESH], rest),
+    }
+    return tuple(Figures(name=name, difference=driver.off(*two)) for name, two in futures.items())
 
 
-def through_us(results: Mapping[str, Sequence[WayBack]]) -> Table:
+def through_us(results: Mapping[str, Sequence[Figures]]) -> Table:
     """What the ways of this interface lead to, by backend."""
     rows = zip(*results.values(), strict=True)
     return Table(
@@ -132,7 +135,7 @@ def through_us(results: Mapping[str, Sequence[WayBack]]) -> Table:
     )
 
 
-def of_its_own(results: Mapping[str, Sequence[WayBack]]) -> list[Table]:
+def of_its_own(results: Mapping[str, Sequence[Figures]]) -> list[Table]:
     """What the engines' own ways lead to, where they were tried."""
     return [
         Table(

@@ -8,7 +8,6 @@ it is refused instead of being measured.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,6 +19,7 @@ from ..interface import Array, JointType, Model, make_data
 from ..interface.options import as_count
 from ..kinematics import Kind, Kinematics, shared_joints
 from ..measures import largest_or_inf
+from ..models import AnyPath
 from ..page import Figures
 from ..rotations import Placement, angle_between, matrix_from_quat
 from ..runs.drive import Progress, silent
@@ -46,7 +46,7 @@ def certify(
     poses: int = 200,
     seed: int = 0,
     site: str | None = None,
-    witness: str | os.PathLike[str] | None = None,
+    witness: AnyPath | None = None,
     witness_frame: str | None = None,
     progress: Progress = silent,
 ) -> Figures:
@@ -135,7 +135,7 @@ def certify(
 def _asked(
     model: Model,
     tips: list[Tip],
-    witness: str | os.PathLike[str] | None,
+    witness: AnyPath | None,
     witness_frame: str | None,
 ) -> tuple[Kinematics, list[Tip], str]:
     """The witness to ask, what it is asked for, and why it has not read the file itself."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -195,7 +194,7 @@ def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
         "most": lambda r: str(r.contacts.max()),
         "on average": lambda r: f"{r.contacts.mean():.1f}",
         **{
-            pair: partial(_touched, pair)
+            pair: lambda r, pair=pair: f"{r.pairs.get(pair, 0)} of {len(r.contacts)} steps"
             for pair in dict.fromkeys(pair for r in results.values() for pair in r.pairs)
         },
     }
@@ -219,10 +218,6 @@ def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
             },
         ),
     }
-
-
-def _touched(pair: str, result: Figures) -> str:
-    return f"{result.pairs.get(pair, 0)} of {len(result.contacts)} steps"
 
 
 def _hinges_apart(left: Figures, right: Figures) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -169,7 +168,9 @@ def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
         "differences": differences(
             results,
             {
-                f"rise of the {scene.body}, {scene.name}": partial(_rise, k)
+                f"rise of the {scene.body}, {scene.name}": lambda left, right, k=k: (
+                    " instead of ".join(millimetres(r.scenes[k].rise, 3) for r in (right, left))
+                )
                 for k, scene in enumerate(first.scenes)
                 if scene.body
             },
@@ -195,10 +196,4 @@ def _keyframe(number: int, scenes: Mapping[str, Figures]) -> Table:
         ("what touches", *scenes),
         rows or [("nothing", *("" for _ in scenes))],
         title=f"Keyframe {number} ({first.name!r}, time {first.time:g} s), after forward",
-    )
-
-
-def _rise(number: int, left: Figures, right: Figures) -> str:
-    return " instead of ".join(
-        millimetres(result.scenes[number].rise, 3) for result in (right, left)
     )

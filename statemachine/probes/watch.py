@@ -210,7 +210,6 @@ def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
 
     tells: dict[str, Callable[..., None]] = {
         "_derive": lambda value, _, name: watch.check(name, value),
-        "_find_contacts": lambda value, _: watch.check("contacts", value),
         "_recompute": lambda *_: watch.begin(0, present=True),
         "_reset": lambda *_: watch.begin(None, never=True),
         "_set_state": lambda *_: watch.begin(None, never=True),

@@ -26,7 +26,7 @@ from xml.etree import ElementTree
 from .. import __version__
 from ..errors import MissingEngineError, refuse
 from ..installed import DEFAULT, ENGINES, engine_version, require
-from ..models import SUFFIXES
+from ..models import SUFFIXES, AnyPath
 from ..processes import ALONE, checked_jobs, fresh_python, sandbox
 from ..processes.parallel import in_parallel, unwinding
 from ..runs.drive import Progress, silent
@@ -70,7 +70,7 @@ class ModelFile:
     part_of: str = ""
 
 
-def find(paths: Sequence[str | os.PathLike[str]]) -> list[ModelFile]:
+def find(paths: Sequence[AnyPath]) -> list[ModelFile]:
     """The models among files and folders, in an order that does not change.
 
     In a folder, and in all below it, each MJCF and URDF is one; a binary model must be named.

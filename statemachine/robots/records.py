@@ -241,12 +241,6 @@ SUFFIXES = (".csv", ".json")
 _FIRST = ("file", "sha256", "made_with")
 
 
-def check_suffix(target: Path) -> None:
-    """Raise BadInputError for a file of another kind."""
-    if target.suffix.lower() not in SUFFIXES:
-        raise BadInputError(f"a table ends in {' or '.join(SUFFIXES)}; got {target.name}")
-
-
 def write_table(target: Path, rows: Iterable[ExaminedModel]) -> None:
     """Write the table anew, whole or not at all."""
     plain = [dataclasses.asdict(row) for row in rows]

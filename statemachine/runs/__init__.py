@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import TraceError, refuse
 from ..interface import MOCAP, Array, Data, Model, make_data, reset
+from ..interface.records import Defaults
 from .drive import Controller, Progress, check_length, silent
 from .files import export_csv, model_file, read, shipped, shipped_names, write
 from .header import COLUMNS, CONTACTS, Header
@@ -79,7 +80,7 @@ class Rerun:
     keyframe: int | str | None = None
     qpos: Array | None = None
     qvel: Array | None = None
-    defaults: Literal["model", "engine"] = "model"
+    defaults: Defaults = "model"
     options: dict[str, Any] = field(default_factory=dict)
     experiment: str = ""
     says: str = ""
@@ -105,7 +106,7 @@ def rerun_of(
     *,
     seconds: float | None = None,
     seed: int = 0,
-    defaults: Literal["model", "engine"] = "model",
+    defaults: Defaults = "model",
     options: dict[str, Any] | None = None,
 ) -> Rerun:
     """How a scenario is run on a Model; arguments are those of `record_scenario`."""
@@ -128,7 +129,7 @@ def rerun_of(
 def replayed(
     trace: Trace,
     model: Model,
-    defaults: Literal["model", "engine"] = "model",
+    defaults: Defaults = "model",
     options: dict[str, Any] | None = None,
 ) -> Rerun:
     """The start and the commands of a trace on a Model of its layout."""
@@ -154,7 +155,7 @@ def record_scenario(
     seconds: float | None = None,
     seed: int = 0,
     command: str = "",
-    defaults: Literal["model", "engine"] = "model",
+    defaults: Defaults = "model",
     options: dict[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Trace:
@@ -188,7 +189,7 @@ def play(
     model: Model,
     *,
     command: str = "",
-    defaults: Literal["model", "engine"] = "model",
+    defaults: Defaults = "model",
     options: dict[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Trace:

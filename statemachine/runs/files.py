@@ -24,7 +24,7 @@ from ..errors import (
     did_you_mean,
 )
 from ..interface import MOCAP, JointType
-from ..models import resolve
+from ..models import AnyPath, resolve
 from .formats import read_npz, read_parquet, write_npz, write_parquet
 from .header import COLUMNS, Header, model_digest
 from .trace import Trace
@@ -35,7 +35,7 @@ SUFFIXES = (".npz", ".parquet")
 _FOLDER = Path(__file__).resolve().parent / "recorded"
 
 
-def write(trace: Trace, path: str | os.PathLike[str]) -> Path:
+def write(trace: Trace, path: AnyPath) -> Path:
     """Write a trace; the suffix, .npz or .parquet (zstd), says how.
 
     The file is written beside and then renamed: it is there whole or not at all. The same
@@ -57,7 +57,7 @@ def write(trace: Trace, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def read(path: str | os.PathLike[str]) -> Trace:
+def read(path: AnyPath) -> Trace:
     """Open a trace. No engine is needed; nothing in the file is run.
 
     A file is not trusted: it may unfold into 256 MB or into a hundred times its size, and
@@ -104,8 +104,8 @@ def shipped(experiment: str, backend: str, defaults: str = "model") -> Trace:
 
 def model_file(
     header: Header,
-    menagerie: str | os.PathLike[str] | None = None,
-    beside: str | os.PathLike[str] | None = None,
+    menagerie: AnyPath | None = None,
+    beside: AnyPath | None = None,
 ) -> tuple[Path, bool]:
     """The file of the model that a trace is of, and whether it has the digest of that one.
 
@@ -133,7 +133,7 @@ def model_file(
     return candidates[0], False
 
 
-def _known(path: str | os.PathLike[str]) -> Path:
+def _known(path: AnyPath) -> Path:
     target = Path(path)
     if target.suffix.lower() not in SUFFIXES:
         raise BadInputError(f"a trace is a file {' or '.join(SUFFIXES)}; got {target.name!r}")
@@ -151,9 +151,7 @@ def _missing(path: Path) -> TraceError:
     return TraceError(message)
 
 
-def _candidates(
-    name: str, menagerie: str | os.PathLike[str] | None, beside: str | os.PathLike[str] | None
-) -> Iterator[Path]:
+def _candidates(name: str, menagerie: AnyPath | None, beside: AnyPath | None) -> Iterator[Path]:
     folder = menagerie or os.environ.get("MENAGERIE") or None
     for where in (None, folder) if folder else (None,):
         with suppress(StateMachineError):
@@ -164,7 +162,7 @@ def _candidates(
             yield resolve(place.absolute() / last)
 
 
-def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
+def export_csv(trace: Trace, path: AnyPath) -> list[Path]:
     """Write the columns as CSV, one row for each moment, units SI.
 
     Columns are named after joints, bodies, sites and actuators: "qpos.elbow_flex",

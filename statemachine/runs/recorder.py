@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from ..interface import (
     step,
 )
 from ..interface.options import HUGE
+from ..interface.records import Arrays, Defaults
 from .drive import Controller, Progress, drive, part_of, silent, steps_in
 from .header import Header, provenance
 from .robot import warn_of_start
@@ -53,7 +54,7 @@ def record(
     experiment: str = "",
     says: str = "",
     command: str = "",
-    defaults: Literal["model", "engine"] = "model",
+    defaults: Defaults = "model",
     options: dict[str, Any] | None = None,
     seed: int | None = None,
     writes_state: bool = True,
@@ -166,7 +167,7 @@ def layout_of(model: Model) -> dict[str, Any]:
 
 def _run(
     model: Model, data: Data, controller: Controller | None, total: int, progress: Progress
-) -> tuple[dict[str, Array], str]:
+) -> tuple[Arrays, str]:
     """The inputs of each row, as they are when the step begins, and why it ended early."""
     times: list[float] = []
     rows: tuple[list[bytes], ...] = ([], [], [])
@@ -218,7 +219,7 @@ Start = Callable[[Model, Data], None]
 
 
 def derived(
-    model: Model, begin: Start, inputs: dict[str, Array], progress: Progress
+    model: Model, begin: Start, inputs: Arrays, progress: Progress
 ) -> tuple[dict[str, Any], int]:
     """Repeat a run and read what is derived.
 
@@ -313,7 +314,7 @@ def _read(
 
 def energies(
     model: Model,
-    defaults: Literal["model", "engine"],
+    defaults: Defaults,
     qpos: Array,
     qvel: Array,
     gravity: Any = None,

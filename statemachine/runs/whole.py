@@ -10,7 +10,7 @@ import secrets
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -22,14 +22,24 @@ _PART = ".part-"  # in the names of files that are being written
 _ABANDONED = 3600.0  # seconds since anything was written into one: its process is gone
 
 
-def check_place(target: Path) -> None:
+def check_place(target: Path, suffixes: Sequence[str] = (), what: str = "the output") -> None:
     """Refuse a place where no file can be written, before anything is run.
 
+    Args:
+        target: The place.
+        suffixes: What it may end in; empty for anything.
+        what: What messages call it then.
+
     Raises:
-        BadInputError: It is a folder, or its folder is not there or not to be written into.
+        BadInputError: It ends in something else, it is a folder, or its folder is not there or not
+            to be written into.
     """
     folder, file, cannot = target.parent, not _special(target), f"{target} cannot be written"
     refuse(
+        (
+            suffixes and target.suffix.lower() not in suffixes,
+            f"{what} ends in {' or '.join(suffixes)}; got {target.name!r}",
+        ),
         (target.is_dir(), f"{target} is a folder; name a file in it"),
         (not (file or os.access(target, os.W_OK)), f"{cannot}: it is read-only for you"),
         (file and not folder.is_dir(), f"{cannot}: there is no folder {folder}"),

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..compare.perturbed import Uncertainty, displaced
 from ..errors import BadInputError, StateMachineError, check_name
 from ..interface import Array, JointType, Model
 from ..interface.options import index_of
+from ..interface.records import Defaults
 from ..measures.text import command
 from ..runs.controllers import function_scenario, is_function
 from ..runs.robot import scalar_joint
@@ -64,7 +65,7 @@ class Sweep:
     seconds: float | None = None
     every: int = 1
     keyframe: str | None = None
-    defaults: Literal["model", "engine"] = "model"
+    defaults: Defaults = "model"
     spread: str = "1deg,1mm"
     moments: int = 20
     timeout: float = 600.0

@@ -21,17 +21,6 @@ from ..rotations import matrix_from_quat
 from .mjcf import FileBody, PlainMjcf
 from .mjcf_text import parse
 
-__all__ = [
-    "OWN_READING",
-    "SAME_READING",
-    "Segment",
-    "WitnessModel",
-    "labels",
-    "read_file",
-    "read_numbers",
-]
-
-
 # A robot as Pinocchio has it, with the names and the order of the file that it comes from.
 #
 # *Same reading*: `read_numbers` builds it from the numbers of a compiled model. They are the

@@ -24,6 +24,7 @@ from ..interface import (
     set_state,
     step,
 )
+from ..interface.records import Errors
 from ..processes import resident_memory
 
 # Of each array where it starts, its shape and its type.
@@ -63,7 +64,7 @@ class Holder:
 
     def answer(
         self, verb: str, argument: int, payload: Any, of_ids: bool, wanted: int
-    ) -> tuple[Any, Exception | None, dict[int, Exception]]:
+    ) -> tuple[Any, Exception | None, Errors]:
         """Do what is asked; the value, what was raised, and the error of each world that ended.
 
         Args:
@@ -73,7 +74,7 @@ class Holder:
             of_ids: Whether it is for the worlds of `ids` only.
             wanted: The derived arrays that are read afterwards, as bits.
         """
-        self._errors: dict[int, Exception] = {}
+        self._errors: Errors = {}
         value: Any = None
         raised: Exception | None = None
         try:
@@ -110,7 +111,7 @@ class Holder:
 
     def _fill(self, _argument: int, _payload: Any, _places: Any) -> Any:
         self._make(self._all)
-        return [data._state_layout() for data in self._data[: None if self._options else 1]]
+        return [data._layout for data in self._data[: None if self._options else 1]]
 
     def _make(self, most: int) -> None:
         while len(self._data) < min(most, self._all):

@@ -34,6 +34,7 @@ from typing import Any, TypeVar
 
 from .. import backends
 from ..errors import EngineError, shown
+from ..interface.records import Errors
 from ..processes import PipedChild, await_message, end_with_parent, fresh_python
 from ._holder import Holder, StepStopped, arrays_in
 
@@ -51,7 +52,7 @@ VERBS = (
     "record", "derive", "stop",
 )  # fmt: skip
 # The value, what was raised, the error of each world that ended, and what was warned of.
-Answer = tuple[Any, Exception | None, dict[int, Exception], list[tuple[type[Warning], str]]]
+Answer = tuple[Any, Exception | None, Errors, list[tuple[type[Warning], str]]]
 NOTHING: Answer = (None, None, {}, [])
 _ENDING = 0.3  # seconds in which one that closed its pipes has ended
 
@@ -186,7 +187,10 @@ class _Apart(Holder):
         self._command = 0  # the number of what is being done
         self._warnings: list[tuple[type[Warning], str]] = []
         warnings.simplefilter("always")
-        warnings.showwarning = self._warn
+        # Warnings are kept for the answer.
+        warnings.showwarning = lambda message, kind, *_, **__: self._warnings.append(
+            (kind, str(message))
+        )
         for name in ("SIGINT", "SIGBREAK"):  # the second on Windows
             if hasattr(signal, name):
                 signal.signal(getattr(signal, name), self._signalled)
@@ -197,10 +201,6 @@ class _Apart(Holder):
     def _signalled(self, *_: Any) -> None:
         if self.running and self.stopped():
             raise StepStopped
-
-    def _warn(self, message: Warning, kind: type[Warning], *_: Any, **__: Any) -> None:
-        """Keep a warning for the answer; in place of `warnings.showwarning`."""
-        self._warnings.append((kind, str(message)))
 
     def _start(self, place: int, job: Mapping[str, Any], places: Any) -> dict[str, Any]:
         self._place = place + self._number * ANSWER_MOST

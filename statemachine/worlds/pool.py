@@ -22,6 +22,7 @@ import numpy as np
 from .. import backends
 from ..errors import BusyDataError, StateMachineError, UnsupportedError
 from ..interface import Array, Ints, Model, State
+from ..interface.records import Errors, StateLayout
 from ..interface.turns import alone
 from ..interface.worlds import WRITABLE, Worlds, check_memory
 from ..processes import checked_jobs
@@ -213,7 +214,7 @@ class PoolWorlds(Worlds):
 
     def _ask(
         self, ids: Ints, verb: str, argument: int = 0, payload: Any = None, wanted: int = 0
-    ) -> tuple[dict[int, Exception], list[Any]]:
+    ) -> tuple[Errors, list[Any]]:
         """Let the processes of some worlds do something; the errors by world, and the values."""
         numbers, of_ids = range(self.workers), len(ids) < self.n
         if of_ids:
@@ -221,7 +222,7 @@ class PoolWorlds(Worlds):
             self._chosen[ids] = 1
             numbers = np.unique(ids % self.workers).tolist()
         answers = self._exchange(numbers, verb, argument, payload, of_ids, wanted)
-        errors: dict[int, Exception] = {}
+        errors: Errors = {}
         raised: Exception | None = None
         for _, error, ended, warned in answers:
             errors |= ended
@@ -235,9 +236,7 @@ class PoolWorlds(Worlds):
             raise raised
         return errors, [value for value, *_ in answers]
 
-    def _change(
-        self, ids: Ints, verb: str, argument: int = 0, payload: Any = None
-    ) -> dict[int, Exception]:
+    def _change(self, ids: Ints, verb: str, argument: int = 0, payload: Any = None) -> Errors:
         """Ask for what changes worlds, and with it for what was read since the last change."""
         own = vars(self)
         read = [name for name in self.derived if own.pop(name, None) is not None]
@@ -266,10 +265,10 @@ class PoolWorlds(Worlds):
                 self._ask(ids, "derive", 1 << self.derived.index(name))
         return vars(self).setdefault(name, self._derived_arrays[name])
 
-    def _step(self, ids: Ints, nstep: int, forward: bool) -> Mapping[int, Exception]:
+    def _step(self, ids: Ints, nstep: int, forward: bool) -> Errors:
         return self._change(ids, "step_and_forward" if forward else "step", nstep)
 
-    def _forward(self, ids: Ints) -> Mapping[int, Exception]:
+    def _forward(self, ids: Ints) -> Errors:
         return self._change(ids, "forward")
 
     def _reset(self, ids: Ints, key: int | None) -> None:
@@ -293,14 +292,14 @@ class PoolWorlds(Worlds):
         most = max(1, _STATES // (8 * max(sizes)))
         return [ids[start : start + most] for start in range(0, len(ids), most)]
 
-    def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+    def _state_layout(self, world: int) -> StateLayout:
         place = world // self.workers if self._options else 0
         return self._layouts[world % self.workers][place]
 
     def _record(
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
-    ) -> Mapping[int, Exception]:
-        errors: dict[int, Exception] = {}
+    ) -> Errors:
+        errors: Errors = {}
         rows, start = nstep // every, 0
         sources = {**arrays, **({} if ctrl is None else {"commands": ctrl})}
         row = sum(8 * int(np.prod(array.shape)) // rows for array in sources.values())

@@ -19,8 +19,9 @@ from ..errors import (
     check_name,
     shown,
 )
-from ..interface import Array, Ints, Model, State
+from ..interface import Ints, Model, State
 from ..interface.options import as_count, as_vector, check_state, checked_options, kind_of
+from ..interface.records import Arrays, Errors
 from ..interface.turns import alone
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world
 from ..processes import checked_jobs, free_memory
@@ -108,7 +109,7 @@ def forward(worlds: Worlds, *, ids: ArrayLike | None = None) -> None:
     _run(worlds, partial(_forward, worlds), _chosen(worlds, ids))
 
 
-def _forward(worlds: Worlds, ids: Ints) -> Mapping[int, Exception]:
+def _forward(worlds: Worlds, ids: Ints) -> Errors:
     worlds._check_inputs(ids)
     return worlds._forward(ids)
 
@@ -221,7 +222,7 @@ def record(
     *,
     every: int = 1,
     ctrl: ArrayLike | None = None,
-) -> dict[str, Array]:
+) -> Arrays:
     """Advance by `nstep` and record: field to (n, nstep // every, ...), after each `every` steps.
 
     A world that has diverged, or does so meanwhile, has NaN from there on.
@@ -270,17 +271,21 @@ def _run(worlds: Worlds, call: Any, ids: Ints, *args: Any) -> None:
         warnings.warn(_warning_text(worlds, errors), DivergedWarning, stacklevel=3)
 
 
-def _checked_call(
-    worlds: Worlds, call: Any, ids: Ints, args: tuple[Any, ...]
-) -> Mapping[int, Exception]:
-    worlds._check_time(ids)
+def _checked_call(worlds: Worlds, call: Any, ids: Ints, args: tuple[Any, ...]) -> Errors:
+    for world in ids[~np.isfinite(worlds.time[ids])][:1].tolist():
+        raise BadInputError(
+            f"time[{world}] = {worlds.time[world]} is not a finite number",
+            quantity="time",
+            index=world,
+            world=world,
+        )
     errors = call(ids, *args)
     if errors:
         worlds._errors.update(errors)
     return errors
 
 
-def _warning_text(worlds: Worlds, errors: Mapping[int, Exception]) -> str:
+def _warning_text(worlds: Worlds, errors: Errors) -> str:
     """'3 of 1024 worlds diverged and are left out: 17 (qpos[2] (elbow) at 0.34 s), …'."""
     entries = [f"{world} ({_entry(worlds, errors[world])})" for world in sorted(errors)]
     more = f" and {len(entries) - _SHOWN} more" if len(entries) > _SHOWN else ""

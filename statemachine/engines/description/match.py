@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import check_name
 from ...interface import Array
+from ...page import Figures
 from ...rotations import HERE, Placement
 from .records import SCALAR, Robot
 from .tree import Group, GroupTree
@@ -88,7 +89,7 @@ def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
         )
         for link in robot.links
     )
-    frames = tuple(replace(f, name=of(f.name), link=of(f.link)) for f in robot.frames)
+    frames = tuple(Figures(name=of(f.name), link=of(f.link), place=f.place) for f in robot.frames)
     drives = robot.actuators and tuple(replace(a, joint=of(a.joint)) for a in robot.actuators)
     return replace(robot, links=links, frames=frames, actuators=drives)
 

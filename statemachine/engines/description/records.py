@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...interface import Array
+from ...page import Figures
 from ...rotations import HERE, Placement, rotation
 
 Range = tuple[float, float]
@@ -140,15 +141,6 @@ class Link:
 
 
 @dataclass(frozen=True, eq=False)
-class NamedFrame:
-    """A named frame that a link carries: `place` in the link's frame."""
-
-    name: str
-    link: str
-    place: Placement
-
-
-@dataclass(frozen=True, eq=False)
 class Actuator:
     """What drives a joint.
 
@@ -184,7 +176,8 @@ class Robot:
         reader: What read it, with its version: "XML", "mujoco 4.0.0".
         format: URDF or MJCF, or the engine that was asked.
         links: Parents before children; the first is the root.
-        frames: Sites; a link is a frame too.
+        frames: Sites, each with its name, link, and place in the link's frame; a link is a frame
+            too.
         actuators: None where the format has no word for them.
         settings: Of the simulation, by name; None where the format has no word for them.
         defaults: What its engine takes for a setting that a file does not name.
@@ -197,7 +190,7 @@ class Robot:
     reader: str
     format: str
     links: tuple[Link, ...]
-    frames: tuple[NamedFrame, ...]
+    frames: tuple[Figures, ...]
     actuators: tuple[Actuator, ...] | None
     settings: Mapping[str, Setting] | None
     rooted: bool

@@ -35,7 +35,7 @@ class MujocoEngine(RawEngine):
     read_file = function_of(".mujoco.description:read_file")
     describe = function_of(".mujoco.description:describe")
     differences = function_of(".mujoco.differences:differences")
-    sensors = function_of(".mujoco.differences:sensors")
+    sensors = function_of(".mujoco._drives:sensors")
     entries = function_of(".mujoco.differences:entries")
     integrator = function_of(".mujoco.differences:integrator")
     edited = function_of(".mujoco.differences:edited")

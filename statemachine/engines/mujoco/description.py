@@ -19,13 +19,13 @@ from ...errors import ModelError
 from ...installed import require
 from ...interface import JointType
 from ...measures.text import few
+from ...page import Figures
 from ...rotations import HERE
 from ..description.records import (
     Actuator,
     CollisionShape,
     Follows,
     Link,
-    NamedFrame,
     Range,
     Robot,
     RobotJoint,
@@ -122,10 +122,10 @@ def describe(raw: Any, name: str, form: str = "MJCF") -> Robot:
         links += _links(raw, body, above, actuators)
         names.append(links[-1].name)
     frames = tuple(
-        NamedFrame(
-            raw.site(i).name or f"site {i}",
-            names[raw.site_bodyid[i]],
-            placed(raw.site_pos[i], raw.site_quat[i]),
+        Figures(
+            name=raw.site(i).name or f"site {i}",
+            link=names[raw.site_bodyid[i]],
+            place=placed(raw.site_pos[i], raw.site_quat[i]),
         )
         for i in range(raw.nsite)
     )

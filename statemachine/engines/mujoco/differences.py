@@ -19,13 +19,11 @@ from ...installed import require
 from ...measures.text import grouped
 from ..records import Counterparts, Edit, ModelDifference
 from . import _fields as fields
-from ._drives import drives, sensors
+from ._drives import drives
 from ._elements import AS_GEOMS, as_geoms, contact_pairs, elements, equalities
 from ._geoms import Geoms
 from ._parts import places, weights
 from ._sides import Sides, plain, same
-
-__all__ = ["differences", "edited", "entries", "integrator", "sensors", "settings_of"]
 
 # After these the boxes around the geoms of a body are no longer where they were.
 _MOVES = {

@@ -21,7 +21,6 @@ from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ...page import Figures
 from ..auditing import Save, SavePoint
-from ..records import Term, WayBack
 from .audit import Client, PybulletDriver, put_back
 from .world import fresh_world, gravity_of, limp, saved_in_memory
 
@@ -42,7 +41,7 @@ def _raw(model: Model, gravity: bool = True, damping: bool = True) -> closing[Wo
     return closing(world)
 
 
-def terms(model: Model) -> tuple[Term, ...]:
+def terms(model: Model) -> tuple[Figures, ...]:
     """What the interface's names are on this engine, by looking at a loaded model."""
     with _raw(model) as world:
         return tuple(
@@ -53,19 +52,23 @@ def terms(model: Model) -> tuple[Term, ...]:
         )
 
 
-def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
+def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Figures]:
     """The numbers of the joints, and of the fixed ones among them."""
     joints = model.compiled.dof_jntid[tree.dofs[tree.base :]]
     for index, place in zip(tree.joints, joints, strict=True):
         thing, slot = f"joint {model.joint_names[place]}", int(model.jnt_qposadr[place])
-        yield Term(thing, f"qpos[{slot}]", f"joint {index} of body {tree.body}")
+        yield Figures(
+            thing=thing, ours=f"qpos[{slot}]", engine=f"joint {index} of body {tree.body}"
+        )
     infos = joint_infos(world.client, tree.body)
     fixed = [f"{info[1].decode()} is {info[0]}" for info in infos if info[3] < 0]
     if fixed:
-        yield Term("fixed joints", "none", f"take an index too: {', '.join(fixed)}")
+        yield Figures(
+            thing="fixed joints", ours="none", engine=f"take an index too: {', '.join(fixed)}"
+        )
 
 
-def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
+def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Figures]:
     """Of a free body: a quarter turn about z, and a spin about the body's own x."""
     if not tree.free:
         return
@@ -77,19 +80,19 @@ def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
     name = model.body_names[tree.root]
     _, quat = pb.getBasePositionAndOrientation(tree.body, world.client)
     _, spin = pb.getBaseVelocity(tree.body, world.client)
-    yield Term(
-        f"{name}, turned by 90° about z",
-        f"w x y z: {_figures(qpos[tree.qpos][3:7])}",
-        f"x y z w: {_figures(quat)}",
+    yield Figures(
+        thing=f"{name}, turned by 90° about z",
+        ours=f"w x y z: {_figures(qpos[tree.qpos][3:7])}",
+        engine=f"x y z w: {_figures(quat)}",
     )
-    yield Term(
-        f"{name}, spinning about its x",
-        f"own axes: {_figures(qvel[tree.qvel][3:6])}",
-        f"world axes: {_figures(spin)}",
+    yield Figures(
+        thing=f"{name}, spinning about its x",
+        ours=f"own axes: {_figures(qvel[tree.qvel][3:6])}",
+        engine=f"world axes: {_figures(spin)}",
     )
 
 
-def _frame_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
+def _frame_terms(world: World, tree: Tree, model: Model) -> Iterator[Figures]:
     """How far apart a link's frame and what the engine calls its position are."""
     apart = {}
     for body, link in tree.links.items():
@@ -98,10 +101,10 @@ def _frame_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
             apart[body] = float(np.linalg.norm(np.subtract(state[0], state[4])))
     if apart:
         body = max(apart, key=lambda link: apart[link])
-        yield Term(
-            f"position of {model.body_names[body]}",
-            "its frame",
-            f"its centre of mass, {apart[body] * 1e3:.1f} mm away",
+        yield Figures(
+            thing=f"position of {model.body_names[body]}",
+            ours="its frame",
+            engine=f"its centre of mass, {apart[body] * 1e3:.1f} mm away",
         )
 
 
@@ -182,7 +185,7 @@ class _AsLoaded(PybulletDriver):
         return Client(world, world)
 
 
-def ways_back(model: Model) -> tuple[WayBack, ...]:
+def ways_back(model: Model) -> tuple[Figures, ...]:
     """Which of the engine's own ways to go back is exact, in the middle of contact.
 
     Each run starts in a new client from keyframe 0 (or the default pose), squeezes by
@@ -203,12 +206,12 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     with driver.at(middle) as machine:
         touching, _ = driver.touching(machine)
     moment = f"after {_BEFORE} steps, {touching} contacts"
-    return (
-        WayBack("a new client, loaded again", driver.off(*runs)),
-        WayBack(
-            "resetJointState, resetBase… to the start",
-            back(start, lambda _: nullcontext(lambda machine: driver.start(machine, start))),
+    differences = {
+        "a new client, loaded again": driver.off(*runs),
+        "resetJointState, resetBase… to the start": back(
+            start, lambda _: nullcontext(lambda machine: driver.start(machine, start))
         ),
-        WayBack(f"saveState, restoreState {moment}", back(middle, saved_in_memory)),
-        WayBack(f"written back {moment}", back(middle, put_back)),
-    )
+        f"saveState, restoreState {moment}": back(middle, saved_in_memory),
+        f"written back {moment}": back(middle, put_back),
+    }
+    return tuple(Figures(name=name, difference=off) for name, off in differences.items())

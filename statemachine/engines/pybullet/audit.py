@@ -17,10 +17,10 @@ from ...backends._bullet_client import pb
 from ...backends._bullet_world import World
 from ...interface import Array, Data, JointType, Model, make_data
 from ...measures import JointPlaces
+from ...page import Figures
 from ..auditing import (
     Disturbance,
     Driver,
-    HiddenState,
     Restore,
     Save,
     SaveMethod,
@@ -177,11 +177,8 @@ class PybulletDriver(Driver):
 
         return save_both
 
-    def hidden_state(self, point: SavePoint) -> HiddenState:
+    def hidden_state(self, point: SavePoint) -> Figures:
         """What the engine's ways forget, each way without what its user must add."""
-
-        def motor_targets(machine: Client) -> None:
-            self.command(machine, point.ctrl - _RETARGET)
 
         def waiting_force(machine: Client) -> None:
             for body, link in machine.solids:
@@ -199,7 +196,7 @@ class PybulletDriver(Driver):
                 machine.world.change(body, link, lateralFriction=_SLIPPERY)
 
         changes: dict[str, Callable[[Client], None]] = {
-            "motor targets": motor_targets,
+            "motor targets": lambda machine: self.command(machine, point.ctrl - _RETARGET),
             "a waiting force": waiting_force,
             "collision masks": let_pass,
             "frictions": friction,
@@ -208,7 +205,7 @@ class PybulletDriver(Driver):
             del changes["motor targets"]
         ways = {"written": written, "saveState": saved_in_memory, "saveBullet": saved_in_a_file}
         best = SaveMethod(_BEST, self._with_targets(written))
-        return HiddenState(ways, changes, let_pass, best)
+        return Figures(ways=ways, changes=changes, let_pass=let_pass, best=best)
 
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         def links(machine: Client) -> None:

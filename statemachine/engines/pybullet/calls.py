@@ -197,8 +197,8 @@ class PybulletWatch(CallWatch):
                 self._name_model(label, value)
             elif isinstance(value, HiddenData) and isinstance(value.model, PybulletModel):
                 self._name_model(f"{label}.model", value.model)
-                self._label(value.machine.world.raw, f"the world of {label}")
-                machine = value.machine
+                machine = value._machine
+                self._label(machine.world.raw, f"the world of {label}")
                 watched = self._arrays.get(machine) or _Arrays(machine)
                 arrays.setdefault(machine, watched).lead(label)
         self._arrays = arrays  # the others no variable leads to

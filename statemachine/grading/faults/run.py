@@ -14,7 +14,6 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -29,6 +28,7 @@ from ...errors import (
     unknown_name,
 )
 from ...installed import DEFAULT, engine_version, require
+from ...models import AnyPath
 from ...page import Figures
 from ...processes import checked_jobs, sandbox
 from ...processes.parallel import in_parallel, unwinding
@@ -94,7 +94,7 @@ def examination_of(
 
 
 def examine(
-    file: str | os.PathLike[str],
+    file: AnyPath,
     backend: str = DEFAULT,
     only: Sequence[str] = (),
     seconds: float = _SECONDS,
@@ -126,7 +126,7 @@ def examine(
         check_name("fault", name, FAULTS)
     faults = [FAULTS[name] for name in dict.fromkeys(only or FAULTS)]
     version = _ready(backend)
-    records: dict[str, _Record] = {}
+    records: dict[str, Figures] = {}
     with unwinding():
         healthy = _run(path, backend, None, seconds, clock)
         if broken := healthy.failures.get(IMPORT):
@@ -154,7 +154,7 @@ def examine(
     )
 
 
-def _test_file(file: str | os.PathLike[str]) -> Path:
+def _test_file(file: AnyPath) -> Path:
     path = Path(file).absolute()
     if not path.is_file():
         raise ModelFileError(f"no file {os.fspath(file)}: --faults takes a file of tests")
@@ -181,17 +181,7 @@ def _ready(backend: str) -> str:
     return engine_version(backend)
 
 
-@dataclass(frozen=True)
-class _Record:
-    """What one run of pytest came to; tests that were skipped are not tests."""
-
-    outcome: sandbox.ProcessOutcome
-    tests: tuple[str, ...]
-    skipped: int
-    failures: dict[str, str]
-
-
-def _failures_of(record: _Record) -> tuple[Figures, ...]:
+def _failures_of(record: Figures) -> tuple[Figures, ...]:
     return tuple(Figures(test=test, why=why) for test, why in record.failures.items())
 
 
@@ -202,7 +192,14 @@ def _run(
     seconds: float,
     clock: float,
     stop: threading.Event | None = None,
-) -> _Record:
+) -> Figures:
+    """What one run of pytest came to.
+
+    Returns:
+        outcome: How it ended.
+        tests: Those that were not skipped; skipped: how many were.
+        failures: By test what was said.
+    """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         here = Path(folder)
         settings, record = here / "pytest.ini", here / "record"
@@ -243,7 +240,7 @@ def _environment() -> dict[str, str]:
     }
 
 
-def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> _Record:
+def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> Figures:
     if not outcome.started:  # of which no test can be the reason
         raise EngineError(f"pytest stopped before the tests: it {_end(outcome)}")
     tests: list[str] | None = None
@@ -276,7 +273,7 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> _Record:
         # The one that was running ended them all.
         failures.setdefault(running if running in rest else rest[0], _end(outcome))
     counted = tuple(test for test in tests or () if test not in skipped)
-    return _Record(outcome, counted, len(skipped), failures)
+    return Figures(outcome=outcome, tests=counted, skipped=len(skipped), failures=failures)
 
 
 def _said(text: str, file: str) -> str:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...interface import Array, Data, Model, forward, make_data
+from ...interface.records import Arrays
 from ...measures.text import rounded, vector
+from ...page import Figures
 from ..answers import Answer
 from ..calls import first_of, reason
-from ..watch import Inputs
+from ..watch import Inputs, inputs_of
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from . import LIFT, TIP, address, grain, near, numbers, owner, parts, short_float, told_apart
 
@@ -23,19 +24,6 @@ _SINGLE = 1e-7  # [m]: what float32 keeps of such places
 _READINGS = ("1, fresh", "2, after forward", "3, after the write", "4, after the second forward")
 
 
-@dataclass(frozen=True)
-class Tips:
-    """What is right on one world, and what other sites and bodies would give.
-
-    Attributes:
-        readings: (4, 3) the four readings [m].
-        others: (4, 3) those of each other site and body, by what it is [m].
-    """
-
-    readings: Array
-    others: dict[str, Array]
-
-
 def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     """The course's scene; a crate before the arm, and the fingertip elsewhere."""
     return [
@@ -44,8 +32,13 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(world: ExerciseWorld) -> Tips:
-    """The readings."""
+def right(world: ExerciseWorld) -> Figures:
+    """What is right on one world, and what other sites and bodies would give.
+
+    Returns:
+        readings: (4, 3) the four readings [m].
+        others: (4, 3) those of each other site and body, by what it is [m].
+    """
     model = world.model
     with make_data(model) as data:
         moments = [_places(model, data)]
@@ -55,16 +48,16 @@ def right(world: ExerciseWorld) -> Tips:
         forward(model, data)
         moments.append(_places(model, data))
     places = {name: np.array([moment[name] for moment in moments]) for name in moments[0]}
-    return Tips(places.pop(f"site {TIP!r}"), places)
+    return Figures(readings=places.pop(f"site {TIP!r}"), others=places)
 
 
-def _places(model: Model, data: Data) -> dict[str, Array]:
+def _places(model: Model, data: Data) -> Arrays:
     """Where each site and body is, (3,) [m]."""
     sites = {f"site {name!r}": data.site_xpos[k].copy() for k, name in enumerate(model.site_names)}
     return sites | {f"body {n!r}": data.xpos[k].copy() for k, n in enumerate(model.body_names)}
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Tips, course: Tips) -> list[str] | str:
+def judge(answer: Answer, world: ExerciseWorld, right: Figures, course: Figures) -> list[str] | str:
     """The four readings, and that no time passed."""
     short = short_float(answer.result)
     tolerance = _SINGLE if short == "float32" else TOLERANCE
@@ -95,7 +88,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Tips, course: Tips) -> li
     return f"a write changed nothing derived; forward moved the tip by {rounded(moved, 'm')}"
 
 
-def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> list[str]:
+def _all_at_once(given: Array, answer: Answer, tips: Figures, tolerance: float) -> list[str]:
     """One mistake that gives all four readings."""
     if near(given, tips.readings, tolerance):
         return []
@@ -123,7 +116,7 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
 
 
 def _why(
-    k: int, given: Array, world: ExerciseWorld, tips: Tips, course: Tips, answer: Answer
+    k: int, given: Array, world: ExerciseWorld, tips: Figures, course: Figures, answer: Answer
 ) -> str:
     """What reading k is, as far as the run shows it."""
     right, reading = tips.readings[k], given[k]
@@ -176,7 +169,7 @@ def _poses(reading: Array, model: Model, answer: Answer, away: str) -> Iterator[
     """What the last reading is, if it belongs to one of the poses that forward met."""
     place, lift = address(model), f"{LIFT} is at qpos[{address(model)}]"
     with make_data(model) as data:
-        start = Inputs(0, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy(), data.time)
+        start = inputs_of(0, data)
         for met in reversed(
             [inputs for inputs in answer.forwards if inputs.qpos.shape == (model.nq,)]
         ):

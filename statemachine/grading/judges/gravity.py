@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Array, Ints, make_data, step
+from ...interface import Array, make_data, step
 from ...measures.text import count
+from ...page import Figures
 from ..answers import Answer
 from ..calls import reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
@@ -25,29 +25,6 @@ _SPEED = "that is its speed, qvel; its position is in qpos"
 _NO_STEP = "no step was taken with the model that you got"
 
 
-@dataclass(frozen=True)
-class Fall:
-    """What is right on one world: with servos and without, for a second longer than asked for.
-
-    Attributes:
-        place: Where the joint is in qpos.
-        angles: (2, steps + 1, nq) qpos as degrees.
-        speed: (2, steps + 1) that of the joint [rad/s].
-        time: (steps + 1,) of the Data [s].
-        marks: (seconds + 1,) the steps at which whole seconds are over.
-    """
-
-    place: int
-    angles: Array
-    speed: Array
-    time: Array
-    marks: Ints
-
-    def degrees(self, limp: bool) -> Array:
-        """(seconds + 1,) the joint at whole seconds."""
-        return self.angles[int(limp), self.marks, self.place]
-
-
 def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     """The course's scene; the Moon's gravity at another timestep; a crate before the arm."""
     course = scenes.ordinary(SCENE)
@@ -59,8 +36,17 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(world: ExerciseWorld) -> Fall:
-    """The fall, with servos and without."""
+def right(world: ExerciseWorld) -> Figures:
+    """The fall, with servos and without, for a second longer than asked for.
+
+    Returns:
+        place: Where the joint is in qpos.
+        angles: (2, steps + 1, nq) qpos as degrees.
+        speed: (2, steps + 1) that of the joint [rad/s].
+        time: (steps + 1,) of the Data [s].
+        marks: (seconds + 1,) the steps at which whole seconds are over.
+        degrees: (2, seconds + 1) the joint then.
+    """
     model, (seconds,) = world.model, world.arguments
     rate, dof = round(1 / model.timestep), int(model.jnt_dofadr[model.joint_id(LIFT)])
     size = (2, (seconds + 1) * rate + 1)
@@ -72,10 +58,18 @@ def right(world: ExerciseWorld) -> Fall:
                     step(variant, data)
                 qpos[limp, k], speed[limp, k], time[k] = data.qpos, data.qvel[dof], data.time
     marks = np.arange(seconds + 1) * rate
-    return Fall(address(model), np.degrees(qpos), speed, time, marks)
+    place, angles = address(model), np.degrees(qpos)
+    return Figures(
+        place=place,
+        angles=angles,
+        speed=speed,
+        time=time,
+        marks=marks,
+        degrees=angles[:, marks, place],
+    )
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Fall, course: Fall) -> list[str] | str:
+def judge(answer: Answer, world: ExerciseWorld, right: Figures, course: Figures) -> list[str] | str:
     """Both traces in degrees; ctrl as a new Data has it; the Model as it was."""
     remarks = _left(answer)
     pair = parts(answer.result, 2, "(on, off), two lists of degrees,")
@@ -85,7 +79,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall, course: Fall) -> li
         for name, trace in zip(_NAMES, pair, strict=True)
     ]
     remarks += _command(answer)
-    falls = [right.degrees(limp) for limp in (False, True)]
+    falls = right.degrees
     if near(given[0], falls[1], TOLERANCE) and near(given[1], falls[0], TOLERANCE):
         return [*remarks, "the two lists are swapped: (on, off) is the order"]
     for limp, name in enumerate(_NAMES):
@@ -112,11 +106,16 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall, course: Fall) -> li
 
 
 def _why(
-    given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, course: Fall, answer: Answer
+    given: list[Array],
+    limp: bool,
+    world: ExerciseWorld,
+    fall: Figures,
+    course: Figures,
+    answer: Answer,
 ) -> str:
     """What a wrong list is, where one mistake gives all of its numbers."""
     mine, other = given[limp], given[not limp]
-    right = fall.degrees(limp)
+    right = fall.degrees[int(limp)]
     # The farthest, but not the start, where all is zero in any unit.
     k = int(np.argmax(np.nan_to_num(abs(mine - right), nan=np.inf)))
     figures = told_apart(mine[k], right[k], lambda value, digits: f"{value + 0.0:.{digits}g}")
@@ -157,11 +156,11 @@ def _is(given: Array, mistaken: Array, right: Array) -> bool:
 
 
 def _mistakes(
-    limp: bool, world: ExerciseWorld, fall: Fall, course: Fall, answer: Answer
+    limp: bool, world: ExerciseWorld, fall: Figures, course: Figures, answer: Answer
 ) -> Iterator[tuple[Array, str]]:
     """What typical mistakes give, and what to say of them."""
     model, place, marks = world.model, fall.place, fall.marks
-    angles, right = fall.angles[int(limp)], fall.degrees(limp)
+    angles, right = fall.angles[int(limp)], fall.degrees[int(limp)]
     yield np.radians(right), "that is radians; np.degrees(…) makes degrees of them"
     yield np.degrees(right), "degrees were made of it twice"
     for entry in set(range(model.nq)) - {place}:
@@ -175,12 +174,12 @@ def _mistakes(
     if world.where:
         loaded = "" if all(run.own for run in answer.runs) else " (it steps a model of its own)"
         yield (
-            course.degrees(limp)[: len(marks)],
+            course.degrees[int(limp)][: len(marks)],
             f"that belongs to the course's own scene, not to the model that you got{loaded}",
         )
     servos = f"the servos were {'still on' if limp else 'off already'} in this run"
-    yield fall.degrees(not limp), servos
-    yield np.radians(fall.degrees(not limp)), f"{servos}, and that is radians"
+    yield fall.degrees[1 - limp], servos
+    yield np.radians(fall.degrees[1 - limp]), f"{servos}, and that is radians"
     for nstep in dict.fromkeys(run.nstep for run in answer.runs):
         rate = nstep // (len(marks) - 1)
         if rate != marks[1] and (len(marks) - 1) * rate < len(angles):
@@ -205,7 +204,7 @@ def _goes_on(given: Array, other: Array, world: ExerciseWorld, answer: Answer) -
     )
 
 
-def _late(given: Array, limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer) -> str:
+def _late(given: Array, limp: bool, world: ExerciseWorld, fall: Figures, answer: Answer) -> str:
     """Whether the list is right for other moments, to which one of the runs came."""
     marks, timestep = fall.marks, world.model.timestep
     trace = fall.angles[int(limp), :, fall.place]
@@ -225,7 +224,7 @@ def _late(given: Array, limp: bool, world: ExerciseWorld, fall: Fall, answer: An
     return f": that is the arm {abs(offsets[0]) * timestep:g} s {word} (the first is at 0 s)"
 
 
-def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) -> str:
+def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Figures) -> str:
     """Whether it was stepped while data.time was below whole seconds, where that is a step off."""
     degrees = fall.angles[int(limp), :, fall.place]
     marks = np.searchsorted(fall.time, np.arange(len(fall.marks)))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ...interface import Array, make_data, reset
 from ...measures.text import count
+from ...page import Figures
 from ..answers import Answer, kind
 from ..calls import first_of, reason
-from ..watch import EngineRun, Nudge
+from ..watch import EngineRun, Inputs, inputs_of
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from . import address, grain, listed, near, numbers, parts, same_bits, short_float
 
@@ -20,16 +19,6 @@ _OTHER = (-0.2, -0.5, 0.4, 1.5, 1.5, 0.28)
 _STEPS = 100  # of the runs that are made to end apart
 _COUNT = ("first", "second")
 _START = 1e-9  # a keyframe's quaternion may be normalised
-
-
-@dataclass(frozen=True)
-class Start:
-    """Where both runs begin: (nq,), (nv,), and the keyframe's own time [s] and ctrl (nu,)."""
-
-    qpos: Array
-    qvel: Array
-    time: float
-    ctrl: Array
 
 
 def worlds(scenes: Scenes) -> list[ExerciseWorld]:
@@ -46,7 +35,7 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
                 f"with {what} of the second run one bit off",
                 course,
                 (np.array(_CTRL), _STEPS),
-                Nudge(place, towards, _STEPS),
+                Figures(place=place, towards=towards, after=_STEPS),
             )
             for what, place, towards in (
                 ("a joint", address(course, "elbow_flex"), np.inf),
@@ -56,14 +45,14 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(world: ExerciseWorld) -> Start:
-    """Where the runs begin."""
+def right(world: ExerciseWorld) -> Inputs:
+    """Where both runs begin, with the keyframe's own time and ctrl."""
     with make_data(world.model) as data:
         reset(world.model, data, keyframe=0)
-        return Start(data.qpos.copy(), data.qvel.copy(), data.time, data.ctrl.copy())
+        return inputs_of(0, data)
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Start, _course: Start) -> list[str] | str:
+def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) -> list[str] | str:
     """Two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")
@@ -129,7 +118,7 @@ def _memory(answer: Answer) -> list[str]:
     )
 
 
-def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> list[str]:
+def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Inputs) -> list[str]:
     """Whether there were two runs, each as it was asked for; the first fault of each kind."""
     _, nstep = world.arguments
     fault = first_of(
@@ -163,7 +152,7 @@ def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> li
     return [*(remarks | others | remarks).values()]
 
 
-def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str]:
+def _faults(run: EngineRun, world: ExerciseWorld, start: Inputs) -> dict[str, str]:
     """What is wrong with a run, by what it concerns; "" for nothing."""
     ctrl, nstep = world.arguments
     gaps = {
@@ -205,7 +194,7 @@ def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str
     }
 
 
-def _command(run: EngineRun, ctrl: Array, start: Start) -> str:
+def _command(run: EngineRun, ctrl: Array, start: Inputs) -> str:
     """What ctrl was in a run where it was not what is asked for, and why it may have been."""
     own, late = same_bits(run.start.ctrl, start.ctrl), run.ctrl_changed is not None
     had = "the keyframe's own" if own else listed(run.start.ctrl)

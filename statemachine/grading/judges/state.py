@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import operator
-from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Real
 from typing import Any
 
 from ...interface import JointType, Model, make_data, reset
 from ...measures.text import count
+from ...page import Figures
 from ..answers import Answer, kind
 from ..calls import FaultError, first_of, reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
@@ -20,14 +20,6 @@ SCENE = "so101/scene_box"
 Slot = tuple[int, int]  # from, and up to but not with
 
 
-@dataclass(frozen=True)
-class ExpectedState:
-    """What is right on one world: slots of qpos and of qvel by joint, time at keyframe 0 [s]."""
-
-    slots: dict[str, tuple[Slot, Slot]]
-    time: float
-
-
 def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     """The course's scene; a crate before the arm, and a keyframe with another time."""
     return [
@@ -36,8 +28,8 @@ def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def right(world: ExerciseWorld) -> ExpectedState:
-    """The layout, and the time."""
+def right(world: ExerciseWorld) -> Figures:
+    """The layout, slots of qpos and of qvel by joint, and the time at keyframe 0 [s]."""
     model = world.model
     # A joint's slots end where the next one's begin: without a table of what a joint has.
     owned = [
@@ -47,12 +39,10 @@ def right(world: ExerciseWorld) -> ExpectedState:
     slots = dict(zip(model.joint_names, zip(*owned, strict=True), strict=True))
     with make_data(model) as data:
         reset(model, data, keyframe=0)
-        return ExpectedState(slots, data.time)
+        return Figures(slots=slots, time=data.time)
 
 
-def judge(
-    answer: Answer, world: ExerciseWorld, right: ExpectedState, course: ExpectedState
-) -> list[str] | str:
+def judge(answer: Answer, world: ExerciseWorld, right: Figures, course: Figures) -> list[str] | str:
     """A pair of slices for every joint, and the time."""
     slots, time = parts(answer.result, 2, "(slots, time)")
     remarks = [*_names(slots, right), *_first_wrong(slots, right, world.model)]
@@ -67,7 +57,7 @@ def judge(
     return f"all {len(right.slots)} joints, {', '.join(frees)} with 7 and 6 numbers"
 
 
-def _names(slots: Any, layout: ExpectedState) -> list[str]:
+def _names(slots: Any, layout: Figures) -> list[str]:
     if not isinstance(slots, dict):
         raise FaultError(
             "slots: a dict {joint: (slice of qpos, slice of qvel)} is asked for; "
@@ -85,7 +75,7 @@ def _names(slots: Any, layout: ExpectedState) -> list[str]:
     )
 
 
-def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> list[str]:
+def _first_wrong(slots: dict[str, Any], layout: Figures, model: Model) -> list[str]:
     """The first joint with a wrong slot, and why it may be."""
     for name, right in layout.slots.items():
         if name not in slots:
@@ -116,7 +106,7 @@ def _slot(value: Any, name: str, total: int) -> Slot:
     return (start + total if start < 0 else start), (stop + total if stop < 0 else stop)
 
 
-def _why(name: str, given: list[Slot], which: int, layout: ExpectedState, model: Model) -> str:
+def _why(name: str, given: list[Slot], which: int, layout: Figures, model: Model) -> str:
     right = layout.slots[name]
     number = model.joint_id(name)
     free = int(model.jnt_type[number]) == int(JointType.FREE)

@@ -39,6 +39,7 @@ from ...interface import (
     set_state,
     step,
 )
+from ...interface.records import Arrays
 from ...measures.quantities import readings
 from ...page import Figures
 from ...processes import fresh_python, last_line
@@ -226,10 +227,10 @@ class InterfaceDriver(Driver):
 def written(*names: str) -> SaveMethod:
     """Arrays of a Data, and its time, that are written back."""
 
-    def take(data: Data) -> dict[str, Array]:
+    def take(data: Data) -> Arrays:
         return {name: np.array(getattr(data, name)) for name in names}
 
-    def give(data: Data, values: dict[str, Array]) -> None:
+    def give(data: Data, values: Arrays) -> None:
         for name, value in values.items():
             setattr(data, name, value if name in INPUTS else float(value))
 
@@ -250,7 +251,7 @@ Traces = dict[tuple[str, str], Array]
 
 
 # Of each run from the start, by layer and point; of each State, by point.
-Answer = tuple[Traces, dict[str, Array]]
+Answer = tuple[Traces, Arrays]
 
 
 def run_elsewhere(

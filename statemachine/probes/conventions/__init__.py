@@ -1,9 +1,9 @@
 """What each engine takes for granted: questions, each asked of the raw engines.
 
-A question is a `Convention`: its words, what the engines are given for it, and a function that
-lets the answer follow from what an engine did, so that one that behaved otherwise would get another
-answer. What the engine does is measured in its room (`RawEngine.measurement`). Nothing goes through
-the adapters that keep our contract. An engine whose room measures nothing is not asked.
+A question has its words, what the engines are given for it, and a function that lets the answer
+follow from what an engine did, so that one that behaved otherwise would get another answer. What
+the engine does is measured in its room (`RawEngine.measurement`). Nothing goes through the adapters
+that keep our contract. An engine whose room measures nothing is not asked.
 """
 
 from __future__ import annotations
@@ -20,26 +20,10 @@ from ...errors import check_name
 from ...installed import ENGINES, engine_version, require, silence
 from ...page import Figures
 from . import answers, frames, motion
-from .answers import NO_ANSWER, UNDECIDED, Answers, Convention, EngineAnswer, EngineQuestion
-
-__all__ = [
-    "CONCEPTS",
-    "NO_ANSWER",
-    "QUESTIONS",
-    "UNDECIDED",
-    "Answers",
-    "EngineAnswer",
-    "EngineQuestion",
-    "ask",
-    "check_engine",
-    "check_questions",
-    "probe",
-    "run_phrases",
-    "versions",
-]
+from .answers import NO_ANSWER, Answers, EngineAnswer
 
 # In the order in which a newcomer meets them.
-QUESTIONS: dict[str, Convention] = {
+QUESTIONS: dict[str, Figures] = {  # as `answers.question` gives them
     "quaternion": frames.quaternion,
     "velocity": frames.velocity,
     "gravity": motion.gravity,

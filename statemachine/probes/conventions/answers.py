@@ -10,22 +10,10 @@ import numpy as np
 
 from ...engines.measured import Futures, Measurement, ReadTwice
 from ...interface import Array
+from ...page import Figures
 
 NO_ANSWER = "–"  # the question does not arise on this engine
 UNDECIDED = "undecided"  # no hypothesis explains what was measured
-
-
-@dataclass(frozen=True)
-class EngineQuestion:
-    """A question, and the bug of a student who takes the answer for granted.
-
-    Attributes:
-        title: The question.
-        why: What goes wrong, in a sentence or two.
-    """
-
-    title: str
-    why: str
 
 
 @dataclass(frozen=True)
@@ -46,37 +34,35 @@ class EngineAnswer:
 Answers = tuple[EngineAnswer, ...]
 
 
-@dataclass(frozen=True)
-class Convention:
-    """A question, what the engines are given for it, and how an answer follows.
-
-    Attributes:
-        question: Its words.
-        given: The arguments of an engine's measurement.
-        answer: From what was measured to the answer; called, it is that.
-    """
-
-    question: EngineQuestion
-    given: tuple[Any, ...]
-    answer: Callable[[Any], Answers]
-
-
 def question(
     title: str, why: str, *given: Any
-) -> Callable[[Callable[[Any], Iterator[EngineAnswer]]], Convention]:
-    """The Convention of a function that lets its answers follow from a measurement."""
-    return lambda answers: Convention(
-        EngineQuestion(title, why), given, lambda measured: tuple(answers(measured))
+) -> Callable[[Callable[[Any], Iterator[EngineAnswer]]], Figures]:
+    """The question of a function that lets its answers follow from a measurement.
+
+    Args:
+        title: The question.
+        why: What goes wrong for a student who takes the answer for granted, in a sentence or two.
+        *given: The arguments of an engine's measurement.
+
+    Returns:
+        question: Its words, title and why.
+        given: The same.
+        answer: From what was measured to the Answers.
+    """
+    return lambda answers: Figures(
+        question=Figures(title=title, why=why),
+        given=given,
+        answer=lambda measured: tuple(answers(measured)),
     )
 
 
-def closest(distances: Mapping[str, float], part: float = 0.25) -> tuple[str, float, float]:
+def closest(distances: Mapping[str, float]) -> tuple[str, float, float]:
     """The hypothesis that explains a measurement, how far off it is, and how far the next.
 
-    It is `UNDECIDED` unless its distance is below that part of the next one's.
+    It is `UNDECIDED` unless its distance is below a quarter of the next one's.
     """
     (best, name), (following, _), *_ = sorted((off, key) for key, off in distances.items())
-    return (name if best < part * following else UNDECIDED), best, following
+    return (name if best < following / 4 else UNDECIDED), best, following
 
 
 # What an engine keeps: derived values after a write and a step, a past after a reset, a save.
