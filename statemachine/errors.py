@@ -163,6 +163,11 @@ def check_name(kind: str, name: object, known: Iterable[str]) -> None:
         raise unknown_name(kind, name, known)
 
 
+def one_line(words: object) -> str:
+    """What is said, in one line."""
+    return " ".join(str(words).split())
+
+
 def shown(value: object) -> str:
     """What somebody gave, on one line of a message."""
     text = " ".join("".join(c if c.isprintable() else " " for c in repr(value)).split())

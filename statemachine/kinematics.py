@@ -20,8 +20,9 @@ from .installed import require
 from .interface import Array, Model
 from .interface.options import as_numbers, as_vector
 from .models import AnyPath, resolve
+from .page import Figures
 from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz
-from .witness import Segment, WitnessModel, read_file, read_numbers
+from .witness import Segment, read_file, read_numbers
 
 Kind = Literal["site", "body"]
 
@@ -83,9 +84,7 @@ class Kinematics:
         kinematics._hold(pin, model.path, read_numbers(pin, compiled, *names), None)
         return kinematics
 
-    def _hold(
-        self, pin: Any, path: Path, read: WitnessModel, joint_names: Sequence[str] | None
-    ) -> None:
+    def _hold(self, pin: Any, path: Path, read: Figures, joint_names: Sequence[str] | None) -> None:
         self._pin: Any = pin
         self.path: Path = path
         self.version: str = pin.__version__
@@ -247,7 +246,7 @@ def shared_joints(kinematics: Kinematics, names: Sequence[str]) -> list[int]:
     return [number for number, name in enumerate(names) if name in own]
 
 
-def _in_order(read: WitnessModel, wanted: Sequence[str], path: Path) -> list[Segment]:
+def _in_order(read: Figures, wanted: Sequence[str], path: Path) -> list[Segment]:
     """The joints as segments of a qpos that lists them in the order `wanted`."""
     in_file = [name for name, _ in read.joints]
     if list(wanted) == in_file:

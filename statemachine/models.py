@@ -23,6 +23,7 @@ from .errors import (
     ModelError,
     ModelFileError,
     check_name,
+    one_line,
     refuse,
     shown,
     unknown_name,
@@ -142,7 +143,7 @@ def _need_network(name: str, url: str) -> None:
 
 
 def _not_had(name: str, error: object) -> ModelFileError:
-    reason = " ".join(str(error).split()) or type(error).__name__
+    reason = one_line(error) or type(error).__name__
     return ModelFileError(
         f"{name} is not on this machine and could not be downloaded ({reason[:200]}). Without a "
         "network give the path of a model file, or a folder with --menagerie"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import fcntl
 import io
 import itertools
@@ -37,9 +36,10 @@ from statemachine.errors import BadInputError, StateMachineError
 from statemachine.lessons import LESSONS, PATH, module, template, worlds
 from statemachine.lessons._falling import summed
 from statemachine.lessons.in_turns import Ratio
-from statemachine.lessons.session import CodeRun, Taken, load_line, page_of_lesson, take
+from statemachine.lessons.session import CodeRun, load_line, page_of_lesson, take
 from statemachine.page import (
     Code,
+    Figures,
     Heading,
     Page,
     Printed,
@@ -77,7 +77,7 @@ _QUICK = {
 }
 
 
-def _take(name: str, backend: str, **options: Any) -> tuple[Page, Taken]:
+def _take(name: str, backend: str, **options: Any) -> tuple[Page, Figures]:
     lesson = LESSONS[name]
     taken = take(
         lesson, sm.load(lesson.model, backend=backend), backend, _QUICK.get(name, {}) | options
@@ -87,7 +87,9 @@ def _take(name: str, backend: str, **options: Any) -> tuple[Page, Taken]:
 
 def _repage(name: str, backend: str, result: Any) -> Page:
     """The page of a result that was changed."""
-    return page_of_lesson(LESSONS[name], {backend: Taken(result, "", "", arm=True)})
+    return page_of_lesson(
+        LESSONS[name], {backend: Figures(result=result, code="", printed="", arm=True)}
+    )
 
 
 def test_the_path_has_ten_lessons_in_the_order_of_the_course() -> None:
@@ -483,9 +485,9 @@ def test_a_slide_is_printed_in_millimetres_and_a_reset_tells_its_own_time(tmp_pa
 
 def test_the_second_engine_is_named_after_what_follows_the_load() -> None:
     line = f"model = {load_line('so101', 'mujoco', 'robots')}.replace(timestep=0.01)"
-    taken = dataclasses.replace(
-        take(LESSONS["reset"], sm.load("so101"), "mujoco"),
-        code=f"import statemachine as sm\n\n{line}\n",
+    taken = Figures(
+        **vars(take(LESSONS["reset"], sm.load("so101"), "mujoco"))
+        | {"code": f"import statemachine as sm\n\n{line}\n"}
     )
     page = page_of_lesson(LESSONS["reset"], {"mujoco": taken, "other": taken})
     (shown,) = blocks(page, Code)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 import random
@@ -23,12 +22,11 @@ import pytest
 import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
 from statemachine.measures import Gap
+from statemachine.page import Figures
 from statemachine.runs import record, write
 from statemachine.view.live import Command, Live, Tempo
 from statemachine.view.session import (
-    EnginePose,
     LiveSession,
-    Snapshot,
     TraceSession,
     controls_of,
 )
@@ -259,13 +257,13 @@ class Hand:
 
     def __init__(self) -> None:
         self.asked: list[Command] = []
-        self.shown: list[tuple[Snapshot, Tempo, str]] = []
+        self.shown: list[tuple[Figures, Tempo, str]] = []
 
     def commands(self) -> Sequence[Command]:
         taken, self.asked = self.asked, []
         return taken
 
-    def show(self, frame: Snapshot, pace: Tempo, note: str) -> None:
+    def show(self, frame: Figures, pace: Tempo, note: str) -> None:
         self.shown.append((frame, pace, note))
 
 
@@ -284,7 +282,7 @@ class Slow(LiveSession):
         self.clock.now += self.cost * count
 
 
-def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Snapshot, Tempo, str]:
+def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Figures, Tempo, str]:
     """What is shown after some turns, of which the first obeys these commands."""
     hand.asked += asked
     for _ in range(turns):
@@ -363,12 +361,18 @@ def test_commands_are_obeyed_in_their_order() -> None:
 
 
 def test_the_readout_says_what_the_frame_says() -> None:
-    pose = EnginePose(
-        "mujoco", np.zeros((1, 3)), np.zeros((1, 4)), np.array([0.1, -0.02, 0.3]), np.zeros(1)
-    )
-    ghost = dataclasses.replace(pose, name="pybullet", tip=np.array([0.1, -0.02, 0.3015]))
+    pose = Figures(name="mujoco", tip=np.array([0.1, -0.02, 0.3]))
+    ghost = Figures(name="pybullet", tip=np.array([0.1, -0.02, 0.3015]))
     joint = Gap(math.radians(2.5), "rad", "elbow")
-    frame = Snapshot(1.25, 250, True, np.zeros(1), 1, (pose, ghost), 0.0015, joint)
+    frame = Figures(
+        time=1.25,
+        steps=250,
+        running=True,
+        poses=(pose, ghost),
+        tips_apart=0.0015,
+        joint_apart=joint,
+        trouble="",
+    )
     assert dict(readout(frame, Tempo(1.0, 0.997, False), "tip")).items() >= {
         ("time", "1.250 s"),
         ("steps", "250"),
@@ -379,7 +383,7 @@ def test_the_readout_says_what_the_frame_says() -> None:
     }
     assert "0.50 ×" in dict(readout(frame, Tempo(2.0, 0.5, True), "tip"))["pace"]
     assert warning(frame, "a note") == "a note"
-    stopped = Snapshot(1.25, 250, False, np.zeros(1), 1, (pose,), trouble="mujoco: it blew up")
+    stopped = Figures(**vars(frame) | {"running": False, "trouble": "mujoco: it blew up"})
     assert dict(readout(stopped, Tempo(1, None, False), ""))["pace"] == "paused"
     assert warning(stopped, "") == "mujoco: it blew up. Reset to go on."
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from itertools import combinations, product
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..interface import Array, Contacts
+from ..page import Figures
 from ..rotations import matrix_from_quat
 from . import _dense as dense
 from ._contact_rules import bodies_meet, mixed
@@ -28,25 +28,11 @@ _MOST = 10.0  # PyBullet's largest friction of a pair
 _CLOSE = 0.01  # a friction is the model's if it is within this part of it
 
 
-@dataclass(frozen=True)
-class Solid:
-    """What touches as one: geoms of a body that meet the same, or one plane.
-
-    Attributes:
-        part: A body's solids, numbered.
-    """
-
-    body: int
-    geoms: tuple[int, ...]
-    plane: bool
-    part: int = 0
-
-
 class Surfaces:
     """The solids of a model.
 
     Attributes:
-        solids: All that can touch; planes first.
+        solids: All that can touch, see `_solids`; planes first.
         touching: (ngeom,) which geoms may touch any other.
         pairs: Of two solids, by their places, whether they meet.
         meeting: The geoms that do, two by two.
@@ -81,7 +67,7 @@ class Surfaces:
         self.differences += several
 
     def _label(self, i: int, j: int) -> str:
-        def name(solid: Solid) -> str:
+        def name(solid: Figures) -> str:
             if solid.plane:
                 return self._raw.geom(solid.geoms[0]).name or f"the plane (geom {solid.geoms[0]})"
             return self._raw.body(solid.body).name or f"body {solid.body}"
@@ -148,16 +134,27 @@ def _meets(raw: mujoco.MjModel) -> NDArray[np.bool_]:
 
 def _solids(
     raw: mujoco.MjModel, meets: NDArray[np.bool_], touching: NDArray[np.bool_]
-) -> list[Solid]:
-    """Geoms of a body that meet the same are one solid."""
+) -> list[Figures]:
+    """Geoms of a body that meet the same are one solid.
+
+    Returns:
+        body: That they are of.
+        geoms: Which they are.
+        plane: Whether it is a plane, and not what touches as one.
+        part: A body's solids, numbered.
+    """
     planes = touching & (raw.geom_type == PLANE)
-    solids = [Solid(int(raw.geom_bodyid[g]), (int(g),), True) for g in np.flatnonzero(planes)]
+    solids = [
+        Figures(body=int(raw.geom_bodyid[g]), geoms=(g,), plane=True, part=0)
+        for g in np.flatnonzero(planes).tolist()
+    ]
     for body in range(raw.nbody):
         alike: dict[bytes, list[int]] = {}
         for geom in np.flatnonzero(touching & ~planes & (raw.geom_bodyid == body)).tolist():
             alike.setdefault(meets[geom].tobytes(), []).append(geom)
         solids += [
-            Solid(body, tuple(geoms), False, part) for part, geoms in enumerate(alike.values())
+            Figures(body=body, geoms=tuple(geoms), plane=False, part=part)
+            for part, geoms in enumerate(alike.values())
         ]
     return solids
 

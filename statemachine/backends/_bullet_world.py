@@ -18,6 +18,7 @@ import numpy as np
 
 from ..installed import silence
 from ..interface import Array
+from ..page import Figures
 from ..rotations import INVERSE, matrix_from_quat, wxyz_from_xyzw, xyzw_from_wxyz
 from ..rotations import times as quat_times
 from . import _bullet_urdf as urdf
@@ -33,7 +34,6 @@ from ._bullet_client import (
     times,
     turned,
 )
-from ._bullet_contacts import Solid
 from ._bullet_plan import Plan
 from ._hidden_world import HiddenWorld
 from .compiled import gravity
@@ -259,7 +259,7 @@ class World:
                     physicsClientId=self.client,
                 )
 
-    def solids(self) -> Iterator[tuple[int, int, Solid]]:
+    def solids(self) -> Iterator[tuple[int, int, Figures]]:
         """PyBullet's body and link of all that can touch, in the order of the surfaces."""
         links = {}
         for tree in self.trees:

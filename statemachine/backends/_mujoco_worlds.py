@@ -15,10 +15,11 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
+from ..errors import one_line
 from ..interface import Array, Ints, Model, State
 from ..interface.options import check_vector, engine_steps, unsupported
 from ..interface.records import Errors, StateLayout
-from ..interface.worlds import WRITABLE, Worlds, check_memory
+from ..interface.worlds import WRITABLE, Worlds, check_memory, without
 from ._delays import hold, places_of, with_room_of
 from ._mujoco_alarms import (
     FATAL,
@@ -81,7 +82,7 @@ class MujocoWorlds(Worlds):
         except (MemoryError, mujoco.FatalError) as error:
             raise gave_up(error) from error
         except ValueError as error:  # what a Batch cannot do
-            raise unsupported(model, "worlds", " ".join(str(error).split())) from error
+            raise unsupported(model, "worlds", one_line(error)) from error
         self._batch, self._base = batch, base
         self._varied = bool(varied[0])
         # (n, nactuator) commands that each world keeps; None where all keep as many.
@@ -132,12 +133,11 @@ class MujocoWorlds(Worlds):
         if self.model._quaternions:
             qpos = self.qpos if len(ids) == self.n else self.qpos[ids]
             errors.update(self._zero_quaternions(qpos, ids))
-            if errors:
-                ids = ids[~np.isin(ids, list(errors))]
+            ids = without(ids, errors)
         self._before[:] = self._changing
         errors |= self._call(ids, count, lambda some: self._batch.step(some, count))
         if forward:
-            errors |= self._forward(ids[~np.isin(ids, list(errors))] if errors else ids)
+            errors |= self._forward(without(ids, errors))
         return errors
 
     def _forward(self, ids: Ints) -> Errors:
@@ -164,7 +164,7 @@ class MujocoWorlds(Worlds):
             for world in error.ids.tolist():
                 errors[world] = gave_up(self._batch.error(world))
         except ValueError as error:  # a callback in Python
-            raise unsupported(self.model, "worlds", " ".join(str(error).split())) from error
+            raise unsupported(self.model, "worlds", one_line(error)) from error
         if (self._warned != self._told).any():
             errors.update(self._attend(count))
         return errors
@@ -262,8 +262,7 @@ class MujocoWorlds(Worlds):
             if ctrl is not None:
                 self.ctrl[ids] = ctrl[ids, k]
             errors.update(self._step(ids, every, False))
-            if errors:
-                ids = ids[~np.isin(ids, list(errors))]
+            ids = without(ids, errors)
             for name, array in arrays.items():
                 array[ids, k] = getattr(self, name)[ids]
         return errors
@@ -278,7 +277,7 @@ class MujocoWorlds(Worlds):
             it is of. These are back where they were.
         """
         zero = list(self._zero_quaternions(self.qpos[ids], ids))
-        able = ids[~np.isin(ids, zero)]
+        able = without(ids, zero)
         if not len(able):
             return ids
         every_one = len(able) == self.n
@@ -297,7 +296,7 @@ class MujocoWorlds(Worlds):
         except SimulationError as error:
             redo[error.ids] = True
         except ValueError as error:  # a callback in Python
-            raise unsupported(self.model, "worlds", " ".join(str(error).split())) from error
+            raise unsupported(self.model, "worlds", one_line(error)) from error
         redo |= (self._warned != self._told).any(axis=(1, 2))
         if not every_one:
             for name, array in arrays.items():

@@ -24,7 +24,7 @@ from xml.sax.saxutils import escape, unescape
 import mujoco
 import numpy as np
 
-from ..errors import EngineWarning, ModelError, shown
+from ..errors import EngineWarning, ModelError, one_line, shown
 from ..interface import Array, Ints, JointType, Keyframe
 from ..interface.options import HUGE, TINY
 from ..measures import ctrl_owners
@@ -87,7 +87,7 @@ def compile_file(path: AnyPath) -> mujoco.MjModel:
             spec = spec_with_packages(Path(text))
             raw = spec.compile() if spec else mujoco.MjModel.from_xml_path(text)
     except (ValueError, MemoryError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split()) or "out of memory"
+        reason = one_line(error) or "out of memory"
         if missing := re.search(r"opening file '(.*)'", reason):
             place = Path(text).absolute().parent / Path(missing[1]).parent
             reason += f"; it is looked for in {place}: copy that folder along with the model"

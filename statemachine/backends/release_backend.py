@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -24,6 +24,7 @@ from ..interface import Capabilities
 from ..interface.options import unsupported
 from ..interface.records import Arrays, Defaults
 from ..models import AnyPath
+from ..page import Figures
 from ..releases import engine_of, is_release, python_of, version_of
 from . import _release_child as child
 from ._edits import put
@@ -97,31 +98,20 @@ def served(
     return load_there
 
 
-def _opened(reading: FileReading, edits: Mapping[str, Any], server: Server) -> int:
+def _opened(reading: Figures, edits: Mapping[str, Any], server: Server) -> int:
     """The number that the model of a file with some fields edited has there."""
     return _loaded(server, reading.model, edits, digest=reading.digest)[0]["model"]
 
 
-class FileReading(NamedTuple):
-    """What an engine makes of a file.
+def _compiled(engine: ServedEngine, installed: MujocoModel) -> Figures:
+    """What an engine makes of a file that the installed release has compiled.
 
-    Attributes:
+    Returns:
         engine: That read it.
         version: Of the engine.
         model: In the installed release's terms.
         shared: Names of the fields that both have.
         digest: Of what was read, by which a file that changed since then is seen.
-    """
-
-    engine: ServedEngine
-    version: str
-    model: MujocoModel
-    shared: frozenset[str]
-    digest: str
-
-
-def _compiled(engine: ServedEngine, installed: MujocoModel) -> FileReading:
-    """What an engine makes of a file that the installed release has compiled.
 
     Raises:
         ModelError: It cannot read the file, or finds other parts in it.
@@ -155,12 +145,12 @@ def _compiled(engine: ServedEngine, installed: MujocoModel) -> FileReading:
         names = [own for flag in set_there for own in child.SPLIT.get(flag, (flag,))]
         setattr(*child.held(raw, name), sum(int(kinds[own]) for own in names if own in kinds))
     check_numbers(raw, f"{path} in {title}")
-    return FileReading(
-        engine,
-        answer["version"],
-        MujocoModel(raw, path, installed.substeps),
-        frozenset(shared),
-        answer["digest"],
+    return Figures(
+        engine=engine,
+        version=answer["version"],
+        model=MujocoModel(raw, path, installed.substeps),
+        shared=frozenset(shared),
+        digest=answer["digest"],
     )
 
 
@@ -201,7 +191,7 @@ def _field(raw: mujoco.MjModel, name: str) -> Any:
     return getattr(*child.held(raw, name))
 
 
-def _edits(reading: FileReading, raw: mujoco.MjModel) -> dict[str, Any]:
+def _edits(reading: Figures, raw: mujoco.MjModel) -> dict[str, Any]:
     """Fields of a compiled model that are another than those of the file; flags by their names.
 
     Raises:
@@ -225,15 +215,15 @@ def _edits(reading: FileReading, raw: mujoco.MjModel) -> dict[str, Any]:
 class ServedModel(HiddenModel):
     """What an engine in a Python of its own makes of a file, with what was edited in it."""
 
-    _reading: FileReading
+    _reading: Figures
     _inner: MujocoModel
     _own: Capabilities | None
 
     def __init__(
         self,
-        reading: FileReading,
+        reading: Figures,
         capabilities: Capabilities | None = None,
-        inner: MujocoModel | None = None,
+        inner: Any = None,
     ) -> None:
         inner = inner or reading.model
         engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner

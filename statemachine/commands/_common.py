@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from .. import errors
 from ..errors import (
     BadInputError,
     MissingEngineError,
@@ -36,7 +37,7 @@ def one_line(text: object) -> str:
 
     A name may come from a file that somebody else made.
     """
-    return "".join(c if c.isprintable() else "?" for c in " ".join(str(text).split()))
+    return "".join(c if c.isprintable() else "?" for c in errors.one_line(text))
 
 
 @contextmanager

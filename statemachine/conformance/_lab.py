@@ -35,30 +35,28 @@ from ..probes.audit.interface_driver import InterfaceDriver
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
 
+def _model(name: str) -> cached_property[Model]:
+    return cached_property(lambda lab: load(name, backend=lab.backend))
+
+
 class Lab(ExitStack):
     """Models of one backend, compiled when first used, and Data.
 
     `close`, at the end of a check, gives back all Data that were made so far; the Models stay.
+
+    Attributes:
+        arm: The arm alone, floating over nothing.
+        scene: The arm on a floor.
+        box: The arm, a floor and a free box; keyframe 0 holds it, keyframe 1 has it lie.
     """
 
     def __init__(self, backend: str) -> None:
         super().__init__()
         self.backend = backend
 
-    @cached_property
-    def arm(self) -> Model:
-        """The arm alone, floating over nothing."""
-        return load("so101", backend=self.backend)
-
-    @cached_property
-    def scene(self) -> Model:
-        """The arm on a floor."""
-        return load("so101/scene", backend=self.backend)
-
-    @cached_property
-    def box(self) -> Model:
-        """The arm, a floor and a free box; keyframe 0 holds it, keyframe 1 has it lie."""
-        return load("so101/scene_box", backend=self.backend)
+    arm = _model("so101")
+    scene = _model("so101/scene")
+    box = _model("so101/scene_box")
 
     def data(self, model: Model, keyframe: int | None = None) -> Data:
         """A new Data, closed when the lab is."""

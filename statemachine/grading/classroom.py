@@ -13,6 +13,7 @@ from ..errors import BadInputError, StateMachineError
 from ..models import AnyPath
 from ..processes import checked_jobs
 from ..processes.parallel import in_parallel
+from ..runs.drive import Progress, silent
 from ..runs.whole import replace_csv
 from . import score
 from .calls import reason
@@ -213,7 +214,7 @@ def judge_all(
     jobs: int | None = None,
     table: Path | None = None,
     tests: bool = False,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Progress = silent,
 ) -> list[ClassEntry]:
     """Judge every submission, several at once.
 
@@ -260,8 +261,7 @@ def judge_all(
 
         def kept(judged: Mapping[str, ClassEntry]) -> list[ClassEntry]:
             """The entries so far in their order, of which the table is made."""
-            both = {**entries, **judged}
-            in_order = [both[name] for name in work if name in both]
+            in_order = [judged[name] for name in work if name in judged]
             if table is not None:
                 replace_csv(table, rows_of(in_order))
             return in_order
@@ -273,6 +273,7 @@ def judge_all(
                 judge.stop.set,
                 lambda waiting: progress(1 - waiting / len(submitted)),
                 kept,
+                entries,
             )
         )
 

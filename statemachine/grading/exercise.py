@@ -28,6 +28,7 @@ from ..models import AnyPath
 from ..page import Figures
 from ..processes.parallel import in_parallel, unwinding
 from ..releases import is_release
+from ..runs.drive import Progress, silent
 from .judges import JUDGES, Judgement, judge_of, judged
 from .recording import (
     LARGEST,
@@ -93,7 +94,7 @@ def run(
     file: AnyPath,
     backend: str = DEFAULT,
     time_limit: float = TIME_LIMIT,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Progress = silent,
     wall_limit: float = WALL_LIMIT,
     folder: Path | None = None,
 ) -> Figures:
@@ -164,7 +165,7 @@ class ExerciseJudge(ExitStack):
     def judge(
         self,
         file: AnyPath,
-        progress: Callable[[float], None] = lambda _: None,
+        progress: Progress = silent,
         own: Mapping[str, Path] | None = None,
     ) -> Figures:
         """Judge each function of a student's file.
@@ -193,9 +194,7 @@ class ExerciseJudge(ExitStack):
             self.limits.wall,
         )
 
-    def _all(
-        self, copy: _Copy, folder: Path, progress: Callable[[float], None]
-    ) -> tuple[Judgement, ...]:
+    def _all(self, copy: _Copy, folder: Path, progress: Progress) -> tuple[Judgement, ...]:
         """All functions at once, so that the slowest decides how long it takes."""
         stop = threading.Event()
         work: dict[str, Callable[[], Any]] = {

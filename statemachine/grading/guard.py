@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from ..errors import one_line
 from ..models import models_dir
 
 # What no exercise needs, by the name of the audit event, and in words.
@@ -137,7 +138,7 @@ def main(job_file: str) -> None:
         folder.mkdir()
         worlds = judge_of(job["function"]).worlds(Scenes(job["backend"], folder))
     except Exception as error:
-        say("refused", kind=type(error).__name__, text=" ".join(str(error).split()))
+        say("refused", kind=type(error).__name__, text=one_line(error))
         return
     from ..processes.sandbox import limit_cpu
     from .calls import FaultError, answers_of_file

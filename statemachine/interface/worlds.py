@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -41,6 +41,11 @@ if TYPE_CHECKING:
 BATCHED = (*POSES, "qacc", *FORCES)  # the derived arrays that worlds can keep
 WRITABLE = (*INPUTS, *MOCAP, "time")
 _SPARE = 0.95  # of the memory that is free, what worlds may take
+
+
+def without(ids: Ints, ended: Collection[int]) -> Ints:
+    """Numbers of worlds, less those that have ended."""
+    return ids[~np.isin(ids, list(ended))] if ended else ids
 
 
 class Worlds(Closable, ABC):

@@ -16,6 +16,7 @@ from ..probes import conventions
 from ..runs.drive import Progress
 from ..runs.robot import hold_ctrl
 from ._robot import Tip, read_derived, read_stored
+from .template import Results
 
 _STORED = (*INPUTS, "time")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
@@ -154,7 +155,7 @@ def _change_rows(changes: Sequence[Figures]) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def lag_tables(results: Mapping[str, Figures]) -> list[Any]:
+def lag_tables(results: Results) -> list[Any]:
     """To which moment belongs what a step leaves behind, by backend."""
     return [
         Table(

@@ -11,7 +11,7 @@ from ..measures.text import degrees, listed, millimetres, vector
 from ..page import Figures, Items, Page, Table
 from ..witness import OWN_READING
 from . import template
-from .template import by_engine, differences
+from .template import Results, by_engine, differences
 
 _SHOWN = 12  # rows of a table of tips
 _ROWS: Mapping[str, Callable[[Figures], str]] = {
@@ -25,7 +25,7 @@ _ROWS: Mapping[str, Callable[[Figures], str]] = {
 }
 
 
-def page(results: Mapping[str, Figures]) -> Page:
+def page(results: Results) -> Page:
     """Frames first, then the differences."""
     first = next(iter(results.values()))
     single = len(first.tips) == 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -26,8 +25,8 @@ from ._stages import (
     own_answers,
     own_tables,
 )
-from .session import CodeRun
-from .template import differences, emulated
+from .session import CodeRun, Options
+from .template import Results, differences, emulated
 
 _SECONDS = 2.0  # under a command, long enough to touch something
 _INSIDE = 1e-3  # metres; less is how engines press things together
@@ -35,7 +34,7 @@ _Pairs = tuple[tuple[int, int], ...]
 _CHOICES: dict[_Pairs, int] = {((0, 1),): 0, ((1, 2),): 1, ((2, 3),): 2, ((1, 3),): 3}
 
 
-def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+def fit(model: Model, options: Options) -> dict[str, Any]:
     """A joint of this robot, a value in its range, and what the joint carries."""
     values = with_joint(model, options)
     if values["site"] is None:
@@ -43,7 +42,7 @@ def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """The four readings."""
     slot = coordinate(model, options["joint"]).slot  # or says what is wrong with it
     tip = tips_of(model, options["site"])[0]
@@ -66,7 +65,7 @@ print(4, {read}.round(4))
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Read the fingertip at each print; then what else was asked for.
 
     Returns:
@@ -116,7 +115,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figure
     )
 
 
-def _steps(model: Model, options: Mapping[str, Any]) -> int:
+def _steps(model: Model, options: Options) -> int:
     """Over how many steps to look at the lag; 0 if it is not asked for."""
     seconds = _SECONDS if options["lag"] and options["seconds"] is None else options["seconds"]
     return 0 if seconds is None else steps_in(model, seconds)
@@ -158,7 +157,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
+def tables(results: Results, first: Figures) -> dict[str, Any]:
     """The four readings; then what was asked for."""
     digits = 3 if len(results) > 1 else 4  # so that two columns fit
     readings = Table(

@@ -20,8 +20,8 @@ from ..runs.robot import is_the_arm, start_keyframe, touching
 from ..runs.scenarios import SCENARIOS
 from ._falling import BALANCE, PARTS, Droop, droop, milestones
 from ._robot import carried_by_joint, check_servos, coordinate, start_line, with_joint
-from .session import CodeRun, stepping_loop
-from .template import differences, emulated, largest_gap, where
+from .session import CodeRun, Options, stepping_loop
+from .template import Results, differences, emulated, largest_gap, where
 
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
 # The first that is paid is taken; each is a row of the longer ones.
@@ -31,7 +31,7 @@ _CREEP = 0.05  # of the way; a joint that goes on by more has not settled
 _FURTHER = 0.02  # rad or m; less is not worth a cause
 
 
-def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+def fit(model: Model, options: Options) -> dict[str, Any]:
     """The joint, and times that a model with slow steps can be run for."""
     check_servos(model, "gravity", options["joint"])
     values = with_joint(model, options, servos=True)
@@ -44,7 +44,7 @@ def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """The same seconds with the servos on and off; ctrl is never written."""
     at = coordinate(model, options["joint"])
     seconds = steps_in(model, options["seconds"]) * model.timestep  # refuses what is not a time
@@ -69,7 +69,7 @@ for variant in (model, limp):
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Watch both runs; then the servos off for longer, with and without anything to touch.
 
     Returns:
@@ -196,7 +196,7 @@ def _own_motors(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
+def tables(results: Results, first: Figures) -> dict[str, Any]:
     """The course of the joint, the balance of forces at its end, and the longer runs."""
     runs = {
         f"{where(results, name)}{state}": run

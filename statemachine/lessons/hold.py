@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,8 +20,8 @@ from ..runs.header import model_digest, provenance
 from ..runs.robot import command, hold_ctrl, is_servo, start_keyframe, touching, trees_of_actuators
 from ..runs.scenarios import SCENARIOS
 from ._robot import check_servos, start_line
-from .session import CodeRun, stepping_loop
-from .template import differences, largest_gap, where
+from .session import CodeRun, Options, stepping_loop
+from .template import Results, differences, largest_gap, where
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
@@ -31,7 +30,7 @@ _AT_GOAL = np.radians(0.1)  # rad, or m
 OLDER = "mujoco==3.3.7"  # its servos damp where their force is at its limit, too
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """One command, and where the robot is then."""
     check_servos(model, "hold")
     target = options["target"]
@@ -50,7 +49,7 @@ data = sm.make_data(model)
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Watch the way to the command; then the same with nothing to touch.
 
     Returns:
@@ -186,7 +185,7 @@ def _farthest(result: Figures, gaps: Array) -> str:
     return f"{result.joints[joint]}, by {position(gap, result.slides[joint])}"
 
 
-def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
+def tables(results: Results, first: Figures) -> dict[str, Any]:
     """The worst joint over time, the pose at the end, and the way of each joint."""
     end = float(first.time[-1])
     clipped = not np.array_equal(first.target, first.goal)
@@ -224,7 +223,7 @@ def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
     }
 
 
-def _row(results: Mapping[str, Figures], time: float) -> tuple[str, ...]:
+def _row(results: Results, time: float) -> tuple[str, ...]:
     cells = [f"{time:.3f} s"]
     for result in results.values():
         k = int(np.argmin(np.abs(result.time - time)))
@@ -233,7 +232,7 @@ def _row(results: Mapping[str, Figures], time: float) -> tuple[str, ...]:
     return tuple(cells)
 
 
-def _curves(results: Mapping[str, Figures], slide: bool, scale: float) -> dict[str, Any]:
+def _curves(results: Results, slide: bool, scale: float) -> dict[str, Any]:
     """How far each joint is from its goal; those that are slides, or the others."""
     return {
         f"{where(results, name)}{joint}": (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Any
 
@@ -18,8 +18,8 @@ from ..page import Figures
 from ..runs.drive import Progress, part_of
 from ..runs.header import provenance
 from .in_turns import in_turns
-from .session import CodeRun
-from .template import by_engine, differences
+from .session import CodeRun, Options
+from .template import Results, by_engine, differences
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 _TIMES = 5  # repetitions; the median counts
@@ -27,7 +27,7 @@ _STEPS = 200  # of each Data
 _WORLDS_MOST = 100
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """Two Data of one Model, of which one is stepped."""
     worlds = as_count(options["worlds"], "worlds")
     if not 2 <= worlds <= _WORLDS_MOST:
@@ -44,7 +44,7 @@ print(round(data.time, 6), round(other.time, 6))
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Time the parts, then let several Data of the Model step in turn.
 
     Returns:
@@ -132,7 +132,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
+def tables(results: Results, _first: Figures) -> dict[str, Any]:
     """What each part costs."""
     costs = {
         "load: the file, once": lambda r: duration(r.loading),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from ..errors import BadInputError
@@ -13,7 +12,7 @@ from ..runs.drive import Progress, part_of
 from ..runs.header import provenance
 from ..runs.robot import is_the_arm
 from . import LESSONS, module
-from .session import CodeRun, take
+from .session import CodeRun, Options, take
 
 # The lessons that answer, one for each question, with options for little to do.
 ASKED: dict[str, dict[str, Any]] = {
@@ -26,7 +25,7 @@ ASKED: dict[str, dict[str, Any]] = {
 }
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """None: the code of the lessons has been shown."""
     if not is_the_arm(model):
         raise BadInputError(
@@ -35,7 +34,7 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     return ""
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Take each of the lessons that answer: what they measured, by their names."""
     play()
     model, answers = play.model, {}

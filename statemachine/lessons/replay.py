@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,11 +19,11 @@ from ..runs.drive import Progress, part_of
 from ..runs.header import provenance
 from ..runs.robot import body_pairs, command, is_the_arm
 from ._two_runs import BREAKS, broken, broken_table, growth, of_its_own, through_us, ways_back
-from .session import CodeRun
-from .template import by_engine, differences
+from .session import CodeRun, Options
+from .template import Results, by_engine, differences
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """Two runs from the keyframe, compared.
 
     With a way to break them, the second run differs: "extra-step" takes one step more before
@@ -67,7 +67,7 @@ print(np.array_equal(first, second), abs(first - second).max())
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Watch both runs; then play the code that breaks them, and theirs with half the timestep.
 
     Returns:
@@ -141,7 +141,7 @@ def _poses(runs: Sequence[Figures], nstep: int) -> list[Array]:
     return [np.array(course.qpos[-nstep - 1 :]) for course in runs]
 
 
-def _finer(model: Model, options: Mapping[str, Any], end: Array) -> Figures | None:
+def _finer(model: Model, options: Options, end: Array) -> Figures | None:
     """Determinism is not truth: half the timestep replays as exactly, and ends elsewhere."""
     try:
         finer = model.replace(timestep=model.timestep / 2)
@@ -178,7 +178,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
+def tables(results: Results, first: Figures) -> dict[str, Any]:
     """Equal or not, what touched on the way, and the ways back."""
     gaps = {name: result.difference for name, result in results.items()}
     bodies = {name: result.apart for name, result in results.items()}

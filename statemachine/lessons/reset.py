@@ -14,14 +14,14 @@ from ..runs.drive import Progress
 from ..runs.header import provenance
 from ..runs.robot import body_pairs, carried_by, moved_by_actuators
 from ._robot import read_derived, read_stored
-from .session import CodeRun
-from .template import differences, emulated
+from .session import CodeRun, Options
+from .template import Results, differences, emulated
 
 _STEPS = 100  # before the reset, and after it
 _WATCHED = 600  # steps under the keyframe's own ctrl
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """Change everything, reset, and reset to the first keyframe, if there is one."""
     to_keyframe = """\
 sm.reset(model, data, keyframe=0)
@@ -40,7 +40,7 @@ print(data.time, data.qpos[1:3])
 {to_keyframe if model.keyframes else ""}"""
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Look at the Data after each line; go on with it from each keyframe, and after a reset.
 
     Returns:
@@ -158,7 +158,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
+def tables(results: Results, first: Figures) -> dict[str, Any]:
     """What each keyframe shows, and what becomes of it."""
     return {
         "keyframes": [

@@ -9,7 +9,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
@@ -22,6 +22,8 @@ from ..probes.calls import record, recorded_engines, statements
 from ..runs.drive import Progress, silent, steps_in
 from ..runs.robot import is_the_arm, warn_of_start
 from . import Lesson, module, template
+
+Options = Mapping[str, Any]  # of a lesson, by key
 
 
 class CodeRun(ExitStack):
@@ -139,34 +141,16 @@ class CodeRun(ExitStack):
         return list(courses.values())
 
 
-@dataclass(frozen=True)
-class Taken:
-    """A lesson on one backend.
-
-    Attributes:
-        result: What its module measured, and its provenance.
-        code: As it was typed; printed: what it printed.
-        arm: Whether it was taken on an SO-101, which is what its text is about.
-        calls: What the engine was made to do by it, if that was to be recorded and can be.
-    """
-
-    result: Figures
-    code: str
-    printed: str
-    arm: bool
-    calls: Figures | None = None
-
-
 def take(
     lesson: Lesson,
     model: Model,
     backend: str,
-    options: Mapping[str, Any] | None = None,
+    options: Options | None = None,
     name: str | None = None,
     menagerie: str | None = None,
     progress: Progress = silent,
     calls: bool = False,
-) -> Taken:
+) -> Figures:
     """Run the code of a lesson, and what else the lesson looks at.
 
     Args:
@@ -179,6 +163,12 @@ def take(
         progress: Told the fraction that is done.
         calls: Whether to run the code once more, recording what it makes the engine do, if the
             engine's room can tell.
+
+    Returns:
+        result: What its module measured, and its provenance.
+        code: As it was typed; printed: what it printed.
+        arm: Whether it was taken on an SO-101, which is what its text is about.
+        calls: What the engine was made to do by it, if that was to be recorded and can be.
     """
     values = fitted(lesson, model, options or {})
     lesson_module = module(lesson.name)
@@ -187,17 +177,19 @@ def take(
         result = lesson_module.run(play, values, progress)
     engine = backend_engine(backend) or backend
     recorded = record(code, engine) if calls and engine in recorded_engines() else None
-    return Taken(result, code, play.printed, is_the_arm(model), recorded)
+    return Figures(
+        result=result, code=code, printed=play.printed, arm=is_the_arm(model), calls=recorded
+    )
 
 
-def fitted(lesson: Lesson, model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+def fitted(lesson: Lesson, model: Model, options: Options) -> dict[str, Any]:
     """All options of a lesson; what is left open is what the Model suggests."""
     values = lesson.defaults | dict(options)
     fit = getattr(module(lesson.name), "fit", None)
     return fit(model, values) if fit else values
 
 
-def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
+def page_of_lesson(lesson: Lesson, taken: Mapping[str, Figures]) -> Page:
     """The page of a lesson that was taken on one backend or several."""
     first, *others = taken
     code = taken[first].code

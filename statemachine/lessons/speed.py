@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..backends import load as load_model
@@ -14,15 +14,15 @@ from ..page import Figures
 from ..runs.drive import Progress
 from ..runs.header import provenance
 from .in_turns import Ratio, in_turns
-from .session import CodeRun
-from .template import by_engine, differences
+from .session import CodeRun, Options
+from .template import Results, by_engine, differences
 
 _ROUNDS = 20
 _MOST = 20_000  # steps of a call or a round; between two the progress moves and Ctrl-C is heard
 _BULK, _AGAIN, _LOOP, _OWN = "in bulk", "in bulk again", "step by step", "as it comes"
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """The same steps by the clock, both ways, once."""
     steps = as_count(options["steps"], "steps")
     full, rest = divmod(steps, _MOST)
@@ -54,7 +54,7 @@ for name, seconds in (
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Measure the same steps again with the code's own functions, in rounds, the ways in turns.
 
     Returns:
@@ -122,7 +122,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
+def tables(results: Results, _first: Figures) -> dict[str, Any]:
     """Times and factors; they are this machine's, now."""
     times: dict[str, Callable[[Figures], str]] = {
         "in bulk": lambda r: _cell(r, r.bulk),

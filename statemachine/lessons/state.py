@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from ..engines import room
@@ -11,14 +10,14 @@ from ..measures.text import grouped, listed
 from ..page import Figures, Slots, Table
 from ..runs.drive import Progress
 from ..runs.header import provenance
-from .session import CodeRun
-from .template import differences
+from .session import CodeRun, Options
+from .template import Results, differences
 
 NO_NAME = "(no name)"
 _SIZES = ("nq", "nv", "nu", "nbody")
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """Sizes, and the slots of each joint."""
     return f"""\
 import statemachine as sm
@@ -30,7 +29,7 @@ for j, name in enumerate(model.joint_names):
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Read the layout off the Model, and the time off a Data at keyframe 0.
 
     Returns:
@@ -93,7 +92,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
+def tables(results: Results, first: Figures) -> dict[str, Any]:
     """Sizes, and who owns which slots; engines that say the same share a table."""
     sizes = [
         (name, *(str(getattr(layout, size)) for size in _SIZES)) for name, layout in results.items()

@@ -30,9 +30,10 @@ from ..installed import ENGINES
 from ..interface import Array
 from ..measures import largest
 from ..measures.text import apart, milliseconds, short_time
-from ..page import Block, Heading, Items, Page, Question, Table, Text, Verdict
+from ..page import Block, Figures, Heading, Items, Page, Question, Table, Text, Verdict
 from ..releases import engine_of
 
+Results = Mapping[str, Figures]  # of a lesson, by backend
 _CONDITION = re.compile(r"<!-- (?:if (?P<no>not )?(?P<name>\w+)|(?P<other>else)|end) -->")
 _PARTS = re.compile(r"^(?:[a-h]\)|>|-) ", re.MULTILINE)  # choices, a reason, items of a list
 _MARKED = re.compile(r"([?✓]) (\w+): (.*)", re.DOTALL)

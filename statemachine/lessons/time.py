@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,20 +13,20 @@ from ..measures.text import count, duration
 from ..page import Figures
 from ..runs.drive import Progress, steps_in
 from ..runs.header import provenance
-from .session import CodeRun
-from .template import by_engine
+from .session import CodeRun, Options
+from .template import Results, by_engine
 
 _NAP = 0.2  # s
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """A loop that does not wait; with --realtime one that does."""
     total = _steps(model, options)
     return _paced(total, load) if options["realtime"] else _free(total, load)
 
 
-def _steps(model: Model, options: Mapping[str, Any]) -> int:
+def _steps(model: Model, options: Options) -> int:
     seconds = options["seconds"]
     if seconds is not None and not options["realtime"]:
         raise BadInputError("--seconds goes with --realtime")
@@ -67,7 +66,7 @@ print(f"{{data.time:.3f}} s simulated in {{wall:.3f}} s")
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Watch the loop that is typed, and the other of the two on another Data.
 
     Returns:
@@ -146,7 +145,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
+def tables(results: Results, first: Figures) -> dict[str, Any]:
     """Both loops by the clock."""
     rows = {
         "not waiting": lambda r: f"{duration(r.free)}, {r.factor:.3g} × real time",

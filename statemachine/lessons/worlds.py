@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from ..backends import load as load_model
@@ -20,8 +20,8 @@ from ..runs.drive import Progress, part_of
 from ..runs.header import provenance
 from ..worlds import make_worlds, reset, step
 from .in_turns import Ratio, in_turns
-from .session import CodeRun
-from .template import by_engine
+from .session import CodeRun, Options
+from .template import Results, by_engine
 
 _ROUNDS = 5
 _ROUND = 0.04  # s that each way takes in a round, about
@@ -31,7 +31,7 @@ _LOADS, _MANY, _FEW = 3, 200, 2
 _CAUTION = 3  # a world may take that many times the memory that one Data was measured to take
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """Some worlds by the clock, once."""
     as_count(options["most"], "most")
     return f"""\
@@ -55,7 +55,7 @@ for n in (1, 4):
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Measure what is made, then the steps of more and more worlds.
 
     Returns:
@@ -191,7 +191,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], _first: Figures) -> dict[str, Any]:
+def tables(results: Results, _first: Figures) -> dict[str, Any]:
     """What is made once, what each world costs, and how that goes with their number."""
     made = {
         "load a model": lambda r: duration(r.load),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,13 +25,13 @@ from ..page import Figures, Table
 from ..runs.drive import Progress
 from ..runs.header import provenance
 from ._robot import coordinate, read_derived, with_joint
-from .session import CodeRun
-from .template import emulated
+from .session import CodeRun, Options
+from .template import Results, emulated
 
 fit = with_joint  # a joint of this robot, and a value in its range
 
 
-def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Options, load: str) -> str:
     """A name for the array, a copy of it, and a write."""
     slot = coordinate(model, options["joint"]).slot  # or says what is wrong with it
     value = as_scalar(options["value"], "value")
@@ -50,7 +49,7 @@ print(data.qpos[slot], copy[slot], view is data.qpos)
 """
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Figures:
+def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     """Look who notices the write; then go on with the Data that was written.
 
     Returns:
@@ -144,7 +143,7 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Mapping[str, Figures], first: Figures) -> dict[str, Any]:
+def tables(results: Results, first: Figures) -> dict[str, Any]:
     """What is refused."""
     return {
         "refused": Table(

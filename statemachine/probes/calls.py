@@ -18,7 +18,7 @@ from typing import Any
 
 from ..engines import room, rooms_with
 from ..engines.call_watch import NEW, CallWatch, WatchedObject
-from ..errors import BadInputError, StateMachineError, check_name
+from ..errors import BadInputError, StateMachineError, check_name, one_line
 from ..installed import engine_version, require
 from ..interface import Model
 from ..page import Figures
@@ -209,7 +209,7 @@ def record(code: str, engine: str) -> Figures:
                 with redirect_stdout(out):
                     run(namespace)
             except StateMachineError as refusal:
-                error = " ".join(str(refusal).split())
+                error = one_line(refusal)
             done.append(recorder.end(source, line, out.getvalue(), namespace))
             if error is not None:
                 break

@@ -28,7 +28,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing import get_context
-from types import FrameType
+from types import FrameType, MappingProxyType
 from typing import Any, TypeVar
 
 from . import ALONE, checked_jobs, end_with_parent
@@ -51,6 +51,7 @@ def in_parallel(
     stop: Callable[[], object],
     progress: Callable[[int], None] = lambda _left: None,
     ended: Callable[[dict[str, T]], object] = lambda _results: None,
+    known: Mapping[str, T] = MappingProxyType({}),
 ) -> dict[str, T]:
     """Do all of it, in threads that wait for processes.
 
@@ -60,11 +61,12 @@ def in_parallel(
         stop: Called once at the end, or when something is raised: what still runs must end then.
         progress: Told every moment how many are still waited for.
         ended: Called here as each ends, with the results so far.
+        known: Results that are there already, of what is done anew or not at all.
 
     Returns:
         The results by name, in the order in which they came.
     """
-    results: dict[str, T] = {}
+    results = dict(known)
     with ThreadPoolExecutor(jobs) as pool:
         try:
             waiting = {pool.submit(call): name for name, call in work.items()}
@@ -249,7 +251,7 @@ def _shared(
     numbers: Sequence[int], jobs: int, ended: Callable[[], None], limit: float
 ) -> dict[int, tuple[BaseException | None, Any]]:
     """The error or the result of what forks did, by number; until nothing comes for `limit` [s]."""
-    pool = ProcessPoolExecutor(min(jobs, len(numbers)), get_context("fork"), _settle)
+    pool = ProcessPoolExecutor(min(jobs, len(numbers)), get_context("fork"), settle)
     futures: dict[Future[Any], int] = {}
     try:
         with sigint_blocked(), warnings.catch_warnings():
@@ -278,8 +280,8 @@ def _shared(
     return outcomes
 
 
-def _settle() -> None:
-    """In a fork nothing is shown, and it ends with its parent."""
+def settle() -> None:
+    """In a process of ours nothing is shown, and it ends with its parent."""
     faulthandler.disable()
     nothing = open(os.devnull, "r+", encoding="utf-8")  # noqa: SIM115  (until it ends)
     sys.stdout = sys.stderr = nothing

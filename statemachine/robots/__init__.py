@@ -18,7 +18,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
@@ -27,6 +27,7 @@ from .. import __version__
 from ..errors import MissingEngineError, refuse
 from ..installed import DEFAULT, ENGINES, engine_version, require
 from ..models import SUFFIXES, AnyPath
+from ..page import Figures
 from ..processes import ALONE, checked_jobs, fresh_python, sandbox
 from ..processes.parallel import in_parallel, unwinding
 from ..runs.drive import Progress, silent
@@ -37,7 +38,6 @@ from .records import BackendRow, ExaminedModel, RunGap, Survey, WitnessRow, read
 __all__ = [
     "BackendRow",
     "ExaminedModel",
-    "ModelFile",
     "RunGap",
     "Survey",
     "WitnessRow",
@@ -53,28 +53,17 @@ _BINARY = ".mjb"
 _START = 65536  # bytes in which a file that is not XML may say what it was meant to be
 
 
-@dataclass(frozen=True)
-class ModelFile:
-    """A file that is a model, or a part of one.
-
-    Attributes:
-        name: What it is called in the table.
-        path: Where it is.
-        sha256: Digest of it and of what it includes; "" where it cannot be read.
-        part_of: The first file found that includes it; "" for none.
-    """
-
-    name: str
-    path: Path
-    sha256: str
-    part_of: str = ""
-
-
-def find(paths: Sequence[AnyPath]) -> list[ModelFile]:
+def find(paths: Sequence[AnyPath]) -> list[Figures]:
     """The models among files and folders, in an order that does not change.
 
     In a folder, and in all below it, each MJCF and URDF is one; a binary model must be named.
     A file without bodies, itself or in what it includes, is left out.
+
+    Returns:
+        name: What it is called in the table.
+        path: Where it is.
+        sha256: Digest of it and of what it includes; "" where it cannot be read.
+        part_of: The first file found that includes it; "" for none.
 
     Raises:
         BadInputError: A path is not there, or nothing is found at all.
@@ -97,7 +86,12 @@ def find(paths: Sequence[AnyPath]) -> list[ModelFile]:
             for part in list(model_files(file))[1:]:  # what it includes
                 owners.setdefault(part.resolve(), name)
     return [
-        ModelFile(name, file.absolute(), _digest(file), owners.get(place, ""))
+        Figures(
+            name=name,
+            path=file.absolute(),
+            sha256=_digest(file),
+            part_of=owners.get(place, ""),
+        )
         for place, (name, file) in files.items()
     ]
 
@@ -152,7 +146,7 @@ _MEMORY = 8 * sandbox.GB  # address space, of which engines reserve far more tha
 
 
 def examine_all(
-    models: Sequence[ModelFile],
+    models: Sequence[Figures],
     *,
     quick: bool = False,
     seconds: float = SECONDS,
@@ -203,15 +197,14 @@ def examine_all(
 
     def kept(examined: Mapping[str, ExaminedModel | None]) -> list[ExaminedModel]:
         """The rows so far in their order, of which the table is made."""
-        both = {**rows, **examined}
-        in_order = [row for model in models if (row := both.get(model.name))]  # None: stopped
+        in_order = [row for model in models if (row := examined.get(model.name))]  # None: stopped
         if table is not None:
             write_table(table, in_order)
         return in_order
 
     with unwinding():
         examined = in_parallel(
-            work, jobs, stop.set, lambda left: progress(1 - left / max(1, len(models))), kept
+            work, jobs, stop.set, lambda left: progress(1 - left / max(1, len(models))), kept, rows
         )
     done = kept(examined)
     return Survey(
@@ -232,7 +225,7 @@ def _made_with(quick: bool, seed: int) -> str:
 
 
 def _examined(
-    model: ModelFile,
+    model: Figures,
     made_with: str,
     *,
     quick: bool,

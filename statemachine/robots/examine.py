@@ -25,6 +25,7 @@ from ..errors import (
     ModelError,
     StateMachineError,
     UnsupportedError,
+    one_line,
 )
 from ..installed import DEFAULT, WITNESS, require
 from ..interface import Model, make_data, reset, step
@@ -105,7 +106,7 @@ class _Examination:
             self._fault(f"{name}: {type(error).__name__}: {error}")
 
     def _fault(self, words: str) -> None:
-        self.row = replace(self.row, faults=(*self.row.faults, _line(words)[:300]))
+        self.row = replace(self.row, faults=(*self.row.faults, one_line(words)[:300]))
 
     def _put(self, backend: str, **facts: Any) -> None:
         row = replace(self.row.backends.get(backend, BackendRow()), **facts)
@@ -127,10 +128,10 @@ class _Examination:
                 except MissingEngineError:
                     raise
                 except StateMachineError as error:
-                    facts[f"refusal{case}"] = _line(error)
+                    facts[f"refusal{case}"] = one_line(error)
                     facts.setdefault("features", _features(error))
                 except Exception as error:
-                    refusal = facts[f"refusal{case}"] = _line(f"{type(error).__name__}: {error}")
+                    refusal = facts[f"refusal{case}"] = one_line(f"{type(error).__name__}: {error}")
                     self._fault(f"loading, {backend}: {refusal}")
             facts[f"warnings{case}"] = self._of_its_own(backend, caught)
         self._put(backend, **facts)
@@ -140,7 +141,7 @@ class _Examination:
     ) -> tuple[str, ...]:
         """Warnings of a backend that the default one did not give, too, each once."""
         texts = [
-            _line(warning.message)
+            one_line(warning.message)
             for warning in caught
             if issubclass(warning.category, EngineWarning)
         ]
@@ -195,7 +196,7 @@ class _Examination:
         try:
             record_scenario(scenario(name), model, seconds=_SHORT * model.timestep, seed=self.seed)
         except (BadInputError, UnsupportedError) as error:  # it says that it makes no sense here
-            return _line(error)
+            return one_line(error)
         return RUNS
 
     def _cost(self, model: Model) -> float | None:
@@ -225,16 +226,11 @@ def _witness_row(model: Model, seed: int) -> WitnessRow:
     try:
         certificate = certify(model, poses=_POSES, seed=seed)
     except StateMachineError as error:
-        return WitnessRow(refusal=_line(error))
+        return WitnessRow(refusal=one_line(error))
     gap = certificate.position_worst
     if gap is None:  # its frame is another one than the engine's
         gap = float("inf") if certificate.frames is None else certificate.frames.distance
     return WitnessRow(certificate.grade, certificate.reason, len(certificate.tips), gap)
-
-
-def _line(words: object) -> str:
-    """What is said, in one line."""
-    return " ".join(str(words).split())
 
 
 def _features(error: StateMachineError) -> tuple[str, ...]:

@@ -324,36 +324,25 @@ def _count(value: Any) -> bool:
 
 
 _KINDS: dict[str, Callable[[Any], bool]] = {
-    "nq": _count,
-    "nv": _count,
-    "nu": _count,
-    "nmocap": _count,
-    "substeps": _count,
+    **dict.fromkeys(("nq", "nv", "nu", "nmocap", "substeps"), _count),
     "timestep": lambda value: isinstance(value, float) and 0 < value < 1e6,
-    "experiment": _text,
-    "says": _text,
-    "command": _text,
+    **dict.fromkeys(("experiment", "says", "command", "energy_by", "ended"), _text),
     "defaults": lambda value: value in ("model", "engine"),
     "options": lambda value: (
         isinstance(value, dict) and all(_option(name, each) for name, each in value.items())
     ),
     "keyframe": lambda value: value is None or _text(value),
     "gravity": lambda value: _tuple_of(_finite)(value) and len(value) == 3,
-    "joints": _tuple_of(_text),
-    "sites": _tuple_of(_text),
-    "bodies": _tuple_of(_text),
-    "geoms": _tuple_of(_text),
-    "actuators": _tuple_of(_text),
-    "jnt_type": _tuple_of(_integer),
-    "jnt_qposadr": _tuple_of(_integer),
-    "jnt_dofadr": _tuple_of(_integer),
-    "geom_bodyid": _tuple_of(_integer),
-    "body_parentid": _tuple_of(_integer),
-    "actuator_jntid": _tuple_of(_integer),
+    **dict.fromkeys(("joints", "sites", "bodies", "geoms", "actuators"), _tuple_of(_text)),
+    **dict.fromkeys(
+        (
+            *("jnt_type", "jnt_qposadr", "jnt_dofadr"),
+            *("geom_bodyid", "body_parentid", "actuator_jntid"),
+        ),
+        _tuple_of(_integer),
+    ),
     "ctrlrange": _tuple_of(lambda row: _tuple_of(_number)(row) and len(row) == 2),
-    "energy_by": _text,
     "rewritten": _integer,
-    "ended": _text,
     "single": lambda value: isinstance(value, bool),
 }
 _OF_PROVENANCE: dict[str, Callable[[Any], bool]] = {

@@ -146,21 +146,19 @@ def record(
 def layout_of(model: Model) -> dict[str, Any]:
     """What a header says of a model: lengths, names, and where everything is."""
     return {
-        "nq": model.nq,
-        "nv": model.nv,
-        "nu": model.nu,
-        "nmocap": model.nmocap,
+        **{name: getattr(model, name) for name in ("nq", "nv", "nu", "nmocap")},
         "joints": model.joint_names,
         "sites": model.site_names,
         "bodies": model.body_names,
         "geoms": model.geom_names,
         "actuators": model.actuator_names,
-        "jnt_type": tuple(int(kind) for kind in model.jnt_type),
-        "jnt_qposadr": tuple(model.jnt_qposadr.tolist()),
-        "jnt_dofadr": tuple(model.jnt_dofadr.tolist()),
-        "geom_bodyid": tuple(model.geom_bodyid.tolist()),
-        "body_parentid": tuple(model.body_parentid.tolist()),
-        "actuator_jntid": tuple(model.actuator_jntid.tolist()),
+        **{
+            name: tuple(getattr(model, name).tolist())
+            for name in (
+                *("jnt_type", "jnt_qposadr", "jnt_dofadr"),
+                *("geom_bodyid", "body_parentid", "actuator_jntid"),
+            )
+        },
         "ctrlrange": tuple(tuple(row) for row in model.actuator_ctrlrange.tolist()),
     }
 

@@ -32,7 +32,7 @@ from ..page import Figures
 from ..processes import checked_jobs
 from ..processes.parallel import unwinding, worker_processes
 from ..runs.drive import Progress, silent
-from .design import Design, DesignPoint, Vary
+from .design import Design, Vary
 from .folder import check_folder, design_of, locked, read_manifest, settle_manifest
 from .prepare import prepared
 from .request import PreparedSweep, Sweep, SweepCell
@@ -42,7 +42,6 @@ from .worker import Row, differing, row_of, run_batch
 __all__ = [
     "COLUMNS",
     "Design",
-    "DesignPoint",
     "PreparedSweep",
     "Sweep",
     "Vary",

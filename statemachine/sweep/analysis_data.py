@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..errors import BadInputError
 from ..interface import Array, Ints
 from ..page import Figures
-from .design import Design, DesignPoint
+from .design import Design
 from .rows import DONE, require_parquet
 
 _RESAMPLES = 400
@@ -61,7 +61,7 @@ class SweepData:
 
     sides: tuple[str, str]
     design: Design
-    points: tuple[DesignPoint, ...]
+    points: tuple[Figures, ...]
     runs: Runs
     gaps: Mapping[str, Array]
     failed: Mapping[str, int]

@@ -20,6 +20,7 @@ import numpy as np
 from ..errors import BadInputError, refuse, shown, unknown_name
 from ..installed import require_extra
 from ..interface import Array, JointType
+from ..page import Figures
 
 Kind = Literal["model", "option", "state", "parameter"]
 Value = bool | float | str
@@ -257,19 +258,6 @@ def _kind(vary: Vary, options: Collection[str], parameters: Collection[str]) -> 
 
 
 @dataclass(frozen=True)
-class DesignPoint:
-    """One setting of everything that is varied.
-
-    Attributes:
-        id: A digest of the values.
-        values: One for each `Vary`, in their order.
-    """
-
-    id: str
-    values: tuple[Value, ...]
-
-
-@dataclass(frozen=True)
 class Design:
     """What points a sweep has.
 
@@ -322,13 +310,18 @@ class Design:
         count = blocks * self.samples if self.sampled else 1
         return count * math.prod(len(vary.values) for vary in self.listed)
 
-    def points(self) -> Iterator[DesignPoint]:
-        """Every point; the samples change slowest."""
+    def points(self) -> Iterator[Figures]:
+        """Every point; the samples change slowest.
+
+        Yields:
+            id: A digest of the values.
+            values: One for each `Vary`, in their order.
+        """
         names = [vary.label for vary in self.factors]
         for drawn in map(iter, self._drawn()):
             choices = [vary.values or (next(drawn),) for vary in self.factors]
             for values in itertools.product(*choices):
-                yield DesignPoint(digest(dict(zip(names, values, strict=True))), values)
+                yield Figures(id=digest(dict(zip(names, values, strict=True))), values=values)
 
     def _drawn(self) -> list[list[Value]]:
         """The values of each sample, block by block; one without any where nothing is sampled."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import faulthandler
 import functools
-import os
 import signal
 import sys
 import threading
@@ -24,14 +23,14 @@ import numpy as np
 from .. import __version__
 from ..backends import load, on_default
 from ..compare.perturbed import nudged_controller, nudged_start
-from ..errors import BadInputError, StateMachineError, TimedOutError
+from ..errors import BadInputError, StateMachineError, TimedOutError, one_line
 from ..installed import DEFAULT, silence
 from ..interface import Array, Data, Model, forward, make_data, reset
 from ..interface.records import usual_site
 from ..measures import ContactNames
 from ..measures.text import listed
 from ..models import resolve
-from ..processes import end_with_parent
+from ..processes.parallel import settle
 from ..runs.controllers import function_file
 from ..runs.drive import check_length, drive, steps_in
 from ..runs.header import model_digest
@@ -69,18 +68,15 @@ def run_batch(ready: PreparedSweep, cells: Sequence[SweepCell], own: bool) -> li
 @functools.cache
 def _settle() -> None:
     """Once in a process of our own: nothing it prints is shown, and it ends with its driver."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):
-        os.dup2(nowhere, stream)
+    settle()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it was not kept from it already
-    end_with_parent()
 
 
 def row_of(ready: PreparedSweep, cell: SweepCell, error: BaseException | None = None) -> Row:
     """What every row of a cell has, and of one that failed what happened."""
     failed = {} if error is None else {
         "error_class": type(error).__name__,
-        "error": " ".join(str(error).split()) or type(error).__name__,
+        "error": one_line(error) or type(error).__name__,
     }  # fmt: skip
     return {
         "cell": cell.id,

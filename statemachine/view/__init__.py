@@ -8,14 +8,11 @@ knows viser, and `server` says who may look at it.
 from __future__ import annotations
 
 from .live import Live
-from .session import Control, EnginePose, LiveSession, Session, Snapshot, TraceSession
+from .session import LiveSession, Session, TraceSession
 
 __all__ = [
-    "Control",
-    "EnginePose",
     "Live",
     "LiveSession",
     "Session",
-    "Snapshot",
     "TraceSession",
 ]

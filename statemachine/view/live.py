@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..errors import StateMachineError
-from .session import Session, Snapshot
+from ..page import Figures
+from .session import Session
 
 RATE = 40.0  # frames in a second of the clock
 _MOST_LAG = 0.25  # seconds behind the clock that may still be caught up
@@ -42,7 +43,7 @@ class Front(Protocol):
         """What was asked for since the last time, in order."""
         ...
 
-    def show(self, frame: Snapshot, pace: Tempo, note: str) -> None:
+    def show(self, frame: Figures, pace: Tempo, note: str) -> None:
         """A moment, how fast time goes, and what was wrong with the last command."""
 
 

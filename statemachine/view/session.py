@@ -9,7 +9,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +25,8 @@ from ..interface import (
     step,
     usual_site,
 )
-from ..measures import Gap, distances, joint_gap
+from ..measures import distances, joint_gap
+from ..page import Figures
 from ..runs import Trace
 
 SLOWEST, FASTEST = 0.001, 1000.0
@@ -34,76 +34,12 @@ _STEPS_MOST = 100_000  # of one press of a button
 _EQUAL = 1e-6  # seconds between moments that count as the same
 
 
-@dataclass(frozen=True)
-class Control:
-    """A slider.
-
-    Attributes:
-        name: Of the actuator.
-        low: Least value, in `unit`; high: the greatest.
-        unit: ° for the aim of a hinge's servo, mm for a slide's, else nothing.
-        scale: What one `unit` is in the actuator's own unit [rad, m, N·m …].
-    """
-
-    name: str
-    low: float
-    high: float
-    unit: str
-    scale: float
-
-
-@dataclass(frozen=True, eq=False)
-class EnginePose:
-    """Where one engine has everything.
-
-    Attributes:
-        name: Of the engine.
-        xpos: (nbody, 3) [m]; xquat: (nbody, 4) wxyz.
-        tip: (3,) the fingertip [m]; None if the model has no site.
-        qpos: (nq,) in MuJoCo's layout.
-    """
-
-    name: str
-    xpos: Array
-    xquat: Array
-    tip: Array | None
-    qpos: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Snapshot:
-    """One moment.
-
-    Attributes:
-        time: Simulated time [s].
-        steps: Steps taken since the start or the last reset.
-        running: Whether time goes on by itself.
-        ctrl: (nu,) the commands [unit of the actuator].
-        resets: How often the commands were replaced by others than the sliders'.
-        poses: Of each engine; what is drawn solid comes first.
-        tips_apart: Between the fingertips of two engines [m]; None without two, or without a site.
-        joint_apart: Of the hinge or slide that differs most, among hinges if there are any; None
-            without two engines, or without such a joint.
-        trouble: Why it cannot go on, in a sentence; or "".
-    """
-
-    time: float
-    steps: int
-    running: bool
-    ctrl: Array
-    resets: int
-    poses: tuple[EnginePose, ...]
-    tips_apart: float | None = None
-    joint_apart: Gap | None = None
-    trouble: str = ""
-
-
 class Session(ABC):
     """What is shown, paused at first: where every frame of a viewer comes from.
 
     Attributes:
         names: Of the engines.
-        controls: A slider for each actuator.
+        controls: A slider for each actuator, see `controls_of`.
         places: Where `reset` can go: names of the keyframes, by number.
         timestep: Simulated time of a step [s].
         tip: The site that stands for the fingertip, or "".
@@ -113,7 +49,7 @@ class Session(ABC):
         steps: Steps taken since the start or the last reset.
     """
 
-    controls: tuple[Control, ...] = ()
+    controls: tuple[Figures, ...] = ()
     places: tuple[str, ...] = ()
     length: float | None = None
 
@@ -195,12 +131,28 @@ class Session(ABC):
         """
 
     @abstractmethod
-    def frame(self) -> Snapshot:
-        """This moment."""
+    def frame(self) -> Figures:
+        """This moment.
+
+        Returns:
+            time: Simulated time [s].
+            steps: Steps taken since the start or the last reset.
+            running: Whether time goes on by itself.
+            ctrl: (nu,) the commands [unit of the actuator].
+            resets: How often the commands were replaced by others than the sliders'.
+            poses: Of each engine its `name`, `xpos` (nbody, 3) [m], `xquat` (nbody, 4) wxyz, `tip`
+                (3,) the fingertip [m], None if the model has no site, and `qpos` (nq,) in MuJoCo's
+                layout; what is drawn solid comes first.
+            tips_apart: Between the fingertips of two engines [m]; None without two, or without a
+                site.
+            joint_apart: Of the hinge or slide that differs most, among hinges if there are any;
+                None without two engines, or without such a joint.
+            trouble: Why it cannot go on, in a sentence; or "".
+        """
 
     def _snapshot(
-        self, time: float, ctrl: Array, poses: tuple[EnginePose, ...], same: bool = True
-    ) -> Snapshot:
+        self, time: float, ctrl: Array, poses: tuple[Figures, ...], same: bool = True
+    ) -> Figures:
         """A frame; how far two engines are apart is known if their moments are the same."""
         tips, joint = None, None
         if same and len(poses) > 1:
@@ -208,8 +160,16 @@ class Session(ABC):
             if left.tip is not None and right.tip is not None:
                 tips = float(distances(left.tip, right.tip))
             joint = joint_gap(*self._joints, left.qpos, right.qpos)
-        return Snapshot(
-            time, self.steps, self.running, ctrl, self._resets, poses, tips, joint, self._trouble
+        return Figures(
+            time=time,
+            steps=self.steps,
+            running=self.running,
+            ctrl=ctrl,
+            resets=self._resets,
+            poses=poses,
+            tips_apart=tips,
+            joint_apart=joint,
+            trouble=self._trouble,
         )
 
 
@@ -259,7 +219,7 @@ class LiveSession(Session, ExitStack):
         self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
         self._arms: list[tuple[Model, Data]] = []
         # The last moment that was good: its time and the poses.
-        self._good: tuple[float, tuple[EnginePose, ...]] = 0.0, ()
+        self._good: tuple[float, tuple[Figures, ...]] = 0.0, ()
         try:
             for model in models:
                 self._arms.append((model, self.enter_context(make_data(model))))
@@ -285,7 +245,7 @@ class LiveSession(Session, ExitStack):
         self._trouble, self.steps = "", 0
         self._resets += 1
 
-    def frame(self) -> Snapshot:
+    def frame(self) -> Figures:
         """This moment; after an engine failed, the last one that was good.
 
         Looking changes nothing: the run goes on as if nobody had looked.
@@ -296,11 +256,10 @@ class LiveSession(Session, ExitStack):
         time, poses = self._good
         return self._snapshot(time, np.array(self._arms[0][1].ctrl), poses)
 
-    def _pose(self, model: Model, data: Data) -> EnginePose:
+    def _pose(self, model: Model, data: Data) -> Figures:
         tip = None if self._site is None else np.array(data.site_xpos[self._site])
-        return EnginePose(
-            model.backend, np.array(data.xpos), np.array(data.xquat), tip, np.array(data.qpos)
-        )
+        arrays = {name: np.array(getattr(data, name)) for name in ("xpos", "xquat", "qpos")}
+        return Figures(name=model.backend, tip=tip, **arrays)
 
     def _all_do(self, verb: Callable[[Model, Data], None]) -> bool:
         """Call a verb on every engine; whether there is no trouble, now or before."""
@@ -382,15 +341,15 @@ class TraceSession(Session):
         """To the start."""
         self.steps = 0
 
-    def frame(self) -> Snapshot:
+    def frame(self) -> Figures:
         """This row of the first trace, and what the other has nearest to its time."""
         now = self._times[0][self.steps]
         rows = [int(np.abs(time - now).argmin()) for time in self._times]
         poses = []
         for trace, name, row in zip(self._traces, self.names, rows, strict=True):
             tip = None if self._site is None else trace["site_xpos"][row, self._site]
-            where = trace["xpos"][row], trace["xquat"][row], tip, trace.qpos[row]
-            poses.append(EnginePose(name, *where))
+            arrays = {column: trace[column][row] for column in ("xpos", "xquat", "qpos")}
+            poses.append(Figures(name=name, tip=tip, **arrays))
         first = self._traces[0]
         # Moments that are not the same say nothing about the engines.
         same = abs(self._times[-1][rows[-1]] - now) < _EQUAL
@@ -406,8 +365,15 @@ def checked_speed(speed: float) -> float:
     return float(speed)
 
 
-def controls_of(model: Model) -> tuple[Control, ...]:
-    """A slider for each actuator, over its range; over its joint's where it has none."""
+def controls_of(model: Model) -> tuple[Figures, ...]:
+    """A slider for each actuator, over its range; over its joint's where it has none.
+
+    Returns:
+        name: Of the actuator.
+        low: Least value, in `unit`; high: the greatest.
+        unit: ° for the aim of a hinge's servo, mm for a slide's, else nothing.
+        scale: What one `unit` is in the actuator's own unit [rad, m, N·m …].
+    """
     controls = []
     for index, name in enumerate(model.actuator_names):
         low, high = model.actuator_ctrlrange[index].tolist()
@@ -423,6 +389,13 @@ def controls_of(model: Model) -> tuple[Control, ...]:
                 low, high = model.jnt_range[joint].tolist()
         if not math.isfinite(high - low):
             low, high = -spare, spare
-        label = name or f"actuator {index}"
-        controls.append(Control(label, low / scale, high / scale, unit, scale))
+        controls.append(
+            Figures(
+                name=name or f"actuator {index}",
+                low=low / scale,
+                high=high / scale,
+                unit=unit,
+                scale=scale,
+            )
+        )
     return tuple(controls)

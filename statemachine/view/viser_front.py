@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..drawing import Drawing, Part
 from ..drawing.scene import Camera
 from ..measures.text import millimetres, position, short_time
+from ..page import Figures
 from .live import Command, Tempo
-from .session import FASTEST, SLOWEST, Session, Snapshot
+from .session import FASTEST, SLOWEST, Session
 
 _GHOST = (0.20, 0.45, 0.95)  # the second engine, seen through
 _OPACITY = 0.45
@@ -60,7 +61,7 @@ class ViserFront:
         """What was asked for since the last time."""
         return [self._asked.get_nowait() for _ in range(self._asked.qsize())]
 
-    def show(self, frame: Snapshot, pace: Tempo, note: str) -> None:
+    def show(self, frame: Figures, pace: Tempo, note: str) -> None:
         """Move the bodies, and what stands beside them."""
         with self._server.atomic():
             for bodies, pose in zip(self._frames, frame.poses, strict=True):
@@ -194,14 +195,14 @@ class ViserFront:
         self._on(slider.on_update, asked)
         self._sliders.append(slider)
 
-    def _follow(self, frame: Snapshot) -> None:
+    def _follow(self, frame: Figures) -> None:
         """Put the sliders to commands that did not come from them."""
         for index, slider in enumerate(self._sliders):
             scale = self._session.controls[index].scale
             shown = _round(float(frame.ctrl[index]) / scale, slider.step)
             slider.value = min(max(shown, slider.min), slider.max)
 
-    def _say(self, frame: Snapshot, pace: Tempo, note: str) -> None:
+    def _say(self, frame: Figures, pace: Tempo, note: str) -> None:
         now = time.monotonic()
         if frame.running and now - self._when < _SPAN:
             return  # nobody reads faster
@@ -230,7 +231,7 @@ class ViserFront:
         listen(put)
 
 
-def readout(frame: Snapshot, pace: Tempo, tip: str) -> list[tuple[str, str]]:
+def readout(frame: Figures, pace: Tempo, tip: str) -> list[tuple[str, str]]:
     """Rows of a name and a value that stand beside the picture of one moment.
 
     Args:
@@ -256,7 +257,7 @@ def readout(frame: Snapshot, pace: Tempo, tip: str) -> list[tuple[str, str]]:
     return [(name, text) for name, text in rows if text]
 
 
-def _pace(frame: Snapshot, pace: Tempo) -> str:
+def _pace(frame: Figures, pace: Tempo) -> str:
     if not frame.running:
         return "paused"
     if pace.reached is None:
@@ -265,7 +266,7 @@ def _pace(frame: Snapshot, pace: Tempo) -> str:
     return f"{pace.reached:.2f} × real time{late}"
 
 
-def warning(frame: Snapshot, note: str) -> str:
+def warning(frame: Figures, note: str) -> str:
     """What is wrong, or ""."""
     return f"{frame.trouble}. Reset to go on." if frame.trouble else note
 

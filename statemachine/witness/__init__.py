@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -17,8 +16,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..errors import ModelError
+from ..page import Figures
 from ..rotations import matrix_from_quat
-from .mjcf import FileBody, PlainMjcf
+from .mjcf import PlainMjcf
 from .mjcf_text import parse
 
 # A robot as Pinocchio has it, with the names and the order of the file that it comes from.
@@ -57,28 +57,6 @@ class Segment(NamedTuple):
         return SIZES[self.kind][1]
 
 
-@dataclass(frozen=True)
-class WitnessModel:
-    """A robot as Pinocchio has it.
-
-    Attributes:
-        model: Pinocchio's.
-        joints: Of each joint its name, "" if it has none, and where it is; in MuJoCo's
-            order, or of a URDF in Pinocchio's.
-        bodies, sites: Ids of Pinocchio's frames, by name; those without a name are called
-            "body 7" and "site 3", by their places in MuJoCo's order. 0 is the world.
-        grade: `OWN_READING` or `SAME_READING`.
-        prepared: What was done to the file's text before Pinocchio read it.
-    """
-
-    model: Any
-    joints: tuple[tuple[str, Segment], ...]
-    bodies: dict[str, int]
-    sites: dict[str, int]
-    grade: str
-    prepared: tuple[str, ...] = ()
-
-
 def labels(kind: str, names: Iterable[str]) -> list[str]:
     """What bodies or sites are called: their names, or "body 7" and "site 3" without one."""
     given = list(names)
@@ -102,7 +80,7 @@ _KINDS = (
 
 def read_numbers(
     pin: Any, compiled: Any, bodies: Sequence[str], joints: Sequence[str], sites: Sequence[str]
-) -> WitnessModel:
+) -> Figures:
     """Build Pinocchio's model of a compiled model.
 
     Args:
@@ -113,6 +91,15 @@ def read_numbers(
         bodies: Names, "" for none; joints, sites: likewise.
         joints: See bodies.
         sites: See bodies.
+
+    Returns:
+        model: Pinocchio's.
+        joints: Of each joint its name, "" if it has none, and where it is (a Segment); in MuJoCo's
+            order, or of a URDF in Pinocchio's.
+        bodies, sites: Ids of Pinocchio's frames, by name; those without a name are called
+            "body 7" and "site 3", by their places in MuJoCo's order. 0 is the world.
+        grade: `OWN_READING` or `SAME_READING`.
+        prepared: What was done to the file's text before Pinocchio read it.
     """
     model = pin.Model()
     types = pin.FrameType
@@ -145,12 +132,13 @@ def read_numbers(
         added = pin.Frame(f"site {site}", parent, frame, pose, types.OP_FRAME)
         placed.append(model.addFrame(added))
     frames = [frame for *_, frame in carriers]
-    return WitnessModel(
-        model,
-        tuple(segments),
-        dict(zip(labels("body", bodies), frames, strict=True)),
-        dict(zip(labels("site", sites), placed, strict=True)),
-        SAME_READING,
+    return Figures(
+        model=model,
+        joints=tuple(segments),
+        bodies=dict(zip(labels("body", bodies), frames, strict=True)),
+        sites=dict(zip(labels("site", sites), placed, strict=True)),
+        grade=SAME_READING,
+        prepared=(),
     )
 
 
@@ -162,7 +150,7 @@ def _pose(pin: Any, pos: Any, quat: Any) -> Any:
 # Own reading: a robot's file, read by Pinocchio's own parser with no misreading unnoticed.
 
 
-def read_file(pin: Any, path: Path) -> WitnessModel:
+def read_file(pin: Any, path: Path) -> Figures:
     """Pinocchio's model of an MJCF or URDF file.
 
     Args:
@@ -185,7 +173,7 @@ def read_file(pin: Any, path: Path) -> WitnessModel:
     raise ModelError(f"{path} is neither MJCF nor URDF: its root element is <{root.tag}>")
 
 
-def _read_mjcf(pin: Any, file: PlainMjcf, path: Path) -> WitnessModel:
+def _read_mjcf(pin: Any, file: PlainMjcf, path: Path) -> Figures:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "robot.xml"
         ElementTree.ElementTree(file.root).write(copy, encoding="utf-8")
@@ -205,24 +193,24 @@ def _read_mjcf(pin: Any, file: PlainMjcf, path: Path) -> WitnessModel:
     sites = [site for body in file.bodies for site in body.sites]
     if sum(segment.nq for _, segment in joints) != model.nq:
         raise ModelError(f"Pinocchio finds other joints in {path.name} than there are")
-    return WitnessModel(
-        model,
-        tuple(joints),
-        dict(zip(labels("body", (body.name for body in file.bodies)), bodies, strict=True)),
-        dict(
+    return Figures(
+        model=model,
+        joints=tuple(joints),
+        bodies=dict(zip(labels("body", (body.name for body in file.bodies)), bodies, strict=True)),
+        sites=dict(
             zip(
                 labels("site", (name for name, _ in sites)),
                 (frames[written] for _, written in sites),
                 strict=True,
             )
         ),
-        OWN_READING,
-        file.changes,
+        grade=OWN_READING,
+        prepared=file.changes,
     )
 
 
 def _segments(
-    pin: Any, model: Any, body: FileBody, frame: int, path: Path
+    pin: Any, model: Any, body: Figures, frame: int, path: Path
 ) -> list[tuple[str, Segment]]:
     """The joints of one body, which Pinocchio may have put into one."""
     if not body.joints:
@@ -249,7 +237,7 @@ def _segments(
 _KINDS_BY_SIZE = {(2, 1): "unbounded", (1, 1): "hinge"}
 
 
-def _read_urdf(pin: Any, path: Path) -> WitnessModel:
+def _read_urdf(pin: Any, path: Path) -> Figures:
     model = pin.buildModelFromUrdf(str(path))
     joints: list[tuple[str, Segment]] = []
     changed = 0
@@ -266,7 +254,14 @@ def _read_urdf(pin: Any, path: Path) -> WitnessModel:
     links = [k for k, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
     bodies = {model.frames[k].name: k for k in links}
     said = (f"places of floating joints left out, for qpos has them: {changed}",) * bool(changed)
-    return WitnessModel(model, tuple(joints), bodies, {}, OWN_READING, said)
+    return Figures(
+        model=model,
+        joints=tuple(joints),
+        bodies=bodies,
+        sites={},
+        grade=OWN_READING,
+        prepared=said,
+    )
 
 
 def _reason(error: Exception) -> str:

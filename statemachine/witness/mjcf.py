@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -19,8 +18,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..errors import ModelError
+from ..page import Figures
 from ..rotations import HERE, Array, Placement
-from .mjcf_text import Source, attached_source, body_of, numbers, own_place, source_of
+from .mjcf_text import attached_source, body_of, numbers, own_place, source_of
 
 Element = ElementTree.Element
 _MOST_BODIES = 100_000
@@ -29,23 +29,6 @@ _WITHOUT_PLACES = {"inertial", "geom", "camera", "light", "plugin"}
 _PLACED_BY = {"quat", "euler", "axisangle", "xyaxes", "zaxis", "fromto"}
 # What a joint and a site of Pinocchio's parser need to be told.
 _KINEMATIC = {"joint": {"type", "pos", "axis", "ref"}, "site": {"pos"} | _PLACED_BY}
-
-
-@dataclass
-class FileBody:
-    """A body of a file.
-
-    Attributes:
-        name: "" if it has none.
-        written: Its name in what Pinocchio reads: there, names are unique and never empty.
-        joints: In order: the name of each, its kind, and its ref [rad or m].
-        sites: Their names, and what they are called in what Pinocchio reads.
-    """
-
-    name: str
-    written: str
-    joints: list[tuple[str, str, float]] = field(default_factory=list[tuple[str, str, float]])
-    sites: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
 
 
 class _Surroundings(NamedTuple):
@@ -60,12 +43,12 @@ class _Surroundings(NamedTuple):
 
     frame: Placement
     childclass: str
-    sources: tuple[Source, ...]
+    sources: tuple[Figures, ...]
     prefix: str = ""
     suffix: str = ""
 
     @property
-    def source(self) -> Source:
+    def source(self) -> Figures:
         """The file that it is in."""
         return self.sources[-1]
 
@@ -75,7 +58,10 @@ class PlainMjcf:
 
     Attributes:
         root: What Pinocchio's parser reads.
-        bodies: The world first, then all bodies in MuJoCo's order.
+        bodies: The world first, then all bodies in MuJoCo's order. Of each its name, "" if it has
+            none; what is written, its name in what Pinocchio reads: there, names are unique and
+            never empty; its joints in order, the name of each, its kind, and its ref [rad or m];
+            its sites, their names, and what they are called in what Pinocchio reads.
         changes: What was done, in words.
     """
 
@@ -102,7 +88,7 @@ class PlainMjcf:
         # keeps them.
         ground = ElementTree.SubElement(world, "body", name="the ground")
         still = ElementTree.SubElement(ground, "body", name="body 0")
-        self.bodies: list[FileBody] = [FileBody("world", "body 0")]
+        self.bodies = [Figures(name="world", written="body 0", joints=[], sites=[])]
         self._numbers = {"joint": itertools.count(), "site": itertools.count()}
         around = _Surroundings(HERE, "", (source,))
         for worldbody in source.root.findall("worldbody"):
@@ -136,7 +122,7 @@ class PlainMjcf:
         self,
         source: Element,
         target: Element,
-        body: FileBody,
+        body: Figures,
         around: _Surroundings,
         sites: Element,
     ) -> None:
@@ -164,7 +150,7 @@ class PlainMjcf:
         self,
         element: Element,
         target: Element,
-        body: FileBody,
+        body: Figures,
         around: _Surroundings,
         sites: Element,
     ) -> None:
@@ -206,7 +192,7 @@ class PlainMjcf:
         if number > _MOST_BODIES:
             raise ModelError(f"{self._path.name} has more than {_MOST_BODIES:,} bodies")
         name = self._name(element, around)
-        body = FileBody(name, f"body {number}")
+        body = Figures(name=name, written=f"body {number}", joints=[], sites=[])
         self._done["body names"] += not name
         self.bodies.append(body)
         written = ElementTree.SubElement(target, "body", name=body.written)
@@ -216,7 +202,7 @@ class PlainMjcf:
         self._write(element, written, body, inside, written)
 
     def _joint(
-        self, element: Element, target: Element, body: FileBody, around: _Surroundings
+        self, element: Element, target: Element, body: Figures, around: _Surroundings
     ) -> None:
         given = self._resolved(element, "joint", around)
         kind = "free" if element.tag == "freejoint" else given.get("type", "hinge")
@@ -243,7 +229,7 @@ class PlainMjcf:
         ElementTree.SubElement(target, "joint", written)
 
     def _site(
-        self, element: Element, target: Element, body: FileBody, around: _Surroundings
+        self, element: Element, target: Element, body: Figures, around: _Surroundings
     ) -> None:
         called = f"site {next(self._numbers['site'])}"
         body.sites.append((self._name(element, around), called))

@@ -14,6 +14,7 @@ import numpy as np
 from .. import models
 from ..errors import ModelError, refuse
 from ..models import included_file
+from ..page import Figures
 from ..rotations import HERE, Array, Placement, matrix_from_quat, rotation
 
 Element = ElementTree.Element
@@ -33,33 +34,28 @@ class Compiler(NamedTuple):
         return float(np.deg2rad(angle)) if self.degrees else angle
 
 
-class Source(NamedTuple):
-    """An MJCF that bodies are read from: the main file, or one that is attached.
+def source_of(root: Element, path: Path, done: Counter[str]) -> Figures:
+    """A file with all that is needed to read its bodies; `done` is told what was resolved.
 
-    Attributes:
+    Returns:
         path: Where it is.
         root: Its text, the includes resolved.
         compiler, classes: What it says of angles, and its default classes.
-    """
-
-    path: Path
-    root: Element
-    compiler: Compiler
-    classes: Classes
-
-
-def source_of(root: Element, path: Path, done: Counter[str]) -> Source:
-    """A file with all that is needed to read its bodies; `done` is told what was resolved.
 
     Raises:
         ModelError: It has a meaning that is not that of MuJoCo today, or a part is missing.
     """
     root, included = with_includes(root, path)
     done["included files"] += included
-    return Source(path, root, compiler_of(root, path), classes(root, path, done))
+    return Figures(
+        path=path,
+        root=root,
+        compiler=compiler_of(root, path),
+        classes=classes(root, path, done),
+    )
 
 
-def attached_source(name: str, main: Source, done: Counter[str]) -> Source:
+def attached_source(name: str, main: Figures, done: Counter[str]) -> Figures:
     """The file that an <attach> of `main` calls `name`.
 
     Raises:
@@ -75,7 +71,7 @@ def attached_source(name: str, main: Source, done: Counter[str]) -> Source:
     raise ModelError(f"{main.path.name} has an <attach> of {name!r}, and no <model> is called so")
 
 
-def body_of(source: Source, name: str) -> tuple[Element, str]:
+def body_of(source: Figures, name: str) -> tuple[Element, str]:
     """A body of a file by its name, and the class that its parents give it.
 
     Raises:

@@ -24,7 +24,7 @@ from ..errors import BusyDataError, StateMachineError, UnsupportedError
 from ..interface import Array, Ints, Model, State
 from ..interface.records import Errors, StateLayout
 from ..interface.turns import alone
-from ..interface.worlds import WRITABLE, Worlds, check_memory
+from ..interface.worlds import WRITABLE, Worlds, check_memory, without
 from ..processes import checked_jobs
 from ._holder import Holder, Layout, arrays_in
 from ._worker import ANSWER_MOST, Answer, SharedBlock, WorldsProcess, end_all, lost_worlds
@@ -258,9 +258,7 @@ class PoolWorlds(Worlds):
     def _fetched(self, name: str) -> Array:
         """A derived array as it is now; the rows of worlds that have diverged stay."""
         if name not in self._fresh:
-            ids = self._numbers
-            if self._errors:
-                ids = ids[~np.isin(ids, list(self._errors))]
+            ids = without(self._numbers, self._errors)
             if len(ids):
                 self._ask(ids, "derive", 1 << self.derived.index(name))
         return vars(self).setdefault(name, self._derived_arrays[name])
@@ -320,7 +318,7 @@ class PoolWorlds(Worlds):
                 for world, k in zip(ids[done < count], done[done < count], strict=True):
                     array[world, start : start + k] = shared[name][world, :k]
             errors |= ended
-            ids = ids[~np.isin(ids, list(ended))]
+            ids = without(ids, ended)
             start += count
         return errors
 

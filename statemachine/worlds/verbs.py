@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,9 +23,10 @@ from ..interface import Ints, Model, State
 from ..interface.options import as_count, as_vector, check_state, checked_options, kind_of
 from ..interface.records import Arrays, Errors
 from ..interface.turns import alone
-from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world
+from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world, without
 from ..processes import checked_jobs, free_memory
 
+T = TypeVar("T")
 _SHOWN = 5  # diverged worlds that a warning names
 
 
@@ -106,12 +107,13 @@ def forward(worlds: Worlds, *, ids: ArrayLike | None = None) -> None:
         BusyDataError, ClosedDataError: As in `step`.
     """
     _admit(worlds)
-    _run(worlds, partial(_forward, worlds), _chosen(worlds, ids))
+    _run(worlds, partial(_with_inputs, worlds, worlds._forward), _chosen(worlds, ids))
 
 
-def _forward(worlds: Worlds, ids: Ints) -> Errors:
+def _with_inputs(worlds: Worlds, call: Callable[[Ints], T], ids: Ints) -> T:
+    """Call a hook that reads the inputs of these worlds."""
     worlds._check_inputs(ids)
-    return worlds._forward(ids)
+    return call(ids)
 
 
 def reset(
@@ -130,14 +132,14 @@ def reset(
     """
     _admit(worlds)
     key = None if keyframe is None else worlds.model.key_id(keyframe)
-    alone(worlds, _reset, worlds, _numbers(worlds, ids), key)
+    alone(worlds, _begin_anew, worlds, worlds._reset, _numbers(worlds, ids), key)
 
 
-def _reset(worlds: Worlds, ids: Ints, key: int | None) -> None:
-    worlds._reset(ids, key)
-    if worlds._errors:
-        for world in ids.tolist():
-            worlds._errors.pop(world, None)
+def _begin_anew(worlds: Worlds, call: Callable[[Ints, Any], None], ids: Ints, start: Any) -> None:
+    """Call a hook after which none of these worlds has diverged."""
+    call(ids, start)
+    for world in ids.tolist() if worlds._errors else ():
+        worlds._errors.pop(world, None)
 
 
 def get_state(worlds: Worlds, world: int) -> State:
@@ -156,7 +158,8 @@ def get_state(worlds: Worlds, world: int) -> State:
             "set_state",
             world=number,
         )
-    return alone(worlds, _get_states, worlds, worlds._numbers[number : number + 1])[0]
+    ids = worlds._numbers[number : number + 1]
+    return alone(worlds, _with_inputs, worlds, worlds._get_states, ids)[0]
 
 
 def get_states(worlds: Worlds, ids: ArrayLike | None = None) -> dict[int, State]:
@@ -172,12 +175,8 @@ def get_states(worlds: Worlds, ids: ArrayLike | None = None) -> dict[int, State]
     """
     _admit(worlds)
     numbers = _chosen(worlds, ids)
-    return dict(zip(numbers.tolist(), alone(worlds, _get_states, worlds, numbers), strict=True))
-
-
-def _get_states(worlds: Worlds, ids: Ints) -> list[State]:
-    worlds._check_inputs(ids)
-    return worlds._get_states(ids)
+    states = alone(worlds, _with_inputs, worlds, worlds._get_states, numbers)
+    return dict(zip(numbers.tolist(), states, strict=True))
 
 
 def set_state(worlds: Worlds, world: int, state: State) -> None:
@@ -206,13 +205,8 @@ def set_states(worlds: Worlds, states: Mapping[int, State]) -> None:
     for world, state in checked.items():
         check_state(state, worlds.model, *worlds._state_layout(world))
     numbers = np.array(sorted(checked), dtype=np.int64)
-    alone(worlds, _set_states, worlds, numbers, [checked[world] for world in numbers.tolist()])
-
-
-def _set_states(worlds: Worlds, ids: Ints, states: Sequence[State]) -> None:
-    worlds._set_states(ids, states)
-    for world in ids.tolist() if worlds._errors else ():
-        worlds._errors.pop(world, None)
+    in_order = [checked[world] for world in numbers.tolist()]
+    alone(worlds, _begin_anew, worlds, worlds._set_states, numbers, in_order)
 
 
 def record(
@@ -318,10 +312,7 @@ def _admit(worlds: Worlds) -> None:
 
 def _chosen(worlds: Worlds, ids: ArrayLike | None) -> Ints:
     """The worlds that are meant and have not diverged."""
-    numbers = _numbers(worlds, ids)
-    if not worlds._errors:
-        return numbers
-    return numbers[~np.isin(numbers, list(worlds._errors))]
+    return without(_numbers(worlds, ids), worlds._errors)
 
 
 def _numbers(worlds: Worlds, ids: ArrayLike | None) -> Ints:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import MissingEngineError, ModelError
+from ...errors import MissingEngineError, ModelError, one_line
 from ...installed import require
 from .. import RawEngine, function_of
 
@@ -212,7 +212,7 @@ def with_parts(
     try:
         return to.compile()
     except (ValueError, require("mujoco").FatalError) as error:
-        reason = " ".join(str(error).split())
+        reason = one_line(error)
         raise ModelError(f"{taker.name} with parts of {giver.name}: {reason}") from error
 
 

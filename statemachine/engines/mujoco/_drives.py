@@ -30,7 +30,7 @@ _STILL = (
 
 def drives(sides: Sides) -> Iterator[ModelDifference]:
     """Actuators, by their gains, ranges, laws and what they drive."""
-    left, right = sides.left, sides.right
+    left, right = sides.raws
     owners = ctrl_owners(left), ctrl_owners(right)
     places = sides.pairs.actuators
     actuators = sorted({(int(owners[0][a]), int(owners[1][b])) for a, b in places})
@@ -39,9 +39,14 @@ def drives(sides: Sides) -> Iterator[ModelDifference]:
         yield from _delay(sides, a, b)
         targets = [_targets(sides, side, k) for side, k in enumerate((a, b))]
         if targets[0][0] != targets[1][0]:
-            why = "it drives another thing, or in another way"
             values = (("drives", *(words for _, words in targets)),)
-            yield sides.tell("transmission", "actuator", a, values, refused=why)
+            yield sides.tell(
+                "transmission",
+                "actuator",
+                a,
+                values,
+                refused="it drives another thing, or in another way",
+            )
     if left.opt.disableactuator or right.opt.disableactuator:
         yield from sides.rows("actuator", actuators, "group")
     for a, b in places:
@@ -79,19 +84,24 @@ def _law(raw: Any, k: int) -> tuple[int, ...]:
 
 def _delay(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """A delay needs a memory of commands: without one it is taken away from the other."""
-    left, right = sides.left, sides.right
+    left, right = sides.raws
     sizes = left.actuator_history[a], right.actuator_history[b]
     back = bool(sizes[0][0] and not sizes[1][0])
     yield from sides.rows("actuator", [(a, b)], "delay", back=back)
     if left.actuator_delay[a] and right.actuator_delay[b] and not same(*sizes):
         values = (("history", plain(sizes[0]), plain(sizes[1])),)
-        why = "it keeps another number of commands, or reads between them in another way"
-        yield sides.tell("memory of commands", "actuator", a, values, refused=why)
+        yield sides.tell(
+            "memory of commands",
+            "actuator",
+            a,
+            values,
+            refused="it keeps another number of commands, or reads between them in another way",
+        )
 
 
 def _targets(sides: Sides, side: int, k: int) -> tuple[tuple[int, ...], str]:
     """What an actuator acts on and from which site it measures: ids of the second model, words."""
-    raw = (sides.left, sides.right)[side]
+    raw = sides.raws[side]
     kind, ids = int(raw.actuator_trntype[k]), raw.actuator_trnid[k].tolist()
     targets = list(zip(_DRIVES.get(kind, ()), ids, strict=False))
     names = [name_of(raw, target, i) for target, i in targets if i >= 0]

@@ -49,7 +49,7 @@ def elements(sides: Sides) -> Iterator[ModelDifference]:
 
 def _bodies(sides: Sides) -> Iterator[ModelDifference]:
     """The weight that is taken off bodies; of a model without any, nothing is kept."""
-    left, right = sides.left, sides.right
+    left, right = sides.raws
     sleep = int(require("mujoco").mjtEnableBit.mjENBL_SLEEP)
     if (left.opt.enableflags | right.opt.enableflags) & sleep:
         trees = {
@@ -64,7 +64,7 @@ def _bodies(sides: Sides) -> Iterator[ModelDifference]:
 
 
 def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
-    left, right = sides.left, sides.right
+    left, right = sides.raws
     name, kind = name_of(left, "joint", a), JointType(left.jnt_type[a])
     differences = [*sides.rows("joint", [(a, b)]), *_rest(sides, a, b, kind)]
     here, there = int(left.jnt_dofadr[a]), int(right.jnt_dofadr[b])
@@ -82,7 +82,7 @@ def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 
 def _rest(sides: Sides, a: int, b: int, kind: JointType) -> Iterator[ModelDifference]:
     """Where the spring of a joint is slack."""
-    left, right = sides.left, sides.right
+    left, right = sides.raws
     stiff = ("jnt_stiffness", "jnt_stiffnesspoly")
     here, there = int(left.jnt_qposadr[a]), int(right.jnt_qposadr[b])
     ours, theirs = left.qpos_spring[here:][: kind.nq], right.qpos_spring[there:][: kind.nq]
@@ -112,7 +112,7 @@ def _path(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
 
 def _passes(sides: Sides, side: int, tendon: int) -> list[tuple[int, int, float]]:
     """What a tendon passes: its kind, its id in the second model, and a number."""
-    raw = (sides.left, sides.right)[side]
+    raw = sides.raws[side]
     start, passes = int(raw.tendon_adr[tendon]), []
     for k in range(start, start + int(raw.tendon_num[tendon])):
         kind, number = int(raw.wrap_type[k]), round(float(raw.wrap_prm[k]), 9)
@@ -165,7 +165,7 @@ def _match(sides: Sides) -> Iterator[tuple[int, int]]:
 
 def _keeps(sides: Sides, side: int, k: int) -> tuple[int, ...]:
     """How an equality keeps things, and which, as ids of the second model."""
-    raw = (sides.left, sides.right)[side]
+    raw = sides.raws[side]
     kind, of = int(raw.eq_type[k]), int(raw.eq_objtype[k])
     target = {_JOINT: "joint", _TENDON: "tendon"}.get(kind, _KEEPS.get(of))
     ids = [sides.there(side, target, int(end[k])) for end in (raw.eq_obj1id, raw.eq_obj2id)]
@@ -225,7 +225,7 @@ def contact_pairs(sides: Sides) -> Iterator[ModelDifference]:
         """Those of either model that are of the same two elements."""
         ours, theirs = (
             [{sides.there(side, kind, int(end)) for end in pair} for pair in ends(raw)]
-            for side, raw in enumerate((sides.left, sides.right))
+            for side, raw in enumerate(sides.raws)
         )
         return [(k, theirs.index(pair)) for k, pair in enumerate(ours) if pair in theirs]
 

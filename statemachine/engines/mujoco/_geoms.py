@@ -80,8 +80,13 @@ class Geoms:
             return
         values: list[tuple[Any, ...]] = [("type", *kinds)] if kinds[0] != kinds[1] else []
         if values and not {*kinds} <= shapes.PRIMITIVES.keys():
-            why = "one of them is not a primitive, and cannot become the other"
-            yield sides.tell("shape", "geom", a, values, refused=why)
+            yield sides.tell(
+                "shape",
+                "geom",
+                a,
+                values,
+                refused="one of them is not a primitive, and cannot become the other",
+            )
             return
         if kinds[0] == "hfield":
             yield from shapes.heights(sides, a, b)

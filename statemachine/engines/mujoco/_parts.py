@@ -146,7 +146,7 @@ def places(sides: Sides) -> Iterator[ModelDifference]:
 
 def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
     """Where a part is on the one that carries it, and what it turns about."""
-    left, right = sides.left, sides.right
+    left, right = sides.raws
     joints = [(a, b) for a, b in sides.pairs.joints if left.jnt_bodyid[a] == pair.left]
     if any(left.jnt_type[a] == _FREE for a, _ in joints):
         return  # where it starts is a matter of the state
@@ -182,7 +182,7 @@ def _axis(sides: Sides, pair: BodyPair, a: int, b: int) -> Iterator[ModelDiffere
 def _place(
     sides: Sides, pair: BodyPair, parent: BodyPair, joints: list[tuple[int, int]]
 ) -> Iterator[ModelDifference]:
-    left, right = sides.left, sides.right
+    left, right = sides.raws
     refs = [(_ref(left, a), _ref(right, b)) for a, b in joints]
     ours, theirs = sides.solids[0].hangs(pair.left), sides.solids[1].hangs(pair.right)
     alike = all(same(a, b) for a, b in refs)

@@ -168,7 +168,7 @@ def identical(left: Any, ours: int, right: Any, theirs: int) -> bool:
 
 def heights(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
     """What two height fields differ in."""
-    left, right = sides.left, sides.right
+    left, right = sides.raws
     (ours, grid, here), (theirs, other, there) = _field(left, a), _field(right, b)
     if grid != other:
         values = (("points", *(f"{rows} x {columns}" for rows, columns in (grid, other))),)

@@ -176,7 +176,7 @@ class Sides:
     """Two compiled models, and what of one is what of the other.
 
     Attributes:
-        left, right: The mjModels.
+        left, right: The mjModels; raws: both.
         pairs: What of one is what of the other.
         solids: Their rigid parts.
         ids: By kind of element the ids of the second model by those of the first; of geoms once
@@ -184,7 +184,7 @@ class Sides:
     """
 
     def __init__(self, left: Any, right: Any, pairs: Counterparts) -> None:
-        self.left, self.right, self.pairs = left, right, pairs
+        self.left, self.right, self.pairs, self.raws = left, right, pairs, (left, right)
         self.solids = (
             Solids(left, {pair.left for pair in pairs.solids}),
             Solids(right, {pair.right for pair in pairs.solids}),
@@ -229,9 +229,10 @@ class Sides:
 
     def _names(self, kind: str) -> list[list[str]]:
         """Names of the elements of each model."""
-        word, models = _COUNTED.get(kind, kind), (self.left, self.right)
+        word = _COUNTED.get(kind, kind)
         return [
-            [getattr(raw, word)(k).name for k in range(getattr(raw, f"n{word}"))] for raw in models
+            [getattr(raw, word)(k).name for k in range(getattr(raw, f"n{word}"))]
+            for raw in self.raws
         ]
 
     def tell(
@@ -314,7 +315,7 @@ class Sides:
             what: Tells what stands for one as a value.
         """
         for side, names in enumerate(self._names(kind)):
-            raw = (self.left, self.right)[side]
+            raw = self.raws[side]
             for k in sorted({*range(len(names))} - {pair[side] for pair in pairs}):
                 edits, values = without(raw, k), (what(raw, k), None)
                 if edits:

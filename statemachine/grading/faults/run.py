@@ -13,7 +13,7 @@ import re
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -32,6 +32,7 @@ from ...models import AnyPath
 from ...page import Figures
 from ...processes import checked_jobs, sandbox
 from ...processes.parallel import in_parallel, unwinding
+from ...runs.drive import Progress, silent
 from ..recording import content
 from . import FAULT, FAULTS, IMPORT, Fault
 
@@ -99,7 +100,7 @@ def examine(
     only: Sequence[str] = (),
     seconds: float = _SECONDS,
     clock: float = _CLOCK,
-    progress: Callable[[float], None] = lambda _fraction: None,
+    progress: Progress = silent,
 ) -> Figures:
     """Run a student's tests on the healthy arm and on one with each of the faults.
 

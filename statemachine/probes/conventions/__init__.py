@@ -9,7 +9,7 @@ that keep our contract. An engine whose room measures nothing is not asked.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +19,7 @@ from ...engines.measured import Absent, Measurement, Phrases
 from ...errors import check_name
 from ...installed import ENGINES, engine_version, require, silence
 from ...page import Figures
+from ...runs.drive import Progress, silent
 from . import answers, frames, motion
 from .answers import NO_ANSWER, Answers, EngineAnswer
 
@@ -71,7 +72,7 @@ def _absent(looked: Absent) -> Answers:
 def probe(
     engines: Sequence[str],
     questions: Iterable[str] = QUESTIONS,
-    progress: Callable[[float], None] = lambda _fraction: None,
+    progress: Progress = silent,
 ) -> Figures:
     """Ask each engine each question.
 
@@ -145,9 +146,7 @@ CONCEPTS = (
 )
 
 
-def run_phrases(
-    engines: Sequence[str], progress: Callable[[float], None] = lambda _fraction: None
-) -> Figures:
+def run_phrases(engines: Sequence[str], progress: Progress = silent) -> Figures:
     """Run every cell of some engines.
 
     Args:
