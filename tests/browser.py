@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -114,10 +114,10 @@ def _playwright() -> Iterator[Any]:
 
 
 @contextmanager
-def tabs(
+def browser(
     width: int = 1280, height: int = 800, offline: bool = False, **context: Any
-) -> Iterator[Callable[[], Tab]]:
-    """A browser with a new profile; call what it gives for a new, empty tab.
+) -> Iterator[Tab]:
+    """A browser with a new profile, and an empty tab in it.
 
     Args:
         width: Of a tab [px].
@@ -134,15 +134,6 @@ def tabs(
             one = chromium.new_context(
                 viewport={"width": width, "height": height}, offline=offline, **context
             )
-            yield lambda: Tab(one.new_page())
+            yield Tab(one.new_page())
         finally:
             chromium.close()
-
-
-@contextmanager
-def browser(
-    width: int = 1280, height: int = 800, offline: bool = False, **context: Any
-) -> Iterator[Tab]:
-    """A browser with one tab; the arguments are those of `tabs`."""
-    with tabs(width, height, offline, **context) as new:
-        yield new()

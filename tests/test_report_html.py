@@ -58,6 +58,7 @@ from .test_strange_traces import added, cut
 from .test_strange_traces import changed as edited
 
 LIMIT = 2_000_000  # bytes
+CSS = ROOT / "statemachine/report/html/page.css"
 Made = tuple[Comparison, Trace, Trace, Look]
 Seen = Callable[..., Any]
 
@@ -66,9 +67,8 @@ def of(one: Trace, two: Trace) -> Made:
     return of_look(one, two, drawing_of(sm.load(one.header.provenance.model_file)))
 
 
-def page_of(made: Made, **more: Any) -> str:
-    looks = more.pop("looks", made[3:] * 2)
-    return report(compared(made[0], **more), looks)
+def page_of(made: Made, looks: Any = None, **more: Any) -> str:
+    return report(compared(made[0], **more), looks or made[3:] * 2)
 
 
 def recorded(name: str, kind: Any = "model") -> Made:
@@ -96,8 +96,10 @@ def data_of(text: str) -> Any:
 
 @pytest.fixture(scope="module")
 def page(hold: Made, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    target = tmp_path_factory.mktemp("report") / "hold.html"
-    return write_report(target, page_of(hold, command="statemachine compare hold --html hold.html"))
+    return write_report(
+        tmp_path_factory.mktemp("report") / "hold.html",
+        page_of(hold, command="statemachine compare hold --html hold.html"),
+    )
 
 
 @contextmanager
@@ -128,13 +130,6 @@ def seen(tmp_path: Path) -> Seen:
     )
 
 
-@pytest.fixture
-def bare(page: Path) -> Iterator[Tab]:
-    """A browser with the page that runs no script."""
-    with looking(page, java_script_enabled=False) as opened:
-        yield opened
-
-
 def picture(tab: Tab, where: str = "#scene") -> np.ndarray:
     if where == "#scene":
         tab.mouse.move(0, 0)  # nothing under it is in another colour
@@ -149,7 +144,18 @@ def picture(tab: Tab, where: str = "#scene") -> np.ndarray:
 
 def changed(before: np.ndarray, after: np.ndarray) -> int:
     """How many pixels are clearly of another colour."""
-    return int((np.abs(before - after).max(axis=2) > 24).sum())
+    return int(where_changed(before, after).sum())
+
+
+def where_changed(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Pixels that are clearly of another colour."""
+    return np.abs(before - after).max(axis=2) > 24
+
+
+def bare_stage(tab: Tab) -> None:
+    """Nothing but the robots in the picture."""
+    for name in ("marks", "trails"):
+        tab.locator(f"#{name}").uncheck()
 
 
 def cursors(tab: Tab) -> list[float]:
@@ -208,13 +214,12 @@ def test_names_that_are_markup_do_nothing(hold: Made, seen: Seen) -> None:
             header.provenance, model_file=hostile("m"), backend=hostile("b"),
             versions={hostile("v"): hostile("1")}, emulated=(hostile("e"),),
         )  # fmt: skip
-        texts = {name: hostile(name) for name in ("experiment", "says", "command", "keyframe")}
+        texts = ("experiment", "says", "command", "keyframe", "ended")
         options = {hostile("o"): hostile("p")}
-        more = {"provenance": prov, "ended": hostile("end"), "options": options}
-        return edited(trace, {**more, **names, **texts})
+        names |= {name: hostile(name) for name in texts}
+        return edited(trace, {"provenance": prov, "options": options, **names})
 
-    _, one, two, look = hold
-    made = of_look(spoiled(one), spoiled(two), look)
+    made = of_look(spoiled(hold[1]), spoiled(hold[2]), hold[3])
     with seen(made, said=(hostile("said"),), command=hostile("typed")) as tab:
         assert tab.evaluate("window.hit") is None
         assert tab.locator("img").count() == 0
@@ -240,19 +245,13 @@ def test_a_long_run_is_small_too_and_keeps_the_moments_that_count() -> None:
 def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
     """Many contacts at once."""
     _, one, two, look = hold
-    count = 60
-    n = len(one) * count
+    rows = np.repeat(np.arange(len(one)), 60)
     columns = {
-        f"contact_{name}": np.random.default_rng(0).normal(size=(n, *width))
+        f"contact_{name}": np.random.default_rng(0).normal(size=(len(rows), *width))
         for name, width in {"dist": (), "pos": (3,), "frame": (9,), "force": (3,)}.items()
     }
-    many = edited(
-        one,
-        None,
-        contact_row=np.repeat(np.arange(len(one)), count),
-        contact_geom=np.tile([0, 34], (n, 1)),
-        **columns,
-    )
+    geoms = np.tile([0, 34], (len(rows), 1))
+    many = edited(one, None, contact_row=rows, contact_geom=geoms, **columns)
     text = page_of(of_look(many, two, look))
     assert len(text.encode()) <= LIMIT
     assert "strongest are drawn" in text
@@ -263,15 +262,14 @@ def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
 
 def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
     comparison, one, *_ = hold
-    found = {each.name: each for each in comparison.agreements}
+    (wrist,) = (each for each in comparison.agreements if each.name == "wrist_flex")
     finding = headline(comparison, events_of(comparison))
-    wrist = found["wrist_flex"]
-    far, at = quantity(wrist.max, wrist.unit), f"{wrist.at:.3f} s"
+    far = quantity(wrist.max, wrist.unit)
     assert finding.lead.startswith(f"Joint wrist_flex is up to {far} apart")
     since = min(row.since for row in comparison.agreements if row.since is not None)
     assert_in(
         finding.lead,
-        f", at {at}; ",
+        f", at {wrist.at:.3f} s; ",
         f"the runs part at {since:.3f} s, when gripper touches floor",
     )
     assert finding.causes == ()  # nothing was asked about causes
@@ -290,31 +288,20 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     comparison, one, two, _ = made
     worst = max((a for a in comparison.agreements if a.kind == "joint"), key=lambda a: a.max)
     gap = Deviation("rad", worst.max, worst.at, worst.rms, worst.settled)
-    g = worst.max
-
-    contact = Figures(
-        name="contact", values=None, share=0.5, gap=1e-8 * g, is_still=False
-    )  # fmt: skip
+    contact = Figures(name="contact", values=None, share=0.5, gap=1e-8 * gap.worst, is_still=False)
 
     def row(name: str, share: float) -> Figures:
-        values, parts = ((name, "kp 998.2", "its motors"),), dict.fromkeys(("alone", "last"), share)
+        values = ((name, "kp 998.2", "its motors"),)
         return Figures(
-            name=name,
-            values=values,
-            unit="",
-            share=share,
-            error=0.0,
-            note="",
-            place=None,
-            chosen=None,
-            **parts,
-        )
+            name=name, values=values, unit="", share=share, alone=share, last=share, error=0.0,
+            note="", place=None, chosen=None,
+        )  # fmt: skip
 
     fields: dict[str, Any] = {
         "experiment": "hold", "says": "", "seconds": 2.0, "one": "mujoco", "two": "pybullet",
         "quantity": quantity, "unit": "rad", "measure": "worst", "first": {quantity: gap},
-        "gap": g, "shares": (row("servo law", 0.6), row("armature", -0.1)),
-        "method": "all sets", "orders": 0, "brought": 0.5 * g,
+        "gap": gap.worst, "shares": (row("servo law", 0.6), row("armature", -0.1)),
+        "method": "all sets", "orders": 0, "brought": 0.5 * gap.worst,
         "found_in": (contact,),
         "explained": 0.5, "located": 0.5, "unexplained": 1e-8, "negligible": 1e-9, "floor": 0.0,
         "redundant": (), "impossible": (), "unmatched": ({}, {}), "missing": (), "notes": (),
@@ -325,81 +312,87 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
 
 
 def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
-    comparison = hold[0]
-    lead = headline(comparison, [], explanation_of(hold))
-    assert lead.lead.startswith("Joint wrist_flex is up to 2.58° apart")
-    assert lead.causes == (
+    def said(**more: Any) -> Headline:
+        return headline(hold[0], [], explanation_of(hold, **more))
+
+    assert said().lead.startswith("Joint wrist_flex is up to 2.58° apart")
+    assert said().causes == (
         "Servo law, kp 998.2 on the left and its motors on the right: 60.0 % of the 2.58°.",
     )
     # What the run shows itself comes before.
     touch = Figures(time=0.27, what="gripper on floor", before=3e-16)
-    lead = headline(comparison, [], explanation_of(hold, touch=touch))
-    assert lead.causes[0].startswith("Until the first touch, gripper on floor at 0.270 s")
-    assert "the gap of the joints is 2e-14° at most" in lead.causes[0]
+    before = "Until the first touch, gripper on floor at 0.270 s, the gap of the joints is 2e-14°"
+    assert said(touch=touch).causes[0].startswith(f"{before} at most")
     late = Figures(time=0.27, what="finger on floor", before=0.01)  # they were apart before
-    assert len(headline(comparison, [], explanation_of(hold, touch=late)).causes) == 1
+    assert len(said(touch=late).causes) == 1
     # Of two that are as far apart the page names one, here and where it counts agreements.
-    lead = leading(comparison)
-    tied = (replace(lead, max=lead.max * (1 - 1e-9)), *comparison.agreements)
-    assert subject(replace(comparison, agreements=tied), explanation_of(hold))[3] is lead
+    lead = leading(hold[0])
+    tied = (replace(lead, max=lead.max * (1 - 1e-9)), *hold[0].agreements)
+    assert subject(replace(hold[0], agreements=tied), explanation_of(hold))[3] is lead
     # Of another quantity than any that is compared: named as it is.
-    other = headline(comparison, [], explanation_of(hold, quantity="box relative to gripperframe"))
+    other = said(quantity="box relative to gripperframe")
     assert other.lead.startswith("The box relative to gripperframe is up to 2.58° apart")
 
 
 def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     located = explanation_of(hold, shares=(), explained=0.0, located=1.0)
-    assert answer(located).startswith("50.0 % of the 2.58° comes from contact")
-    assert answer(
-        explanation_of(hold, shares=(), found_in=(), explained=0.0, located=0.0, unexplained=1)
-    ).startswith("The cause was not found: 100.0 % of the 2.58°")
-    for part, *parts in (
-        *(("share", -217.0, 127.0), ("share", 127.0, -126.5)),
-        *(("alone", -0.094, 0.0), ("last", -0.094, 0.0)),  # it widens the gap at first, or last
-    ):
-        rows = zip(explanation_of(hold).shares, parts, strict=True)
-        masked = explanation_of(
-            hold, shares=[with_figures(row, **{part: value}) for row, value in rows]
-        )
-        assert answer(masked).startswith("No single difference causes the 2.58°"), parts
-    still = with_figures(located.found_in[0], is_still=True)
-    assert answer(with_figures(located, found_in=[still])).endswith("a weak hint")
     worse = explanation_of(hold, explained=-0.26, located=1.26)  # all brought over widens the gap
-    assert answer(worse).startswith("No single difference causes the 2.58°")
-    assert not worse.is_explained
-    switch = with_figures(
-        worse.shares[0], name="contact", values=(("contact", True, False),), share=0.1
-    )
-    assert (
-        answer(explanation_of(hold, shares=(switch,)))
-        == "50.0 % of the 2.58° comes from contact (left: on, right: off)"
-    )
+    (contact,), rows = located.found_in, worse.shares
+    switch = with_figures(rows[0], name="contact", values=(("contact", True, False),), share=0.1)
     # Two values that read the same are shown with all their digits.
     close = ("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
-    rounded = with_figures(explanation_of(hold).shares[0], values=(close,), unit="rad")
-    assert "1.5708 on the left and 1.570796 on the right" in answer(
-        explanation_of(hold, shares=(rounded,))
-    )
-    noisy = explanation_of(hold, floor=0.2 * located.gap)
-    (table,) = [block for block in causes(noisy) if isinstance(block, Table)]
-    assert [row[3] for row in table.rows] == ["60.0 %", "< 20.0 %", "50.0 %*"]
-    rows, no_part = explanation_of(hold).shares, dict.fromkeys(("share", "alone", "last"), 2e-4)
-    tiny = [with_figures(row, **no_part) for row in rows]
-    (table,) = [
-        block
-        for block in causes(explanation_of(hold, shares=(rows[0], *tiny)))
-        if isinstance(block, Table)
+    rounded = with_figures(rows[0], values=(close,), unit="rad")
+    masked = [
+        [with_figures(row, **{part: value}) for row, value in zip(rows, parts, strict=True)]
+        for part, *parts in (
+            *(("share", -217.0, 127.0), ("share", 127.0, -126.5)),
+            *(("alone", -0.094, 0.0), ("last", -0.094, 0.0)),  # it widens the gap at first, or last
+        )
     ]
-    assert [row[0] for row in table.rows] == ["Servo law", "Contact", "2 more, none above 0.1 %"]
-    assert answer(explanation_of(hold, floor=0.04)).startswith(
-        "Nothing can be concluded: the gap is 2.58°, and the chaos"
-    )
-    assert answer(explanation_of(hold, negligible=1.0)).startswith("The two sides move alike")
+    for explanation, says in (
+        (located, "^50.0 % of the 2.58° comes from contact"),
+        (
+            explanation_of(hold, shares=(), found_in=(), explained=0.0, located=0.0, unexplained=1),
+            "^The cause was not found: 100.0 % of the 2.58°",
+        ),
+        *(
+            (each, "^No single difference causes the 2.58°")
+            for each in (worse, *(explanation_of(hold, shares=shares) for shares in masked))
+        ),
+        (with_figures(located, found_in=[with_figures(contact, is_still=True)]), "a weak hint$"),
+        (
+            explanation_of(hold, shares=(switch,)),
+            r"^50.0 % of the 2.58° comes from contact \(left: on, right: off\)$",
+        ),
+        (
+            explanation_of(hold, shares=(rounded,)),
+            "1.5708 on the left and 1.570796 on the right",
+        ),
+        (
+            explanation_of(hold, floor=0.04),
+            "^Nothing can be concluded: the gap is 2.58°, and the chaos",
+        ),
+        (explanation_of(hold, negligible=1.0), "^The two sides move alike"),
+    ):
+        assert re.search(says, answer(explanation)), says
+    no_part = dict.fromkeys(("share", "alone", "last"), 2e-4)
+    tiny = [with_figures(row, **no_part) for row in rows]
+    for explanation, column, cells in (
+        (explanation_of(hold, floor=0.2 * worse.gap), 3, ["60.0 %", "< 20.0 %", "50.0 %*"]),
+        (
+            explanation_of(hold, shares=(rows[0], *tiny)),
+            0,
+            ["Servo law", "Contact", "2 more, none above 0.1 %"],
+        ),
+    ):
+        (table,) = [block for block in causes(explanation) if isinstance(block, Table)]
+        assert [row[column] for row in table.rows] == cells
     # Where something cannot be brought to the same, a location is not an explanation.
-    refused = with_figures(located.found_in[0], share=1.0)
     row = Figures(name="shape of box", note="another size", share=None)
+    found = (with_figures(contact, share=1.0),)
     assert located.is_explained
-    assert not with_figures(located, shares=(row,), found_in=(refused,)).is_explained
+    assert not worse.is_explained
+    assert not with_figures(located, shares=(row,), found_in=found).is_explained
 
 
 def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
@@ -410,16 +403,14 @@ def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
 
         def bar(row: str) -> tuple[float, float]:
             line = table.locator("tr", has_text=row)
-            whole = line.locator(".bar").bounding_box()
-            fill = line.locator(".bar i").bounding_box()
-            zero = whole["x"] + whole["width"] / 2
-            ends = fill["x"], fill["x"] + fill["width"]
-            return (ends[0] - zero) / whole["width"], (ends[1] - zero) / whole["width"]
+            whole, fill = (line.locator(s).bounding_box() for s in (".bar", ".bar i"))
+            start = (fill["x"] - whole["x"]) / whole["width"] - 0.5
+            return start, start + fill["width"] / whole["width"]
 
         # Armature makes the gap wider: to the left of zero.
-        assert bar("Servo law") == pytest.approx((0.0, 0.3), abs=0.02)
-        assert bar("Armature") == pytest.approx((-0.05, 0.0), abs=0.02)
-        assert bar("Contact") == pytest.approx((0.0, 0.25), abs=0.02)
+        bars = [(0.0, 0.3), (-0.05, 0.0), (0.0, 0.25)]
+        found = [bar(row) for row in ("Servo law", "Armature", "Contact")]
+        np.testing.assert_allclose(found, bars, atol=0.02)
         steps = tab.locator("#agree ul li").all_inner_texts()  # all that was brought over
         assert [step.replace("\u00a0", " ") for step in steps] == [
             f"{name}: its motors → kp 998.2" for name in ("servo law", "armature")
@@ -437,22 +428,19 @@ def test_who_presses_on_what(hold: Made) -> None:
     whole = total_forces(one)["gripper on floor"][360:]
     assert touch.left.total == pytest.approx(whole.mean())
     assert whole.mean() > mean
-    # A side that never touches.
-    bare = edited(
-        two, None, **{n: a[:0] for n, a in two.columns.items() if n.startswith("contact")}
-    )
-    assert touches(one, bare)[0].right.first is None
-    assert "never touches" in page_of(of_look(one, bare, hold[3]))
+    bare = {n: a[:0] for n, a in two.columns.items() if n.startswith("contact")}
+    never = of_look(one, edited(two, None, **bare), hold[3])
+    assert touches(*never[1:3])[0].right.first is None
+    assert "never touches" in page_of(never)
 
 
 def test_what_was_commanded(hold: Made) -> None:
-    sections: Any = commanded(hold[0])
-    ((table,),) = [section.blocks for section in sections]
+    ((table,),) = [section.blocks for section in commanded(hold[0])]
     for row, value in zip(table.rows, hold[1].ctrl[0], strict=True):
         assert float(row[1]) == float(row[2]) == pytest.approx(value, rel=1e-2)
     assert table.rows[0][0] in page_of(hold)
-    still = [edited(trace, {"options": {"actuation": False}}) for trace in hold[1:3]]
-    assert "nothing is commanded" in page_of(of_look(still[0], still[1], hold[3]))
+    one, two = (edited(trace, {"options": {"actuation": False}}) for trace in hold[1:3])
+    assert "nothing is commanded" in page_of(of_look(one, two, hold[3]))
 
 
 def test_a_link_only_to_what_is_there(hold: Made) -> None:
@@ -460,9 +448,8 @@ def test_a_link_only_to_what_is_there(hold: Made) -> None:
     for kind in ("model", "engine"):
         other = edited(hold[2], {"defaults": kind})
         text = page_of(of_look(hold[1], other, hold[3]), models=models)
-        targets = set(re.findall(r'id="([^"]+)"', text))
         links = set(re.findall(r'href="#([^"]+)"', text))
-        assert links <= targets
+        assert links <= set(re.findall(r'id="([^"]+)"', text))
         assert ("emulated" in links) == (kind == "model")
 
 
@@ -525,27 +512,27 @@ def test_it_opens_near_the_tool_where_the_gap_is_small(hold: Made, tmp_path: Pat
     assert near == [True, False, False]
 
 
-def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, bare: Tab) -> None:
-    text = (
-        bare.locator("#figures table").first.inner_text().replace("−", "-").replace("\u00a0", " ")
-    )
+def test_without_a_script_every_figure_of_the_comparison_is_on_the_page(
+    hold: Made, page: Path
+) -> None:
+    parts = "#curves .plot svg", "#slider", "#play", ".cursor"
+    with looking(page, java_script_enabled=False) as tab:
+        seen = [part for part in parts if tab.locator(part).first.is_visible()]
+        whole, table = (
+            tab.locator(name).first.inner_text().replace("−", "-").replace("\u00a0", " ")
+            for name in ("main", "#figures table")
+        )
+    assert seen == ["#curves .plot svg"]
+    assert_in(whole, "How far apart, over time", "What happens when", "Where this comes from")
     for found in hold[0].agreements:
         (line,) = [
-            row for row in text.splitlines() if row.startswith(found.name.replace(", ", " ") + "\t")
+            row
+            for row in table.splitlines()
+            if row.startswith(found.name.replace(", ", " ") + "\t")
         ]
-        values = [found.tolerance]
-        if found.kind != "contact":
-            values += [found.max, found.rms, found.settled]
-        assert_in(line, found.verdict, *(quantity(value, found.unit) for value in values))
-
-
-def test_it_reads_without_a_script(bare: Tab) -> None:
-    assert bare.locator("#curves .plot svg").first.is_visible()
-    assert not bare.locator("#slider").is_visible()
-    assert not bare.locator("#play").is_visible()
-    assert not bare.locator(".cursor").first.is_visible()
-    text = bare.locator("main").inner_text()
-    assert_in(text, "How far apart, over time", "What happens when", "Where this comes from")
+        apart = (found.max, found.rms, found.settled) if found.kind != "contact" else ()
+        values = [quantity(value, found.unit) for value in (found.tolerance, *apart)]
+        assert_in(line, found.verdict, *values)
 
 
 # What moves.
@@ -553,8 +540,7 @@ def test_it_reads_without_a_script(bare: Tab) -> None:
 
 @pytest.mark.slow
 def test_the_slider_moves_both_arms_the_cursors_and_the_figures(tab: Tab, hold: Made) -> None:
-    for name in ("marks", "trails"):
-        tab.locator(f"#{name}").uncheck()
+    bare_stage(tab)
     for alone in ("solid", "ghost"):
         for name in ("solid", "ghost"):
             tab.locator(f"#{name}").set_checked(name == alone)
@@ -568,11 +554,11 @@ def test_the_slider_moves_both_arms_the_cursors_and_the_figures(tab: Tab, hold: 
     places = cursors(tab)
     assert len(places) > 15
     assert places == pytest.approx([0.6 / 2.0] * len(places), abs=0.004)
-    values = hold[1].qpos[120, 3], hold[2].qpos[120, 3]
+    one, two = (np.degrees(trace.qpos[120, 3]) for trace in hold[1:3])
     cells = tab.locator("#readout tr", has_text="wrist_flex").locator("td").all_inner_texts()
-    shown = [float(cell.rstrip("°").replace("−", "-")) for cell in cells]
-    assert shown[:2] == pytest.approx(np.degrees(values), abs=0.06)
-    assert shown[2] == pytest.approx(abs(np.degrees(values[0] - values[1])), abs=0.006)
+    shown = [float(cell.rstrip("°").replace("−", "-")) for cell in cells[:3]]
+    assert shown[:2] == pytest.approx([one, two], abs=0.06)
+    assert shown[2] == pytest.approx(abs(one - two), abs=0.006)
 
 
 @pytest.mark.slow
@@ -594,23 +580,25 @@ def test_the_sides_are_drawn_where_they_are(hold: Made, seen: Seen) -> None:
     w, x, y, z = np.moveaxis(one["xquat"], -1, 0)
     turned = np.stack([w - z, x - y, y + x, z + w], axis=-1) * half
     with seen(of_look(one, edited(one, xpos=xpos, xquat=turned), look)) as tab:
-        for name in ("marks", "trails"):
-            tab.locator(f"#{name}").uncheck()
+        bare_stage(tab)
         both = picture(tab)
         tab.locator("#ghost").uncheck()
-        ghost = np.abs(picture(tab) - both).max(axis=2) > 24
+        alone = picture(tab)
         tab.locator("#solid").uncheck()
         empty = picture(tab)
-        tab.locator("#solid").check()
-        solid = np.abs(picture(tab) - empty).max(axis=2) > 24
+    ghost, solid = (where_changed(alone, other) for other in (both, empty))
     assert (ghost & ~solid).sum() > 0.5 * ghost.sum()
 
 
 def moved(tab: Tab, since: float) -> float:
     """The row once the slider has gone on by itself."""
-    slider = tab.locator("#slider")
-    assert soon(lambda: float(slider.input_value()) > since)
-    return float(slider.input_value())
+    assert soon(lambda: at_row(tab) > since)
+    return at_row(tab)
+
+
+def at_row(tab: Tab) -> float:
+    """The row of the slider."""
+    return float(tab.locator("#slider").input_value())
 
 
 @pytest.mark.slow
@@ -624,45 +612,42 @@ def test_it_plays_and_pauses(tab: Tab) -> None:
     first = moved(tab, 0)
     moved(tab, first)
     tab.locator("#play").click()
-    then = float(tab.locator("#slider").input_value())
+    then = at_row(tab)
     assert 0 < first < then < 400
     tab.wait_for_timeout(400)
-    assert float(tab.locator("#slider").input_value()) == then
+    assert at_row(tab) == then
     assert cursors(tab)[0] == pytest.approx(then / 400, abs=0.004)
     assert soon(lambda: tab.locator("#said").text_content().startswith("Paused at "))
 
 
 @pytest.mark.slow
 def test_it_can_be_used_by_keyboard(tab: Tab) -> None:
-    slider = tab.locator("#slider")
+    slider, scene = tab.locator("#slider"), tab.locator("#scene")
     slider.focus()
     for key, value in (("Home", 0), ("ArrowRight", 1), ("End", 400), ("ArrowLeft", 399)):
         tab.keyboard.press(key)
-        assert int(slider.input_value()) == value
+        assert at_row(tab) == value
     assert re.fullmatch(
         r"1\.995 s: wrist_flex [\d.]+°; gripperframe position [\d.]+\u00a0mm apart",
         slider.get_attribute("aria-valuetext"),
     )
-    tab.keyboard.press("Home")
-    tab.keyboard.press(" ")
+    for key in ("Home", " "):
+        tab.keyboard.press(key)
     moved(tab, 0)
     tab.keyboard.press(" ")
-    assert 0 < int(slider.input_value()) < 400
-    tab.locator("#scene").press("0")
+    assert 0 < at_row(tab) < 400
+    scene.press("0")
     before = picture(tab)
-    tab.locator("#scene").press("ArrowLeft")
-    assert changed(before, picture(tab)) > 1000
-    tab.locator("#scene").press("0")
-    assert changed(before, picture(tab)) == 0
+    for key, least, most in (("ArrowLeft", 1000, np.inf), ("0", 0, 0)):
+        scene.press(key)
+        assert least <= changed(before, picture(tab)) <= most
     # Whatever can be reached shows that it was.
     for _ in range(12):
         tab.keyboard.press("Tab")
-        style = tab.evaluate(
+        assert tab.evaluate(
             "(() => { const s = getComputedStyle(document.activeElement);"
-            "return [s.outlineStyle, parseFloat(s.outlineWidth)]; })()"
+            "return s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 2; })()"
         )
-        assert style[0] != "none"
-        assert style[1] >= 2
 
 
 @pytest.mark.slow
@@ -672,12 +657,10 @@ def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
         before = tab.locator("#slider").input_value()
         tab.wait_for_timeout(500)
         assert tab.locator("#slider").input_value() == before  # nothing moves by itself
-        button = tab.locator("#events button.go").first
-        text = button.inner_text()
+        button, clock = tab.locator("#events button.go").first, tab.locator("#clock")
         button.click()
-        clock = tab.locator("#clock")
         y = tab.evaluate("scrollY")
-        assert soon(lambda: clock.inner_text() == text)
+        assert soon(lambda: clock.inner_text() == button.inner_text())
         tab.wait_for_timeout(200)
         assert tab.evaluate("scrollY") == y
         area = tab.locator("#curves .area").first
@@ -696,10 +679,9 @@ def test_the_view_turns_and_comes_back(tab: Tab) -> None:
     tab.mouse.move(box["x"] + 300, box["y"] + 230, steps=4)
     tab.mouse.up()
     assert changed(before, picture(tab)) > 2000
-    tab.locator("#view-near").click()
-    assert changed(before, picture(tab)) > 2000
-    tab.locator("#view-all").click()
-    assert changed(before, picture(tab)) == 0
+    for view, least, most in (("near", 2000, np.inf), ("all", 0, 0)):
+        tab.locator(f"#view-{view}").click()
+        assert least <= changed(before, picture(tab)) <= most
 
 
 # How it looks, and to whom.
@@ -741,13 +723,12 @@ def luminance(colour: str) -> float:
 
 
 def contrast(one: str, two: str) -> float:
-    high, low = sorted((luminance(one), luminance(two)), reverse=True)
-    return (high + 0.05) / (low + 0.05)
+    low, high = sorted((luminance(one) + 0.05, luminance(two) + 0.05))
+    return high / low
 
 
 def test_every_text_can_be_read(page: Path) -> None:
-    css = (ROOT / "statemachine/report/html/page.css").read_text()
-    blocks = re.findall(r":root[^{]*\{([^}]*--paper[^}]*)\}", css)
+    blocks = re.findall(r":root[^{]*\{([^}]*--paper[^}]*)\}", CSS.read_text())
     assert len(blocks) == 4  # light, dark by the system, dark by hand, print
     colours = [dict(re.findall(r"--([\w-]+): (#\w+)", block)) for block in blocks]
     assert colours[1] == colours[2]
@@ -762,7 +743,7 @@ def test_every_text_can_be_read(page: Path) -> None:
 
 def test_the_sides_differ_for_the_colour_blind() -> None:
     """Machado, Oliveira and Fernandes (2009), severity 1, on linear RGB."""
-    css = (ROOT / "statemachine/report/html/page.css").read_text()
+    css = CSS.read_text()
     deficient = {
         "protan": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
                    [-0.003882, -0.048116, 1.051998]],
@@ -802,17 +783,14 @@ def test_what_a_screen_reader_hears(tab: Tab) -> None:
     )
     assert (levels[0], levels.count(1)) == (1, 1)
     assert all(b - a <= 1 for a, b in itertools.pairwise(levels))
-    nameless = tab.evaluate(
+    for nameless in (
         """[...document.querySelectorAll('button, input, select, a, [role=img], [tabindex]')]
         .filter((e) => !(e.getAttribute('aria-label') || e.textContent.trim()
-          || (e.labels && e.labels.length))).map((e) => e.outerHTML)"""
-    )
-    assert nameless == []
-    tables = tab.evaluate(
-        "[...document.querySelectorAll('table')].map((t) => [!!t.caption?.textContent,"
-        "[...t.querySelectorAll('th')].every((h) => h.scope)])"
-    )
-    assert all(caption and scoped for caption, scoped in tables)
+          || (e.labels && e.labels.length))).map((e) => e.outerHTML)""",
+        """[...document.querySelectorAll('table')].filter((t) => !(t.caption?.textContent
+          && [...t.querySelectorAll('th')].every((h) => h.scope))).map((t) => t.outerHTML)""",
+    ):
+        assert tab.evaluate(nameless) == []
     assert tab.locator("#said").get_attribute("aria-live") == "polite"
 
 
@@ -831,8 +809,8 @@ def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
         assert "shoulder_pan" in tab.locator("#curves > details").inner_text()
         assert tab.locator("#printed").is_visible()
         assert picture(tab, "#printed").std() > 10
-        for name in ("#play", "#slider", "#theme", "#views", "#checks"):
-            assert not tab.locator(name).is_visible()
+        names = "#play", "#slider", "#theme", "#views", "#checks"
+        assert not [name for name in names if tab.locator(name).is_visible()]
         tab.emulate_media(media="screen")
         tab.evaluate("dispatchEvent(new Event('afterprint'))")
         assert tab.locator("#printed").count() == 0
@@ -899,7 +877,7 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(uneven: Made, se
 def test_without_the_model_there_are_sticks(hold: Made, seen: Seen) -> None:
     none = "there is no so101/scene.xml here"
     with seen(hold, looks=(none, none)) as tab:
-        assert "there is no so101/scene.xml here" in tab.locator("#picture").inner_text()
+        assert none in tab.locator("#picture").inner_text()
         tab.locator("#view-all").click()
         before = picture(tab)
         go(tab, 0)
@@ -908,11 +886,11 @@ def test_without_the_model_there_are_sticks(hold: Made, seen: Seen) -> None:
 
 @pytest.mark.slow
 def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, seen: Seen) -> None:
-    bare = [
+    one, two = (
         Trace(t.header, {k: v for k, v in t.columns.items() if k not in ("xpos", "xquat")})
         for t in hold[1:3]
-    ]
-    with seen(of_look(bare[0], bare[1], hold[3])) as tab:
+    )
+    with seen(of_look(one, two, hold[3])) as tab:
         assert "no poses" in tab.locator("#still").inner_text()
         go(tab, 100)
         assert tab.locator("#clock").inner_text() == "0.500 s"
@@ -933,23 +911,15 @@ def test_a_page_without_matplotlib_says_where_its_charts_are(
 # Shapes.
 
 
-def test_a_mesh_keeps_its_surface() -> None:
+def test_a_mesh_keeps_its_surface_and_too_many_triangles_are_made_fewer() -> None:
     drawing = drawing_of(sm.load("so101/scene"))
-    mesh = mesh_of(drawing)
+    whole, fewer = mesh_of(drawing), mesh_of(drawing, most=2000)
     wanted = sum(area_of(p) for p in drawing.parts if not p.endless)
-    assert area_of(mesh) == pytest.approx(wanted, rel=1e-5)
-    assert not mesh.simplified
-
-
-def test_too_many_triangles_are_made_fewer() -> None:
-    drawing = drawing_of(sm.load("so101/scene"))
-    mesh = mesh_of(drawing, most=2000)
-    assert 500 < len(mesh.faces) <= 2000 < mesh.simplified
-    whole = mesh_of(drawing)
-    for k in (0, 1):
-        ends = [np.sort(m.vertices, axis=0)[[0, -1][k]] for m in (mesh, whole)]
-        assert ends[0] == pytest.approx(ends[1], abs=0.02)
+    assert area_of(whole) == pytest.approx(wanted, rel=1e-5)
     assert not whole.simplified
+    assert 500 < len(fewer.faces) <= 2000 < fewer.simplified
+    for end in (np.min, np.max):
+        assert end(fewer.vertices, 0) == pytest.approx(end(whole.vertices, 0), abs=0.02)
 
 
 def test_normals_are_those_of_the_faces(tab: Tab) -> None:
@@ -974,11 +944,10 @@ def test_bones_reach_from_body_to_body(hold: Made) -> None:
     chain = [body for body, parent in enumerate(one.header.body_parentid) if body and parent]
     assert len(drawing.parts) == len(chain) + 2  # a knob at the end of each branch
     for body, part in zip(chain, drawing.parts, strict=False):
-        end = part.vertices[np.linalg.norm(part.vertices, axis=1).argmax()]
         apart = one["xpos"][0, body] - one["xpos"][0, one.header.body_parentid[body]]
-        if not apart.any():
-            continue  # the camera's mount has its origin where the gripper has
-        assert np.linalg.norm(end) == pytest.approx(np.linalg.norm(apart), abs=1e-6)
+        if apart.any():  # the camera's mount has its origin where the gripper has
+            reach = np.linalg.norm(part.vertices, axis=1).max()
+            assert reach == pytest.approx(np.linalg.norm(apart), abs=1e-6)
 
 
 # The command.
@@ -1013,5 +982,4 @@ def test_any_page_can_be_drawn() -> None:
         *("An origin", "First.", "●", "&lt;b&gt;", "<li>two</li>", 'data-t="1.500000"'),
     )
     assert not page.holds
-    written = markdown(page, lambda _: "")
-    assert_in(written, "## More", "<details><summary>Deep</summary>")
+    assert_in(markdown(page, lambda _: ""), "## More", "<details><summary>Deep</summary>")

@@ -200,24 +200,24 @@ def test_many_cells_are_told_beforehand() -> None:
     assert any("20,000 cells" in line for line in prepared(small("hold", seeds=20_000)).said)
 
 
+RANGES = Vary("damping", bounds=(0.0, 2.0)), Vary("kp", bounds=(10.0, 20.0))
+
+
 def test_the_points_of_a_design() -> None:
     listed = Vary("contacts", values=(True, False))
-    one, two = Vary("damping", bounds=(0.0, 2.0)), Vary("kp", bounds=(10.0, 20.0))
-    points = list(Design((one, listed, two), samples=8).points())
-    assert len(points) == Design((one, listed, two), samples=8).size == 16
-    assert len({point.id for point in points}) == 16
-    drawn = np.array([(p.values[0], p.values[2]) for p in points if p.values[1]])
+    few, more = (Design((RANGES[0], listed, RANGES[1]), samples=count) for count in (8, 16))
+    points = {point.id: point.values for point in few.points()}
+    assert len(points) == len(list(few.points())) == few.size == 16
+    drawn = np.array([(one, two) for one, on, two in points.values() if on])
     # Each eighth of each range has one point: a Sobol sequence, not a random one.
-    assert sorted((drawn[:, 0] // 0.25).astype(int)) == list(range(8))
-    assert sorted(((drawn[:, 1] - 10) // 1.25).astype(int)) == list(range(8))
+    eighths = np.sort((drawn - [0, 10]) // [0.25, 1.25], axis=0)
+    assert eighths.T.tolist() == [[*range(8)]] * 2
     # More samples keep the first ones.
-    more = {point.id for point in Design((one, listed, two), samples=16).points()}
-    assert {point.id for point in points} < more
+    assert points.keys() < {point.id for point in more.points()}
 
 
 def test_the_points_of_indices() -> None:
-    one, two = Vary("damping", bounds=(0.0, 2.0)), Vary("kp", bounds=(10.0, 20.0))
-    design = Design((one, two), samples=4, indices=True)
+    design = Design(RANGES, samples=4, indices=True)
     points = np.array([point.values for point in design.points()])
     assert design.size == len(points) == 16
     a, b, damping, kp = points.reshape(4, 4, 2)
@@ -229,15 +229,15 @@ def test_the_points_of_indices() -> None:
 def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
     """It is legal, and usually a mistake."""
     low, high = sm.load("so101").jnt_range[sm.load("so101").joint_id("elbow_flex")]
-
-    def said(word: str) -> list[str]:
-        return [line for line in prepared(small("hold", word)).said if "outside" in line]
-
-    (line,) = said("qpos[elbow_flex]=-3:1:3")
+    words = (
+        "qpos[elbow_flex]=-3:1:3",
+        f"qpos[elbow_flex]={low}:{high}:3",
+        "qvel[elbow_flex]=-30:30:3",
+    )
+    said = [line for word in words for line in prepared(small("hold", word)).said]
+    (line,) = (line for line in said if "outside" in line)
     assert line.startswith("qpos[elbow_flex]=-3 starts outside the range of the joint")
     assert f"{low:.4g} to {high:.4g} rad" in line
-    assert not said(f"qpos[elbow_flex]={low}:{high}:3")
-    assert not said("qvel[elbow_flex]=-30:30:3")
 
 
 # The cells.
@@ -249,6 +249,7 @@ def test_a_cell_is_the_run_of_a_trace(scene: sm.Model, backend: str) -> None:
     options = {"timestep": 0.004, "damping": 0.5 * scene.dof_damping}
     trace = record_scenario(scenario("hold"), scene, seconds=0.4, options=options)
     assert row["status"] == "done", row
+    rows = np.searchsorted(trace.time, np.array(row["sample_time"]) - 1e-9)
     assert_has(
         row,
         steps=100,
@@ -256,13 +257,12 @@ def test_a_cell_is_the_run_of_a_trace(scene: sm.Model, backend: str) -> None:
         qpos=trace.qpos[-1].tolist(),
         qvel=trace.qvel[-1].tolist(),
         max_qvel=np.abs(trace.qvel[1:]).max(),
+        sample_qpos=trace.qpos[rows].tolist(),
+        energy=pytest.approx(trace["energy"][-1].sum(), abs=1e-9),
+        first_touch=trace.time[trace["contact_row"][0]],
     )
-    rows = np.searchsorted(trace.time, np.array(row["sample_time"]) - 1e-9)
-    assert row["sample_qpos"] == trace.qpos[rows].tolist()
-    site = scene.site_id("gripperframe")
-    assert np.allclose(row["sample_tip"], trace["site_xpos"][rows, site], atol=1e-9)
-    assert np.isclose(row["energy"], trace["energy"][-1].sum(), atol=1e-9)
-    assert row["first_touch"] == trace.time[trace["contact_row"][0]]
+    tip = trace["site_xpos"][rows, scene.site_id("gripperframe")]
+    assert np.allclose(row["sample_tip"], tip, atol=1e-9)
     assert row["touch"]
 
 
@@ -301,15 +301,15 @@ def test_a_start_a_place_and_a_parameter(policy: str) -> None:
 def test_a_cell_that_fails_is_a_row(policy: str) -> None:
     both = Sweep("hold", ("integrator=euler",), ("mujoco", "pybullet"), seconds=0.05)
     rows = {row["backend"]: row for row in in_process(both)}
-    assert rows["mujoco"]["status"] == "done"
-    assert rows["pybullet"]["error_class"] == "UnsupportedError"
     fast, fine = in_process(small("hold", "qvel[elbow_flex]=1e9,0"))
-    assert (fast["error_class"], fine["status"]) == ("DivergedError", "done")
     (late,) = in_process(small("hold", "timestep=1e-4", timeout=1e-6))
-    assert late["error_class"] == "TimedOutError"
+    good, wrong = in_process(small(f"{policy}:fails", "gain=1,2"))
+    failed = rows["pybullet"], fast, late, wrong
+    assert {row["status"] for row in (rows["mujoco"], fine, good)} == {"done"}
+    assert [row["error_class"] for row in failed] == [
+        "UnsupportedError", "DivergedError", "TimedOutError", "BadInputError",
+    ]  # fmt: skip
     assert late["steps"] < 500
-    fine, wrong = in_process(small(f"{policy}:fails", "gain=1,2"))
-    assert (fine["status"], wrong["error_class"]) == ("done", "BadInputError")
     assert "policy.py, line" in wrong["error"]
 
 
@@ -334,18 +334,21 @@ def test_a_request_is_kept_and_another_one_refused(tmp_path: Path) -> None:
     settle_manifest(tmp_path, first.manifest(), False)
     told = read_manifest(tmp_path)
     assert (design_of(told), told["cells"], told["points"]) == (first.design, 2, 2)
-    longer = prepared(small("hold", "timestep=0.005,0.01", seconds=0.1))
-    more = prepared(small("hold", "timestep=0.005,0.01", seeds=2))
-    other = prepared(small("hold", "damping=1"))
-    refused(*(
-        (BadInputError, says, partial(settle_manifest, tmp_path, another.manifest(), extend))
-        for another, extend, says in (
-            (longer, True, r"seconds 0.05 there, 0.1 here"),
-            (other, True, "varies timestep"),
-            (more, False, r"seeds 1 there, 2 here.*--extend"),
+    longer, more, other = (
+        prepared(small("hold", vary, **others)).manifest()
+        for vary, others in (
+            ("timestep=0.005,0.01", {"seconds": 0.1}),
+            ("timestep=0.005,0.01", {"seeds": 2}),
+            ("damping=1", {}),
         )
-    ))  # fmt: skip
-    settle_manifest(tmp_path, more.manifest(), True)
+    )
+    settled = partial(settle_manifest, tmp_path)
+    refused(
+        (BadInputError, r"seconds 0.05 there, 0.1 here", lambda: settled(longer, True)),
+        (BadInputError, "varies timestep", lambda: settled(other, True)),
+        (BadInputError, r"seeds 1 there, 2 here.*--extend", lambda: settled(more, False)),
+    )
+    settled(more, True)
     assert read_manifest(tmp_path)["design"]["seeds"] == 2
 
 
@@ -378,8 +381,8 @@ def test_rows_are_written_whole_and_read_in_order(two_rows: Any, tmp_path: Path)
     assert dict(counted(tmp_path)) == {row["cell"]: "done" for row in rows}
     table = read_cells(tmp_path)
     assert table["cell"].to_pylist() == sorted(row["cell"] for row in rows)
-    assert set(table["backend"].to_pylist()) == {"mujoco"}
-    assert set(table["vary.timestep"].to_pylist()) == {0.005, 0.01}
+    both = zip(table["backend"].to_pylist(), table["vary.timestep"].to_pylist(), strict=True)
+    assert set(both) == {("mujoco", 0.005), ("mujoco", 0.01)}
     assert table.column_names == [
         *[name for name, *_ in COLUMNS[:3]],
         "vary.timestep",
@@ -405,7 +408,7 @@ def _part(folder: Path) -> Path:
 
 def test_a_flipped_bit_is_never_another_value(dataset: Path) -> None:
     part, draw = _part(dataset), random.Random(1)
-    whole = part.read_bytes()
+    whole, says = part.read_bytes(), re.escape(f"{part} cannot be read")
     places = [
         *range(len(whole) - 200, len(whole)),
         *(draw.randrange(len(whole)) for _ in range(400)),
@@ -413,8 +416,7 @@ def test_a_flipped_bit_is_never_another_value(dataset: Path) -> None:
     for place in places:
         bad = bytearray(whole)
         bad[place] ^= 1 << draw.randrange(8)
-        part.write_bytes(bytes(bad))
-        says = re.escape(f"{part} cannot be read")
+        part.write_bytes(bad)
         refused(
             (BadInputError, says, lambda: read_cells(dataset)),
             (BadInputError, says, lambda: dict(counted(dataset))),
@@ -458,9 +460,9 @@ def test_a_file_says_what_it_is_without_the_manifest(dataset: Path) -> None:
     facts = {field.name: field.metadata for field in schema}
     assert all(facts.values())
     assert b"multiple of the model's own" in facts["vary.damping"][b"meaning"]
-    assert facts["vary.damping"][b"unit"] == b""
     assert facts["vary.timestep"] == {b"unit": b"s", b"meaning": b"timestep of the model"}
-    assert facts["max_qvel"][b"unit"] == b"rad/s or m/s"
+    units = {"vary.damping": b"", "max_qvel": b"rad/s or m/s"}
+    assert {name: facts[name][b"unit"] for name in units} == units
     told = json.loads(schema.metadata[KEY])
     assert_has(told["design"], vary=["damping=0.5x,1x", "timestep=0.005"], seeds=1)
     assert told["request"]["what"] == "hold"
@@ -505,9 +507,10 @@ def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> No
     sweep = prepared(small("hold"))
     whole = json.dumps(sweep.manifest())
     (tmp_path / "cells").mkdir()
+    run, read = partial(run_sweep, sweep, tmp_path), partial(read_manifest, tmp_path)
     refused(
-        (BadInputError, r"holds cells and no sweep\.json", lambda: run_sweep(sweep, tmp_path)),
-        (BadInputError, r"is not a sweep: it has no sweep\.json", lambda: read_manifest(tmp_path)),
+        (BadInputError, r"holds cells and no sweep\.json", run),
+        (BadInputError, r"is not a sweep: it has no sweep\.json", read),
     )
     for text in (
         whole[:200],
@@ -515,10 +518,7 @@ def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> No
         json.dumps({**json.loads(whole), "factors": [{"name": 1}]}),
     ):
         (tmp_path / "sweep.json").write_text(text)
-        refused(
-            (BadInputError, r"sweep\.json is damaged", lambda: read_manifest(tmp_path)),
-            (BadInputError, r"sweep\.json is damaged", lambda: run_sweep(sweep, tmp_path)),
-        )
+        refused(*((BadInputError, r"sweep\.json is damaged", use) for use in (run, read)))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit stands in for a full disk")
@@ -548,17 +548,13 @@ def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> 
 def test_jobs_do_not_change_results(tmp_path: Path) -> None:
     sweep = Sweep("hold", ("timestep=0.005,0.01", "damping=1x,2x"), seeds=2, seconds=0.1)
     serial = sorted(in_process(sweep), key=lambda row: row["cell"])
-    tables = []
-    for jobs in (1, 2):
+    for jobs, ran in ((1, 16), (2, 16), (2, 0)):
         summary = run_sweep(sweep, tmp_path / str(jobs), jobs=jobs)
-        assert (summary.cells, summary.done, summary.ran, summary.missing) == (16, 16, 16, 0)
-        tables.append(values(tmp_path / str(jobs)))
-    assert tables[0].equals(tables[1])
-    for name in ("cell", "seed", "qpos", "sample_qpos", "sample_tip", "energy", "touch"):
-        assert tables[0][name].to_pylist() == [row.get(name) for row in serial]
-    again = run_sweep(sweep, tmp_path / "2", jobs=2)
-    assert (again.ran, again.done) == (0, 16)
-    assert values(tmp_path / "2").equals(tables[1])
+        assert_has(summary, cells=16, done=16, ran=ran, missing=0)
+        table = values(tmp_path / str(jobs))
+        assert table.equals(values(tmp_path / "1"))
+        for name in ("cell", "seed", "qpos", "sample_qpos", "sample_tip", "energy", "touch"):
+            assert table[name].to_pylist() == [row.get(name) for row in serial]
 
 
 @pytest.mark.slow
@@ -569,10 +565,8 @@ def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs:
         out = tmp_path / name
         summary = run_sweep(sweep, out, jobs=jobs)
         assert (summary.done, dict(summary.failed), summary.missing) == (6, {kind: 2}, 0)
-        failed = [
-            row["vary.gain"] for row in read_cells(out).to_pylist() if row["status"] == "failed"
-        ]
-        assert failed == [2.0, 2.0]
+        rows = read_cells(out).to_pylist()
+        assert [r["vary.gain"] for r in rows if r["status"] == "failed"] == [2.0, 2.0]
 
 
 NO_ALARM = """
@@ -710,8 +704,8 @@ def test_cells_that_failed_are_run_again_if_asked(
         "sweep._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "main(sys.argv[1:])"
     )
-    driver = start("--retry-failed", program=["-c", code, *words])
-    assert driver.wait() == -signal.SIGKILL
+    killed = start("--retry-failed", program=["-c", code, *words])
+    assert killed.wait() == -signal.SIGKILL
     assert list(dict(counted(tmp_path / "out")).values()) == ["done", "done"]
     last = run("--retry-failed")
     assert (last["done"], last["failed"], last["ran"]) == (8, {}, 6)

@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Self
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -24,7 +25,9 @@ from statemachine.errors import BadInputError, TraceError, UnknownNameError
 from statemachine.measures import Gap
 from statemachine.page import Figures
 from statemachine.runs import record, write
+from statemachine.view import server as serving
 from statemachine.view.live import Command, Live, Tempo
+from statemachine.view.server import Door
 from statemachine.view.session import (
     LiveSession,
     TraceSession,
@@ -66,14 +69,12 @@ def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -
             sm.step(model, plain)
             session.advance()
             frame = session.frame()
-        data = session._arms[0][1]
         for name in ("qpos", "qvel", "ctrl"):
-            np.testing.assert_array_equal(getattr(plain, name), getattr(data, name))
+            np.testing.assert_array_equal(getattr(plain, name), getattr(session._arms[0][1], name))
         sm.forward(model, plain)
-        np.testing.assert_array_equal(frame.poses[0].xpos, plain.xpos)
-        np.testing.assert_array_equal(frame.poses[0].xquat, plain.xquat)
-        tip: Any = frame.poses[0].tip
-        np.testing.assert_array_equal(tip, plain.site_xpos[model.site_id("gripperframe")])
+        tip = plain.site_xpos[model.site_id("gripperframe")]
+        for name, wanted in {"xpos": plain.xpos, "xquat": plain.xquat, "tip": tip}.items():
+            np.testing.assert_array_equal(getattr(frame.poses[0], name), wanted)
         assert (frame.time, frame.steps) == (plain.time, 150)
 
 
@@ -94,14 +95,13 @@ def test_commands_do_what_they_say(session: LiveSession) -> None:
     session.play()
     assert session.frame().running
     session.step(7)
-    frame = session.frame()
-    assert_has(frame, running=False, steps=7, time=pytest.approx(6 + 7 * session.timestep))
+    later = pytest.approx(6 + 7 * session.timestep)
+    assert_has(session.frame(), running=False, steps=7, time=later)
     session.play()
     session.pause()
     assert not session.running
     session.reset(1)
-    frame = session.frame()
-    assert (frame.time, frame.steps) == (59.522, 0)
+    assert_has(session.frame(), time=59.522, steps=0)
     session.reset()
     frame = session.frame()
     assert (frame.time, frame.resets) == (0, start.resets + 2)
@@ -163,9 +163,8 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
         session.set_ctrl(2, 1e150)
         session.advance(5)
         bad = session.frame()
-        assert_has(bad, running=False, steps=good.steps)
+        assert_has(bad, running=False, steps=good.steps, time=good.time)  # the last good moment
         assert bad.trouble.startswith("mujoco: ")
-        assert bad.time == good.time  # the last moment that was good
         np.testing.assert_array_equal(bad.poses[0].xpos, good.poses[0].xpos)
         session.play()
         assert not session.running
@@ -274,9 +273,6 @@ class Slow(LiveSession):
         super().__init__([sm.load("so101/scene")])
         self.clock, self.cost = clock, cost
 
-    def __enter__(self) -> Self:
-        return self
-
     def advance(self, count: int = 1) -> None:
         super().advance(count)
         self.clock.now += self.cost * count
@@ -293,7 +289,8 @@ def turned(loop: Live, hand: Hand, *asked: Command, turns: int = 1) -> tuple[Fig
 @contextmanager
 def live(cost: float = 0.0, speed: float = 1.0) -> Iterator[tuple[Slow, Live, Hand, Clock]]:
     clock, hand = Clock(), Hand()
-    with Slow(clock, cost) as session:
+    session = Slow(clock, cost)
+    with session:
         session.set_speed(speed)
         yield session, Live(session, hand, clock, clock.sleep), hand, clock
 
@@ -404,8 +401,7 @@ def test_a_recording_is_played_and_sought(mujoco_scene: sm.Model) -> None:
     np.testing.assert_array_equal(frame.poses[1].xpos, fallen["xpos"][30])
     assert frame.joint_apart.size == np.abs(held.qpos[30] - fallen.qpos[30]).max()
     recording.advance(10_000)
-    end = recording.frame()
-    assert (end.steps, end.running) == (100, False)
+    assert_has(recording.frame(), steps=100, running=False)
     for call, value, steps in (("seek", 0.2, 40), ("step", 2, 42), ("seek", -5, 0)):
         getattr(recording, call)(value)
         assert recording.frame().steps == steps
@@ -416,14 +412,13 @@ def test_a_recording_is_played_and_sought(mujoco_scene: sm.Model) -> None:
 
 
 def test_moments_that_are_not_the_same_are_not_compared(mujoco_scene: sm.Model) -> None:
-    one = record(mujoco_scene, seconds=0.1)
-    two = record(mujoco_scene.replace(timestep=1 / 240), seconds=0.1)
+    models = mujoco_scene, mujoco_scene.replace(timestep=1 / 240)
+    one, two = (record(model, seconds=0.1) for model in models)
     recording = TraceSession([one, two])
     assert recording.frame().joint_apart is not None  # both at 0
     recording.advance(1)
-    frame = recording.frame()
-    assert (frame.joint_apart, frame.tips_apart) == (None, None)
-    np.testing.assert_array_equal(frame.poses[1].xpos, two["xpos"][1])
+    assert_has(recording.frame(), joint_apart=None, tips_apart=None)
+    np.testing.assert_array_equal(recording.frame().poses[1].xpos, two["xpos"][1])
 
 
 # The command
@@ -482,18 +477,15 @@ class Viewer:
 def _listening(pid: int) -> set[str]:
     """Addresses on which a process listens, as the kernel's tables have them."""
     sockets = set()
-    for name in os.listdir(f"/proc/{pid}/fd"):
-        try:
-            sockets.add(os.readlink(f"/proc/{pid}/fd/{name}"))
-        except OSError:
-            continue
-    found = set()
-    for table in ("tcp", "tcp6"):
-        for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]:
-            words = line.split()
-            if words[3] == "0A" and f"socket:[{words[9]}]" in sockets:
-                found.add(words[1])
-    return found
+    for link in Path(f"/proc/{pid}/fd").iterdir():
+        with suppress(OSError):
+            sockets.add(os.readlink(link))
+    rows = [
+        line.split()
+        for table in ("tcp", "tcp6")
+        for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]
+    ]
+    return {row[1] for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in sockets}
 
 
 @pytest.mark.usefixtures("viser")
@@ -550,43 +542,42 @@ def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(
         assert_in(viewer.end(), "box of so101/scene_box", f"mujoco {mujoco_box.engine_version}")
 
 
+@contextmanager
+def served(door: Door | None = None) -> Iterator[Any]:
+    """A server of viser's behind a door."""
+    port = serving.free_port("127.0.0.1", 0)
+    server = serving.serve("127.0.0.1", port, "t", door or Door("127.0.0.1"))
+    try:
+        yield server
+    finally:
+        serving.stop(server)
+
+
 def test_nobody_opens_a_tunnel_from_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tab may ask for a public address; viser would ask its makers' server for one."""
     viser = pytest.importorskip("viser")
     from viser import _messages, _viser
 
-    from statemachine.view import server as serving
-
-    opened: list[object] = []
-    monkeypatch.setattr(_viser, "ViserTunnel", lambda *words: opened.append(words))
-    port = serving.free_port("127.0.0.1", 0)
-    server = serving.serve("127.0.0.1", port, "t", serving.Door("127.0.0.1"))
-    try:
+    tunnel = Mock()
+    monkeypatch.setattr(_viser, "ViserTunnel", tunnel)
+    with served() as server:
         assert isinstance(server, viser.ViserServer)
         handlers = server._websock_server._incoming_handlers[_messages.ShareUrlRequest]
         assert handlers
         for handler in handlers:
             handler(0, _messages.ShareUrlRequest())
         server._thread_executor.shutdown(wait=True)
-        assert opened == []
-    finally:
-        serving.stop(server)
+    tunnel.assert_not_called()
 
 
 def test_an_interrupt_that_is_swallowed_ends_it_all_the_same() -> None:
     """NumPy swallows a Ctrl-C that falls into a comparison."""
-    ran: list[int] = []
     stop: list[int] = []
 
-    class Turning(Live):
-        def __init__(self) -> None:
-            self._clock = time.monotonic
+    def turn() -> None:
+        with suppress(KeyboardInterrupt):
+            stop.append(signal.SIGINT)
+            raise KeyboardInterrupt
 
-        def turn(self) -> None:
-            ran.append(1)
-            with suppress(KeyboardInterrupt):
-                stop.append(signal.SIGINT)
-                raise KeyboardInterrupt
-
-    Turning().run(None, stop)
-    assert len(ran) == 1
+    Live.run(Mock(turn=turn, _clock=time.monotonic), None, stop)
+    assert stop == [signal.SIGINT]

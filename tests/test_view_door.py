@@ -5,15 +5,15 @@ from __future__ import annotations
 import asyncio
 import http.client
 from collections.abc import Iterator
-from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from statemachine.errors import MissingEngineError
-from statemachine.view import server as serving
 from statemachine.view.server import Door
 
 from .conftest import assert_in, refused
+from .test_view import served as served_behind
 
 pytestmark = pytest.mark.usefixtures("viser")
 
@@ -21,13 +21,9 @@ pytestmark = pytest.mark.usefixtures("viser")
 class Served:
     """An empty page behind a door."""
 
-    def __init__(self) -> None:
-        self.door = Door("127.0.0.1")
-        port = serving.free_port("127.0.0.1", 0)
-        self.server = serving.serve("127.0.0.1", port, "t", self.door)
-        self.port: int = self.server.get_port()
-        self.own = f"localhost:{self.port}"
-        self.cookie = self.door.cookie(self.port).partition(";")[0]
+    def __init__(self, door: Door, port: int) -> None:
+        self.door, self.port, self.own = door, port, f"localhost:{port}"
+        self.cookie = door.cookie(port).partition(";")[0]
 
     def get(self, path: str, host: str | None = None, **headers: str) -> http.client.HTTPResponse:
         """Ask for a page, under a name."""
@@ -47,10 +43,9 @@ class Served:
         import websockets
 
         async def attempt() -> bool:
-            address = f"ws://{host or self.own}{path}"
             try:
                 async with websockets.connect(
-                    address,
+                    f"ws://{host or self.own}{path}",
                     host="127.0.0.1",
                     port=self.port,
                     subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
@@ -69,9 +64,9 @@ class Served:
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    made = Served()
-    yield made
-    serving.stop(made.server)
+    door = Door("127.0.0.1")
+    with served_behind(door) as server:
+        yield Served(door, server.get_port())
 
 
 def test_the_address_with_its_token_opens_the_page(served: Served) -> None:
@@ -90,8 +85,7 @@ def test_the_address_with_its_token_opens_the_page(served: Served) -> None:
 @pytest.mark.parametrize("path", ["/", "/?token=", "/?token=wrong", "/index.html", "/nothing"])
 def test_without_the_token_there_is_nothing(served: Served, path: str) -> None:
     answer = served.get(path)
-    assert answer.status == 403
-    assert answer.headers["Set-Cookie"] is None
+    assert (answer.status, answer.headers["Set-Cookie"]) == (403, None)
     assert not served.connects(path, Origin=f"http://{served.own}")
 
 
@@ -108,9 +102,8 @@ def test_a_page_of_another_site_is_refused(served: Served, origin: str) -> None:
 )
 def test_a_name_that_is_not_this_machine_is_refused(served: Served, host: str) -> None:
     """A stranger's name may be given this machine's address while its page is open."""
-    page = f"http://{host}"
     assert served.get("/", host, Cookie=served.cookie).status == 403
-    assert not served.connects(host=host, Cookie=served.cookie, Origin=page)
+    assert not served.connects(host=host, Cookie=served.cookie, Origin=f"http://{host}")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:{}", "[::1]:{}", "LOCALHOST:{}", "192.0.2.7"])
@@ -121,20 +114,7 @@ def test_names_and_numbers_of_this_machine_are_taken(served: Served, host: str) 
 def test_a_viser_that_cannot_be_guarded_is_not_served(monkeypatch: pytest.MonkeyPatch) -> None:
     import viser
 
-    stopped: list[Any] = []
-
-    class Other:
-        def __init__(self, **_arguments: Any) -> None: ...
-
-        def stop(self) -> None:
-            stopped.append(self)
-
-    monkeypatch.setattr(viser, "ViserServer", Other)
-    refused(
-        (
-            MissingEngineError,
-            "let everybody in",
-            lambda: serving.serve("127.0.0.1", 0, "t", Door("127.0.0.1")),
-        )
-    )
-    assert len(stopped) == 1
+    other = Mock(return_value=Mock(spec=["stop"]))  # without what a door is put into
+    monkeypatch.setattr(viser, "ViserServer", other)
+    refused((MissingEngineError, "let everybody in", served_behind().__enter__))
+    other().stop.assert_called_once_with()

@@ -16,15 +16,14 @@ import pytest
 import statemachine as sm
 from statemachine.drawing import drawing_of
 from statemachine.runs import record
-from statemachine.view import server as serving
 from statemachine.view.live import Live, Tempo
 from statemachine.view.server import Door
 from statemachine.view.session import LiveSession, TraceSession
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
-from .browser import Tab, browser, tabs
+from .browser import Tab, browser
 from .conftest import assert_not_in
-from .test_view import Viewer, _free_pair
+from .test_view import Viewer, _free_pair, served
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("viser")]  # a browser at work
 
@@ -33,39 +32,29 @@ KNOWN = ("THREE.Clock",)
 PATIENCE = 90.0  # seconds, on a machine that draws without a graphics card and does more
 
 
-def _serve(door: Door) -> Any:
-    return serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "page", door)
-
-
 class Stage:
     """A session on a page, with tabs before it; time passes only in `until`."""
 
-    def __init__(self, session: LiveSession, model: sm.Model, new_tab: Callable[[], Tab]) -> None:
-        self.session, self.new_tab = session, new_tab
-        self.door = Door("127.0.0.1")
-        self.server = _serve(self.door)
-        front = ViserFront(self.server, session, drawing_of(model))
+    def __init__(
+        self, session: LiveSession, model: sm.Model, server: Any, address: str, tab: Tab
+    ) -> None:
+        self.session, self.tab = session, tab
+        front = ViserFront(server, session, drawing_of(model))
         self.live = Live(session, front, sleep=lambda seconds: None)
-        self.tab = self.open()
+        tab.goto(address)
+        self.until(lambda: tab.get_by_role("slider").count() == 6)
 
-    def open(self) -> Tab:
-        """A new tab with the page, all of it there."""
-        tab = self.new_tab()
-        tab.goto(f"http://127.0.0.1:{self.server.get_port()}/?token={self.door.token}")
-        self.until(lambda: tab.get_by_role("slider").count() == 6, tab)
-        return tab
-
-    def until(self, reached: Callable[[], bool], tab: Tab | None = None) -> None:
+    def until(self, reached: Callable[[], bool]) -> None:
         """Turn the loop until something is so."""
         end = time.monotonic() + PATIENCE
         while not reached():
-            assert time.monotonic() < end, (tab or self.tab).inner_text("body")
+            assert time.monotonic() < end, self.tab.inner_text("body")
             self.live.turn()
-            (tab or self.tab).wait_for_timeout(20)
+            self.tab.wait_for_timeout(20)
 
-    def says(self, text: str, tab: Tab | None = None) -> None:
+    def says(self, text: str) -> None:
         """Wait until the page says so."""
-        self.until(lambda: (tab or self.tab).get_by_text(text).count() > 0, tab)
+        self.until(lambda: self.tab.get_by_text(text).count() > 0)
 
     def reset(self) -> None:
         """Everything to the start, and the time standing."""
@@ -77,23 +66,23 @@ class Stage:
         """A button, by what stands on it."""
         self.tab.get_by_role("button", name=name, exact=True).click()
 
-    def slider(self, index: int, tab: Tab | None = None) -> float:
+    def slider(self, index: int) -> float:
         """What a slider shows."""
-        thumb = (tab or self.tab).get_by_role("slider").nth(index)
+        thumb = self.tab.get_by_role("slider").nth(index)
         return float(thumb.get_attribute("aria-valuenow"))
 
 
 @pytest.fixture(scope="module")
 def stage() -> Iterator[Stage]:
     """The arm, and as its ghost the arm without its servos, which falls."""
-    model = sm.load("so101/scene")
+    model, door = sm.load("so101/scene"), Door("127.0.0.1")
     with (
-        tabs(1000, 640) as new_tab,
+        browser(width=1000, height=640) as tab,
         LiveSession([model, model.replace(actuation=False)]) as session,
+        served(door) as server,
     ):
-        made = Stage(session, model, new_tab)
-        yield made
-        serving.stop(made.server)
+        address = f"http://127.0.0.1:{server.get_port()}/?token={door.token}"
+        yield Stage(session, model, server, address, tab)
 
 
 def _colours(tab: Tab) -> tuple[int, int]:
@@ -118,7 +107,7 @@ def test_everything_is_on_the_page_and_nothing_is_asked_of_the_network(stage: St
     stage.until(lambda: stage.slider(1) == pytest.approx(0))
     assert stage.tab.get_by_text("Share").count() == 0
     hosts = {url.split("/")[2] for url in stage.tab.requests if not url.startswith("blob:")}
-    assert hosts == {f"127.0.0.1:{stage.server.get_port()}"}
+    assert hosts == {stage.tab.url.split("/")[2]}
     stage.tab.nothing_wrong(*KNOWN)
 
 
@@ -225,52 +214,42 @@ def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
 def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
     models = [sm.load("so101/scene_box", backend=name) for name in ("mujoco", "pybullet")]
     drawing = drawing_of(models[0])
-    with LiveSession(models, "held") as session:
+    with LiveSession(models, "held") as session, served() as server:
         session.set_ctrl(0, 0.7)
         session.advance(100)
-        server = _serve(Door("127.0.0.1"))
-        try:
-            front = ViserFront(server, session, drawing, 0)
-            front.show(session.frame(), Tempo(1.0, None, False), "")
-            placed = 0
-            for root, (_, data) in zip(("/mujoco", "/pybullet ghost"), session._arms, strict=True):
-                for body in range(1, models[0].nbody):
-                    handle = server.scene.get_handle_by_name(f"{root}/{body}")
-                    # viser sends nothing for what moved by micrometres.
-                    np.testing.assert_allclose(handle.position, data.xpos[body], atol=1e-5)
-                    np.testing.assert_allclose(handle.wxyz, data.xquat[body], atol=1e-5)
-                    placed += 1
-            assert placed == 2 * 9
-            # A keyframe's commands are shown rounded; what is shown is not a command.
-            time.sleep(0.2)
-            assert front.commands() == []
-            for part in drawing.parts:
-                if part.body:
-                    mesh = server.scene.get_handle_by_name(f"/mujoco/{part.body}/{part.geom}")
-                    np.testing.assert_array_equal(mesh.vertices, part.vertices)
-                    np.testing.assert_array_equal(mesh.faces, part.faces)
-        finally:
-            serving.stop(server)
+        front = ViserFront(server, session, drawing, 0)
+        front.show(session.frame(), Tempo(1.0, None, False), "")
+        handle_of = server.scene.get_handle_by_name
+        for root, (_, data) in zip(("/mujoco", "/pybullet ghost"), session._arms, strict=True):
+            handles = [handle_of(f"{root}/{body}") for body in range(1, models[0].nbody)]
+            assert len(handles) == 9
+            # viser sends nothing for what moved by micrometres.
+            for name, wanted in (("position", data.xpos), ("wxyz", data.xquat)):
+                found = [getattr(handle, name) for handle in handles]
+                np.testing.assert_allclose(found, wanted[1:], atol=1e-5)
+        # A keyframe's commands are shown rounded; what is shown is not a command.
+        time.sleep(0.2)
+        assert front.commands() == []
+        for part in drawing.parts:
+            if part.body:
+                mesh = handle_of(f"/mujoco/{part.body}/{part.geom}")
+                np.testing.assert_array_equal(mesh.vertices, part.vertices)
+                np.testing.assert_array_equal(mesh.faces, part.faces)
 
 
 def test_the_slider_of_a_recording_follows_it(mujoco_scene: sm.Model) -> None:
     recording = TraceSession([record(mujoco_scene, seconds=0.5)])
-    server = _serve(Door("127.0.0.1"))
-    try:
+    with served() as server:
         front = ViserFront(server, recording, drawing_of(mujoco_scene))
         assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))
         recording.play()
-        for _ in range(40):
-            recording.advance()
+        for count, at in ((40, 40 * mujoco_scene.timestep), (0, 0)):
+            recording.reset()
+            recording.advance(count)
             front.show(recording.frame(), Tempo(1.0, None, False), "")
-        assert front._seek.value == pytest.approx(40 * mujoco_scene.timestep)
-        recording.reset()
-        front.show(recording.frame(), Tempo(1.0, None, False), "")
-        assert front._seek.value == 0
+            assert front._seek.value == pytest.approx(at)
         time.sleep(0.2)
         assert front.commands() == []
-    finally:
-        serving.stop(server)
 
 
 def test_what_a_model_is_called_is_no_code_on_the_page() -> None:

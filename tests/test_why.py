@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import warnings
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from shutil import copytree
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine import runs
 from statemachine.compare.why import Explanation, explain
 from statemachine.compare.why.settings import NEEDS, TITLES
 from statemachine.compare.why.shapley import shapley
@@ -34,6 +36,7 @@ from .conftest import (
     shown,
     written,
 )
+from .small_models import mjcf, on_both
 
 HOLD = replace(scenario("hold"), seconds=0.6)  # long enough to touch the floor
 FALL = replace(scenario("fall"), seconds=5.0)  # and to meet a limit
@@ -45,26 +48,18 @@ def arm() -> Model:
     return sm.load("so101/scene")
 
 
-def edited(model: Model, **arrays: Any) -> Model:
-    """A MuJoCo Model with other numbers in its compiled model."""
-    made = model.replace()
-    for name, value in arrays.items():
-        getattr(made.raw, name)[:] = value
-    return made.replace()  # so that what the Model tells follows
-
-
 def shares(result: Explanation) -> dict[str, float]:
     """The part of each cause that has one."""
     return {row.name: row.share for row in result.shares if row.share}
 
 
 def test_an_integrator_is_chosen_on_the_side_that_has_several(tmp_path: Path) -> None:
-    pendulum = """<mujoco><option integrator="RK4" timestep="0.02"/><worldbody><body>
-    <joint axis="1 0 0"/><geom type="capsule" fromto="0 0 0 0 0.3 0" size="0.02"/></body>
-    </worldbody></mujoco>"""
-    file = written(tmp_path / "pendulum.xml", pendulum)
+    text = mjcf(
+        '<body><joint axis="1 0 0"/><geom type="capsule" size=".02" fromto="0 0 0 0 .3 0"/></body>',
+        option='<option integrator="RK4" timestep="0.02"/>',
+    )
     with pytest.warns(EngineWarning, match="RK4 acts as Euler"):
-        result = explain(sm.load(file), sm.load(file, backend="pybullet"), FALL, seconds=1.0)
+        result = explain(*on_both(written(tmp_path / "m.xml", text)), FALL, seconds=1.0)
     (row,) = result.shares
     assert (row.values[0][1:], row.chosen[0]) == (("rk4", "its own"), "left")
     assert result.is_explained
@@ -82,12 +77,11 @@ def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
 
 
 def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = importlib.import_module("statemachine.runs")
-    made, record = [], module.record
-    monkeypatch.setattr(module, "record", lambda *a, **k: made.append(1) or record(*a, **k))
+    record = Mock(side_effect=runs.record)
+    monkeypatch.setattr(runs, "record", record)
     result = explain(arm, arm.replace(gravity=[0, 0, -9]), HOLD, uncertain=None, jobs=1)
     # Both as they come, and the right with the left's gravity.
-    assert len(made) == result.runs == 3
+    assert record.call_count == result.runs == 3
 
 
 @pytest.mark.parametrize(
@@ -100,8 +94,7 @@ def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None
 def test_timesteps_meet_where_they_can_or_are_interpolated(
     arm: Model, timestep: float, facts: dict[str, Any]
 ) -> None:
-    result = explain(arm, arm.replace(timestep=timestep), HOLD, uncertain=None)
-    assert facts.items() <= vars(result).items()
+    assert_has(explain(arm, arm.replace(timestep=timestep), HOLD, uncertain=None), **facts)
 
 
 def test_substeps_and_timestep_are_one_cause(arm: Model) -> None:
@@ -123,22 +116,23 @@ def test_another_quantity(arm: Model) -> None:
 
 
 def test_what_is_held_is_what_it_is_about(mujoco_box: sm.Model) -> None:
-    two = edited(mujoco_box, geom_friction=0.1 * mujoco_box.raw.geom_friction)
+    two = mujoco_box.replace()
+    two.raw.geom_friction[:] *= 0.1
+    two = two.replace()  # so that what the Model tells follows
     result = explain(mujoco_box, two, BOX, uncertain=None)
     assert result.quantity == "box relative to gripperframe"
     assert sum(shares(result).values()) == pytest.approx(1.0)
-    traces = [record_scenario(BOX, model) for model in (mujoco_box, two)]
     seen = []
-    for trace in traces:
-        apart = trace["xpos"][:, mujoco_box.body_id("box")] - trace.site("gripperframe")[0]
-        seen.append(np.einsum("nji,nj->ni", trace.site("gripperframe")[1], apart))
+    for trace in (record_scenario(BOX, model) for model in (mujoco_box, two)):
+        pos, rotation = trace.site("gripperframe")
+        from_tip = trace["xpos"][:, mujoco_box.body_id("box")] - pos
+        seen.append(np.einsum("nji,nj->ni", rotation, from_tip))
     apart = np.linalg.norm(seen[0] - seen[1], axis=1)
     assert result.gap == pytest.approx(apart.max(), rel=1e-9)
-    gap = result.first["box relative to gripperframe"]
     assert_has(
-        gap,
+        result.first["box relative to gripperframe"],
         rms=pytest.approx(np.sqrt((apart**2).mean())),
-        at=traces[0].time[apart.argmax()] - traces[0].time[0],
+        at=trace.time[apart.argmax()] - trace.time[0],
     )
 
 
@@ -174,17 +168,16 @@ def test_one_changed_default_is_one_row_and_its_line_is_found(tmp_path: Path) ->
 def test_joints_that_an_experiment_does_not_move_are_told(arm: Model) -> None:
     damping = arm.dof_damping.copy()
     damping[arm.joint_id("shoulder_pan")] = damping[arm.joint_id("elbow_flex")] = 0.9
-    hold = explain(arm, arm.replace(damping=damping), HOLD, uncertain=None)
-    assert hold.still == ("shoulder_pan",)
     waves = replace(scenario("waves"), seconds=1.0)
-    assert explain(arm, arm.replace(damping=damping), waves, uncertain=None).still == ()
+    for experiment, still in ((HOLD, ("shoulder_pan",)), (waves, ())):
+        result = explain(arm, arm.replace(damping=damping), experiment, uncertain=None)
+        assert result.still == still
 
 
 def test_finer_splits_what_changed_alike(arm: Model) -> None:
     two = arm.replace(armature=1.5 * arm.dof_armature)
-    result = explain(arm, two, HOLD, uncertain=None, finer=True, budget=20)
-    assert len(shares(result)) == 6
-    assert sum(shares(result).values()) == pytest.approx(1.0, abs=0.05)
+    parts = shares(explain(arm, two, HOLD, uncertain=None, finer=True, budget=20))
+    assert (len(parts), sum(parts.values())) == (6, pytest.approx(1.0, abs=0.05))
 
 
 AIRPORT = {"a": 0.1, "b": 0.3, "c": 0.6, "d": 1.0}
@@ -247,8 +240,7 @@ def path_of(model: Model, experiment: Scenario, used: int = 0) -> np.ndarray:
             if wanted is not None:
                 data.ctrl = wanted
             sm.step(model, data)
-        rows.append(data.qpos.copy())
-    return np.array(rows)
+        return np.array([*rows, data.qpos])
 
 
 def dialled(name: str = "so101/scene", options: Any = None) -> tuple[Any, Any]:
@@ -256,9 +248,7 @@ def dialled(name: str = "so101/scene", options: Any = None) -> tuple[Any, Any]:
     from statemachine.engines import room
 
     fresh = quietly(name, defaults="engine")
-    found = room("pybullet").dials(fresh, options or {})
-    assert found
-    return fresh, found
+    return fresh, room("pybullet").dials(fresh, options or {})
 
 
 def motors_off(world: Any) -> None:
@@ -293,12 +283,10 @@ def test_the_ends_of_the_dials_are_the_two_models(name: str) -> None:
     experiment = replace(scenario(name), seconds=0.7)
     fresh, found = dialled(experiment.model, experiment.options)
     raw = fresh.replace(**experiment.options)
-    np.testing.assert_array_equal(
-        path_of(found.build({}, {}), experiment), path_of(raw, experiment)
-    )
     emulated = quietly(experiment.model).replace(**experiment.options)
     whole = found.build(dict.fromkeys(SETTINGS, "model"), values_of(emulated))
-    np.testing.assert_array_equal(path_of(whole, experiment), path_of(emulated, experiment))
+    for model, end in ((found.build({}, {}), raw), (whole, emulated)):
+        np.testing.assert_array_equal(path_of(model, experiment), path_of(end, experiment))
     assert room("pybullet").dials(emulated, {}) is None
 
 
@@ -340,33 +328,27 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
     """
     from statemachine.engines.pybullet import dials as module
 
-    limp = {"actuation": False}
-    _, found = dialled(options=limp)
-    bare = {**limp, "timestep": 1e-3, "armature": 0, "frictionloss": 0, "damping": 0}
-    one = sm.load("so101/scene").replace(**bare, contacts=False, limits=False)
-    values = {**values_of(one), "damping": np.zeros(one.nv)}
-    every: dict[str, Any] = {
-        "gravity": "model",
-        "timestep": "model",
-        "inertia": "model",
-        "damping": "off",
-        "limits": "off",
-        "contact": "off",
-    }
+    _, found = dialled(options={"actuation": False})
+    one = sm.load("so101/scene").replace(
+        actuation=False, timestep=1e-3, armature=0, frictionloss=0, damping=0, contacts=False,
+        limits=False,
+    )  # fmt: skip
+    every: dict[str, Any] = dict.fromkeys(("gravity", "timestep", "inertia"), "model")
+    every |= dict.fromkeys(("damping", "limits", "contact"), "off")
     experiment = replace(scenario("fall"), seconds=0.55)
     wanted = path_of(one, experiment)
     assert np.abs(wanted).max() > 2.0  # beyond the limits, below the floor
 
     def apart(names: dict[str, Any]) -> float:
-        model = found.build(names, values).replace(timestep=one.timestep)
-        model = module._dialled(model, [motors_off])
+        model = found.build(names, values_of(one)).replace(timestep=one.timestep)
         try:
-            return float(np.abs(path_of(model, experiment) - wanted).max())
+            rows = path_of(module._dialled(model, [motors_off]), experiment)
+            return float(np.abs(rows - wanted).max())
         except DivergedError:
             return np.inf
 
     assert apart(every) < 1e-9
-    for name in ("gravity", "inertia", "damping", "limits", "contact"):
+    for name in every.keys() - {"timestep"}:
         assert apart({k: v for k, v in every.items() if k != name}) > 1e-4, name
 
 
@@ -376,9 +358,8 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     """A limp arm without joint damping, which reaches its limits and the floor."""
     from statemachine.engines.pybullet import dials as module
 
-    loaded = quietly("so101/scene", defaults="engine")
-    fresh: Any = loaded.replace(gravity=[0, 0, -9.81], actuation=False)
-    raw = fresh.compiled
+    fresh = quietly("so101/scene", defaults="engine", gravity=[0, 0, -9.81], actuation=False)
+    joints = np.full(fresh.nv, 0.05)
 
     def limp(world: Any) -> None:
         motors_off(world)
@@ -386,34 +367,33 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
             for joint in tree.joints:
                 world.change(tree.body, joint, jointDamping=0.05)
 
-    own = {
-        "damping": lambda w: module._set_damping(w, module.BODY_DAMPING, np.full(raw.nv, 0.05)),
-        "limits": lambda w: module._set_limits(w, module._ranges(fresh)),
-        "surfaces": module._harden,
-    }
-    # Of another kind: so it would have been seen.
-    other = {
-        "damping": lambda w: module._set_damping(w, 0.05, np.full(raw.nv, 0.05)),
-        "limits": lambda w: module._set_limits(w, dict.fromkeys(range(raw.nv), (-0.1, 0.3))),
-        "surfaces": lambda w: w.soften(),
-    }
+    # What is called its own; and another kind of it: so it would have been seen.
+    own, other = {
+        "damping": (
+            lambda w: module._set_damping(w, module.BODY_DAMPING, joints),
+            lambda w: module._set_damping(w, 0.05, joints),
+        ),
+        "limits": (
+            lambda w: module._set_limits(w, module._ranges(fresh)),
+            lambda w: module._set_limits(w, dict.fromkeys(range(fresh.nv), (-0.1, 0.3))),
+        ),
+        "surfaces": (module._harden, lambda w: w.soften()),
+    }[dial]
     experiment = replace(scenario("gravity"), seconds=1.0)
-    plain = path_of(module._dialled(fresh, [limp]), experiment)
-    assert np.abs(plain).max() > 0.35
-    np.testing.assert_array_equal(
-        path_of(module._dialled(fresh, [limp, own[dial]]), experiment), plain
+    plain, same, changed = (
+        path_of(module._dialled(fresh, [limp, *acts]), experiment) for acts in ([], [own], [other])
     )
-    assert (path_of(module._dialled(fresh, [limp, other[dial]]), experiment) != plain).any()
-
-    def spun(*acts: Any) -> np.ndarray:
-        """Speeds after a start that is faster than the engine lets a joint be."""
-        with opened(module._dialled(fresh, [limp, *acts])) as (model, data):
-            data.qvel[5] = 150.0
-            sm.step(model, data)
-            return data.qvel.copy()
-
-    assert np.abs(spun()).max() == pytest.approx(100.0)
-    np.testing.assert_array_equal(spun(own[dial]), spun())
+    assert np.abs(plain).max() > 0.35
+    np.testing.assert_array_equal(same, plain)
+    assert (changed != plain).any()
+    # Speeds after a start that is faster than the engine lets a joint be.
+    speeds = []
+    for acts in ([], [own]):
+        start = [0, 0, 0, 0, 0, 150.0]
+        with opened(module._dialled(fresh, [limp, *acts]), qvel=start, nstep=1) as (_, data):
+            speeds.append(data.qvel.copy())
+    assert np.abs(speeds[0]).max() == pytest.approx(100.0)
+    np.testing.assert_array_equal(*speeds)
 
 
 @pytest.mark.usefixtures("bullet")
@@ -429,12 +409,11 @@ def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     poses = (random.uniform(*arm.jnt_range.T) for _ in range(200))
     pose = next(pose for pose in poses if own_ways(arm, pose, sm.forward) > 2)
     fresh, found = dialled()
-    rest = {name: "model" for name in SETTINGS if name != "surfaces"}
-    values = values_of(arm)
-    own: Any = found.build(rest, values)  # pyright: ignore[reportArgumentType]
-    same: Any = found.build({**rest, "surfaces": "model"}, values)  # pyright: ignore[reportArgumentType]
-    assert own_ways(fresh, pose, sm.step) == own_ways(own, pose, sm.step) == 0
-    assert own_ways(same, pose, sm.step) > 0
+    same = dict.fromkeys(SETTINGS, "model")
+    own = {name: "model" for name in SETTINGS if name != "surfaces"}
+    models = fresh, *(found.build(names, values_of(arm)) for names in (own, same))
+    touching = [own_ways(model, pose, sm.step) > 0 for model in models]
+    assert touching == [False, False, True]
 
 
 @pytest.mark.usefixtures("bullet")
@@ -456,15 +435,14 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
         told = [pb.getPhysicsEngineParameters(data.raw.client) for data in (one, two)]
         assert told[0] == told[1]
         theirs, ours, true = figures(one.raw), figures(two.raw), figures(model.plan.ghost)
-        for body, info in theirs.items():
-            assert ours[body][1] == info[1] == 0.5
-            assert ours[body][5:8] == info[5:8]
-            if body in true:  # the law reckons with the inertias of the shapes, in the same axes
-                np.testing.assert_allclose(true[body][2], info[2], rtol=1e-12)
-                for place in (3, 4):  # where the centre of mass is, and its axes
-                    np.testing.assert_allclose(true[body][place], info[place], atol=1e-12)
-    np.testing.assert_array_equal(model.dof_armature, 0)
-    np.testing.assert_array_equal(model.dof_frictionloss, 0)
+    for body, info in theirs.items():
+        assert ours[body][1] == info[1] == 0.5
+        assert ours[body][5:8] == info[5:8]
+        if body in true:  # the law reckons with the inertias of the shapes, in the same axes
+            np.testing.assert_allclose(true[body][2], info[2], rtol=1e-12)
+            for place in (3, 4):  # where the centre of mass is, and its axes
+                np.testing.assert_allclose(true[body][place], info[place], atol=1e-12)
+    np.testing.assert_array_equal([model.dof_armature, model.dof_frictionloss], 0)
 
 
 @pytest.mark.usefixtures("bullet")
@@ -494,13 +472,10 @@ def explanations() -> dict[tuple[str, str], Explanation]:
     """Of the three experiments, in both regimes."""
     need_engine("pybullet")
     results = {}
-    for name in ("hold", "gravity", "box"):
+    for name, defaults in product(("hold", "gravity", "box"), ("model", "engine")):
         experiment = scenario(name)
-        for defaults in ("model", "engine"):
-            two = quietly(experiment.model, defaults=defaults)
-            results[name, defaults] = explain(
-                sm.load(experiment.model), two, experiment, uncertain=None
-            )
+        one, two = sm.load(experiment.model), quietly(experiment.model, defaults=defaults)
+        results[name, defaults] = explain(one, two, experiment, uncertain=None)
     return results
 
 
@@ -592,11 +567,10 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
 def test_files_and_settings_of_an_engine_are_explained_together(
     arm: sm.Model, tmp_path: Path
 ) -> None:
-    two: Any = edited(arm, body_mass=1.3 * arm.raw.body_mass)
-    heavy = tmp_path / "heavy.mjb"
-    two.save_binary(heavy)
-    right = quietly(str(heavy), defaults="engine")
-    result = explain(sm.load("so101/scene"), right, HOLD, uncertain=None, budget=40)
+    heavy: Any = arm.replace(mass=1.3 * arm.body_mass)
+    heavy.save_binary(tmp_path / "heavy.mjb")
+    right = quietly(str(tmp_path / "heavy.mjb"), defaults="engine")
+    result = explain(arm, right, HOLD, uncertain=None, budget=40)
     assert {"body", "engine"} <= {row.kind for row in result.shares}
     assert result.explained + result.located == pytest.approx(1.0, abs=1e-4)
 
