@@ -6,7 +6,9 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
+from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -54,44 +56,43 @@ def made_up(
 ) -> Path:
     """A dataset whose fingertips are functions of values and seed: (3,) [m]."""
     folder.mkdir()
-    factors = [{**asdict(vary), "label": vary.label} for vary in design.factors]
-    request = {"what": "made up", "function": "", "moments": TIMES}
     manifest = {
         "schema": MANIFEST_VERSION,
-        "request": request,
+        "request": {"what": "made up", "function": "", "moments": TIMES},
         "files": {"no-such-model": ""},
         "versions": {"statemachine": "0", **dict.fromkeys(SIDES, "0")},
         "design": {
             "vary": [], "seeds": seeds, "backends": SIDES, "samples": design.samples,
             "indices": design.indices, "design_seed": design.seed,
         },
-        "factors": factors,
+        "factors": [{**asdict(vary), "label": vary.label} for vary in design.factors],
     }  # fmt: skip
     (folder / "sweep.json").write_text(json.dumps(manifest))
     writer = RowWriter(folder, design.factors, {})
-    for backend, tip_of in zip(SIDES, (left, right), strict=True):
-        rows: list[dict[str, Any]] = []
-        for point in design.points():
-            for seed in range(seeds):
-                row = {
-                    "cell": f"{point.id}{seed}{backend}",
-                    "point": point.id,
-                    "seed": seed,
-                    "backend": backend,
-                    **dict(zip((v.column for v in design.factors), point.values, strict=True)),
-                }
-                if fails(backend, point.values, seed):
-                    rows.append({**row, "status": FAILED, "error_class": "DivergedError"})
-                    continue
-                tip = np.broadcast_to(tip_of(*point.values, seed), (TIMES, 3)).tolist()
-                angles = [[0.0]] * TIMES
-                rows.append(
-                    {**row, "status": DONE, "steps": 100, "time": 1.0, "sample_tip": tip,
-                     "sample_qpos": angles}
-                )  # fmt: skip
-        writer.add(rows)
+    sides = zip(SIDES, (left, right), strict=True)
+    for (backend, tip_of), point, seed in product(sides, list(design.points()), range(seeds)):
+        row: dict[str, Any] = {
+            "cell": f"{point.id}{seed}{backend}",
+            "point": point.id,
+            "seed": seed,
+            "backend": backend,
+            **dict(zip((v.column for v in design.factors), point.values, strict=True)),
+        }
+        if fails(backend, point.values, seed):
+            row |= {"status": FAILED, "error_class": "DivergedError"}
+        else:
+            row |= ran(np.broadcast_to(tip_of(*point.values, seed), (TIMES, 3)).tolist())
+        writer.add([row])
     writer.flush()
     return folder
+
+
+def ran(tips: list[list[float]] | None) -> dict[str, Any]:
+    """What the row of a run has whose fingertip was there."""
+    angles = [[0.0]] * len(tips or ())
+    return {
+        "status": DONE, "steps": 100, "time": 1.0, "sample_tip": tips, "sample_qpos": angles,
+    }  # fmt: skip
 
 
 def along_x(length: float) -> list[float]:
@@ -104,6 +105,9 @@ def nowhere(*_: Any) -> list[float]:
 
 def grid(name: str, low: float, high: float, count: int, **more: Any) -> Vary:
     return Vary(name, values=tuple(np.linspace(low, high, count).tolist()), **more)
+
+
+GAIN = grid("gain", 0, 2, 9, kind="parameter")
 
 
 def of(folder: Path, **given: Any) -> Figures:
@@ -130,32 +134,33 @@ ISHIGAMI = {
 }
 
 
-def test_sobol_indices_are_those_of_the_ishigami_function(tmp_path: Path) -> None:
+def sobol(samples: int) -> Design:
     factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
-    design = Design(factors, samples=1024, indices=True, seed=1)
-    found = of(made_up(tmp_path / "s", design, nowhere, ishigami))
+    return Design(factors, samples=samples, indices=True, seed=1)
+
+
+def test_sobol_indices_are_those_of_the_ishigami_function(tmp_path: Path) -> None:
+    found = of(made_up(tmp_path / "s", sobol(1024), nowhere, ishigami))
     assert_has(the(found.sensitivity), method="sobol", samples=1024)
     assert shares(found).keys() == ISHIGAMI.keys()
     for each in the(found.sensitivity).indices:
-        first, total = ISHIGAMI[each.label]
-        assert each.first == pytest.approx(first, abs=0.03), each
-        assert each.total == pytest.approx(total, abs=0.03), each
-        for value, interval in ((first, each.first_interval), (total, each.total_interval)):
-            low, high = the(interval)
+        for name, value in zip(("first", "total"), ISHIGAMI[each.label], strict=True):
+            assert getattr(each, name) == pytest.approx(value, abs=0.03), each
+            low, high = getattr(each, f"{name}_interval")
             assert low - 0.02 < value < high + 0.02  # 95 %, six of them
             assert 0 < high - low < 0.3
     assert the(found.sensitivity).indices[0].label == "x"
-    assert (the(found.map).across, the(found.map).up, the(found.map).others) == ("x", "y", ("z",))
+    assert_has(the(found.map), across="x", up="y", others=("z",))
 
 
 def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> None:
-    factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
-    design = Design(factors, samples=256, indices=True, seed=1)
-    gone = list(design.points())[300].values
-    folder = made_up(
-        tmp_path / "s", design, nowhere, ishigami, fails=lambda b, v, _: b == "mujoco" and v == gone
+    gone = list(sobol(256).points())[300].values
+    found = of(
+        made_up(
+            *(tmp_path / "s", sobol(256), nowhere, ishigami),
+            fails=lambda backend, values, _: backend == "mujoco" and values == gone,
+        )
     )
-    found = of(folder)
     assert (found.failed, found.quantity.counts["no runs"]) == ({"DivergedError": 1}, 1)
     assert the(found.sensitivity).samples == 128
     assert "1 of 256 samples" in the(found.sensitivity).notes[0]
@@ -165,26 +170,23 @@ def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> 
 def test_a_full_factorial_is_taken_apart_as_its_closed_form(tmp_path: Path) -> None:
     # f = 10 + 3 x + 2 y + x y + 0 z over levels -1, 0, 1, whose variance is 2/3.
     design = Design(tuple(grid(name, -1, 1, 3) for name in "xyz"))
-    folder = made_up(
-        tmp_path / "s", design, nowhere, lambda x, y, z, _: along_x(10 + 3 * x + 2 * y + x * y)
-    )
-    found = of(folder)
-    whole = (9 + 4) * 2 / 3 + 4 / 9
-    x, y, both = 6 / whole, 8 / 3 / whole, 4 / 9 / whole
+    right: TipOf = lambda x, y, z, _: along_x(10 + 3 * x + 2 * y + x * y)  # noqa: E731
+    found = of(made_up(tmp_path / "s", design, nowhere, right))
+    x, y, both = np.array([6, 8 / 3, 4 / 9]) / (6 + 8 / 3 + 4 / 9)
     expected = {"x": (x, x + both), "y": (y, y + both), "z": (0.0, 0.0)}
-    for name, pair in shares(found).items():
-        assert pair == pytest.approx(expected[name], abs=1e-9)
+    assert shares(found) == {name: pytest.approx(e, abs=1e-9) for name, e in expected.items()}
     assert the(found.sensitivity).method == "factorial"
     assert the(found.sensitivity).indices[0].first_interval is None  # of one seed
 
 
 def test_a_factorial_with_holes_keeps_the_rest(tmp_path: Path) -> None:
     design = Design(tuple(grid(name, -1, 1, 3) for name in "xy"))
-    folder = made_up(
-        tmp_path / "s", design, nowhere, lambda x, y, _: along_x(10 + 3 * x),
-        fails=lambda _b, v, _s: v[1] == 1,
-    )  # fmt: skip
-    found = of(folder)
+    found = of(
+        made_up(
+            *(tmp_path / "s", design, nowhere, lambda x, y, _: along_x(10 + 3 * x)),
+            fails=lambda _backend, values, _seed: values[1] == 1,
+        )
+    )
     assert_has(shares(found), x=pytest.approx((1, 1)), y=pytest.approx((0, 0)))
     assert "y = 1.0" in the(found.sensitivity).notes[0]
     assert found.failed == {"DivergedError": 6}
@@ -209,16 +211,10 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
     by = {each.values: each for each in found.settings}
     assert_has(by[2.0, 1.0], median=pytest.approx(3e-3), worst=pytest.approx(4e-3))
     assert by[3.0, 0.0].median is None
-    gap = {
-        (x, y): the(found.map).gap[r][c]
-        for r, y in enumerate(the(found.map).rows)
-        for c, x in enumerate(the(found.map).columns)
-    }
-    flipped = the(found.map).across == "y"
-    for pair, value in gap.items():
-        x, y = pair[::-1] if flipped else pair
-        expected = None if (x, y) == (3.0, 0.0) else pytest.approx(1e-3 * (float(x) + float(y)))
-        assert value == expected
+    for y, row in zip(the(found.map).rows, the(found.map).gap, strict=True):
+        for x, value in zip(the(found.map).columns, row, strict=True):
+            gone = {x, y} == {3.0, 0.0}  # whichever of the two is across
+            assert value == (None if gone else pytest.approx(1e-3 * (float(x) + float(y))))
     said = shown(page(found))
     assert_in(
         " ".join(said.split()),
@@ -231,13 +227,12 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
 
 def test_a_sweep_that_failed_everywhere_has_no_report(tmp_path: Path) -> None:
     design = Design((grid("x", 0, 1, 2, kind="parameter"),))
-    for name, failed in (("one", {"pybullet"}), ("both", {"mujoco", "pybullet"})):
+    for failed in (("pybullet",), SIDES):
         folder = made_up(
-            tmp_path / name, design, nowhere, nowhere,
+            tmp_path / str(len(failed)), design, nowhere, nowhere,
             fails=lambda backend, _values, _seed, failed=failed: backend in failed,
         )  # fmt: skip
-        says = r"no setting .* both mujoco and pybullet"
-        refused((BadInputError, says, partial(of, folder)))
+        refused((BadInputError, r"no setting .* both mujoco and pybullet", partial(of, folder)))
 
 
 def data_of(folder: Path) -> SweepData:
@@ -258,7 +253,7 @@ def fitted(
     folder: Path, best: float, least: float = 0.0, seeds: int = 4, spread: float = 0.0
 ) -> Figures:
     """Left and right part by 5 mm for each unit of gain from the best one, and by `least`."""
-    design = Design((grid("gain", 0, 2, 9, kind="parameter"), grid("y", 0, 1, 2)))
+    design = Design((GAIN, grid("y", 0, 1, 2)))
 
     def right(gain: float, _y: float, seed: int) -> list[float]:
         return [5e-3 * (gain - (best + spread * (seed - (seeds - 1) / 2))), least, 0.0]
@@ -270,30 +265,30 @@ def fitted(
 def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
     (found,) = fitted(tmp_path / "s", best=0.61, least=0.1e-3).together
     assert found.varied == "both"  # a parameter of a function is not a side's own
+    assert_has(found, verdict="together", measured=None)
     assert_has(
-        the(found.fit), value=pytest.approx(0.61, abs=1e-3), gap=pytest.approx(0.1e-3, rel=1e-3)
+        the(found.fit),
+        value=pytest.approx(0.61, abs=1e-3),
+        gap=pytest.approx(0.1e-3, rel=1e-3),
+        error=pytest.approx(0.0, abs=1e-3),  # the seeds are alike
     )
-    assert the(found.fit).error == pytest.approx(0.0, abs=1e-3)  # the seeds are alike
-    assert found.verdict == "together"
     reach = np.sqrt(0.2**2 - 0.1**2) / 5  # where hypot(5 mm · reach, 0.1 mm) is 0.2 mm
     assert values_within(the(found.fit), 0.2e-3) == pytest.approx(
         (0.61 - reach, 0.61 + reach), abs=6e-3
     )
     assert values_within(the(found.fit), 0.05e-3) is None
-    assert found.measured is None
     assert np.interp(1.61, *the(found.fit)._scan) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
 
 
 def test_its_error_is_that_of_the_seeds(tmp_path: Path) -> None:
     seeds, spread = 16, 0.02
-    report = fitted(tmp_path / "s", best=0.9, least=5e-3, seeds=seeds, spread=spread)
-    (found,) = report.together
-    assert the(found.fit).value == pytest.approx(0.9, abs=0.02)
+    (found,) = fitted(tmp_path / "s", best=0.9, least=5e-3, seeds=seeds, spread=spread).together
     # The gap is a parabola here, so that the value is the mean of 16 that are evenly spread;
     # the curves of a seed at 2 values of y are the same, and count once.
     deviation = spread * np.sqrt((seeds**2 - 1) / 12)
     assert_has(
         the(found.fit),
+        value=pytest.approx(0.9, abs=0.02),
         error=pytest.approx(deviation / np.sqrt(seeds), rel=0.15),
         of="16 seeds drawn again",
     )
@@ -312,11 +307,8 @@ def test_at_the_edge_no_value_and_only_closer(tmp_path: Path) -> None:
 
 
 def test_one_curve_has_its_error_from_the_curvature(tmp_path: Path) -> None:
-    design = Design((grid("gain", 0, 2, 9, kind="parameter"),))
-    folder = made_up(
-        tmp_path / "s", design, nowhere, lambda gain, _: [5e-3 * (gain - 1), 1e-3, 0.0]
-    )
-    (found,) = of(folder).together
+    right: TipOf = lambda gain, _: [5e-3 * (gain - 1), 1e-3, 0.0]  # noqa: E731
+    (found,) = of(made_up(tmp_path / "s", Design((GAIN,)), nowhere, right)).together
     # One unknown: s² = 5 · 1e-6 / 14 left over, Σ slope² = 5 · 25e-6.
     assert the(found.fit).error == pytest.approx(np.sqrt(5e-6 / 14 / (5 * 25e-6)), rel=0.02)
 
@@ -366,10 +358,8 @@ def test_pictures_and_page_are_of_the_same_figures(tmp_path: Path) -> None:
     folder = agreement(tmp_path / "s")
     found = of(folder, tolerances={"tip": 1.5e-3})
     chart = next(each for each in pictures(found) if isinstance(each, HeatMap))
-    framed = sum(map(sum, chart.framed))
-    assert framed == sum(
-        v is not None and v <= 1.5 for row in chart.values for v in row
-    )  # fmt: skip
+    within = [[v is not None and v <= 1.5 for v in row] for row in chart.values]
+    assert sum(map(sum, chart.framed)) == sum(map(sum, within))
     html, plot = tmp_path / "r.html", tmp_path / "r.png"
     arguments = ["sweep", "--report", str(folder), "--no-runs", "--tolerance", "tip=1.5mm"]
     assert main([*arguments, "--html", str(html), "--plot", str(plot)]) == 1
@@ -406,21 +396,18 @@ def test_an_axis_says_what_its_values_are_in() -> None:
 
 
 def test_what_no_sweep_has_is_refused(tmp_path: Path) -> None:
-    folder = agreement(tmp_path / "s")
+    report = partial(of, agreement(tmp_path / "s"))
     refused(
-        (UnknownNameError, "parameter", lambda: of(Path(folder), fit=["z"])),
-        (UnknownNameError, "quantity", lambda: of(Path(folder), quantity="touch")),
-        (BadInputError, "two engines", lambda: of(Path(folder), backends=["mujoco"])),
+        (UnknownNameError, "parameter", lambda: report(fit=["z"])),
+        (UnknownNameError, "quantity", lambda: report(quantity="touch")),
+        (BadInputError, "two engines", lambda: report(backends=["mujoco"])),
     )
 
 
 def test_runs_of_several_lengths_keep_their_last_moment_last() -> None:
     arrow = pytest.importorskip("pyarrow")
     tips = [[[1.0, 2.0, 3.0]], [[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]], None, [[1.0, 1.0, 1.0]] * 2]
-    rows: list[dict[str, Any]] = [
-        {"status": DONE, "time": 1.0, "steps": 4, "sample_tip": tip, "sample_qpos": [[0.0, 1.0]]}
-        for tip in tips
-    ]
+    rows = [ran(tip) | {"steps": 4, "sample_qpos": [[0.0, 1.0]]} for tip in tips]
     rows[1]["first_touch"] = 0.5
     rows[3]["status"] = FAILED
     runs = read_runs(arrow.Table.from_pylist(rows, schema_of((), {})), 3, [1])
@@ -433,36 +420,30 @@ def test_runs_of_several_lengths_keep_their_last_moment_last() -> None:
     np.testing.assert_array_equal(runs["timestep"], [0.25, 0.25, 0.25, np.nan])
 
 
-class _Runs:
-    """Runs of the made-up engines at any value, as a CellRunner gives them."""
+def tried(folder: Path, left: TipOf, right: TipOf) -> Any:
+    """What fitting the gain gives where the made-up engines can be run at any value."""
+    arrow, tip_of = pytest.importorskip("pyarrow"), dict(zip(SIDES, (left, right), strict=True))
 
-    def __init__(self, left: TipOf, right: TipOf) -> None:
-        self._of = dict(zip(SIDES, (left, right), strict=True))
-
-    def run(self, asked: Any, **_: Any) -> Any:
-        arrow = pytest.importorskip("pyarrow")
-        rows = [
-            {"status": DONE, "steps": 100, "time": 1.0, "sample_qpos": [[0.0]],
-             "sample_tip": [self._of[backend](*values, seed)]}
-            for backend, values, seed in asked
-        ]  # fmt: skip
+    def run(asked: Any, **_: Any) -> Any:
+        rows = [ran([tip_of[backend](*values, seed)]) for backend, values, seed in asked]
         return read_runs(arrow.Table.from_pylist(rows, schema_of((), {})), TIMES)
+
+    runner: Any = SimpleNamespace(run=run)
+    return brought_together(data_of(folder), GAIN, "tip", 0.2e-3, varied="both", runner=runner)
 
 
 def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Path) -> None:
     """A tip that jumps over what the left one does, as over a contact: 5 mm is the least gap."""
-    vary = grid("gain", 0, 2, 9, kind="parameter")
 
     def right(gain: float, _seed: int) -> list[float]:
         return along_x(5e-3 + 20e-3 * (gain - 0.62) if gain >= 0.62 else -20e-3 + 2e-3 * gain)
 
-    folder = made_up(tmp_path / "s", Design((vary,)), nowhere, right)
+    folder = made_up(tmp_path / "s", Design((GAIN,)), nowhere, right)
     report = of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])
     (fit,) = report.together
     assert the(fit.fit).gap < 1e-3  # which no run gives
     assert fit.tried is None
-    runner: Any = _Runs(nowhere, right)
-    found = brought_together(data_of(folder), vary, "tip", 0.2e-3, varied="both", runner=runner)
+    found = tried(folder, nowhere, right)
     assert the(found.measured) > 5e-3
     assert_has(
         found,
@@ -479,9 +460,8 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
         "9 values from 0.5 to 0.75 were run, 0.03125 apart",
     )
     # Where it agrees with the fit nothing more is run.
-    runner = _Runs(nowhere, lambda gain, _: along_x(5e-3 * (gain - 0.61)))
-    folder = made_up(tmp_path / "t", Design((vary,)), *runner._of.values())
-    found = brought_together(data_of(folder), vary, "tip", 0.2e-3, varied="both", runner=runner)
+    sides = nowhere, lambda gain, _: along_x(5e-3 * (gain - 0.61))
+    found = tried(made_up(tmp_path / "t", Design((GAIN,)), *sides), *sides)
     assert (found.tried, found.cells) == (None, 2)
 
 
@@ -491,7 +471,6 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
     pytest.importorskip("pybullet")
     from statemachine import load
 
-    own = load("so101/scene", backend="mujoco").dof_damping
     sweep = Sweep(
         "hold", vary=("damping=0.6x:1.4x:5",), backends=SIDES, seeds=2, seconds=0.4,
         spread="0.5deg",
@@ -502,7 +481,7 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
     assert 0 < max(each.floor or 0 for each in found.settings) < 1e-6
     (fit,) = found.together
     assert_has(fit, label="damping", varied="right", own=1.0, pairs=2)
-    assert own.any()
+    assert load("so101/scene").dof_damping.any()
     # Both engines have the same model: its own damping, or one near it, is the best.
     assert the(fit.fit).value == pytest.approx(1.0, abs=0.15)
     assert the(fit.measured) < np.interp(0.6, *the(fit.fit)._scan)
