@@ -55,8 +55,11 @@ from .conftest import (
     refused,
     registered,
     soon,
+    written,
+    written_all,
 )
 from .small_models import LINKS_AND_BALL, mjcf, model_of
+from .test_pybullet_backend import memory_of
 
 OLD, STRANGE, SAME, BULLET = RELEASES
 HOLD = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]
@@ -80,9 +83,8 @@ installs = pytest.mark.usefixtures("old_releases")
 
 def run_of(model: Any, nstep: int = 400, call: int = 1) -> Any:
     """Positions of `hold` after each call of so many steps, and its Data."""
-    data = sm.make_data(model)
+    data, rows = sm.make_data(model), []
     data.ctrl[:] = HOLD
-    rows = []
     for _ in range(nstep // call):
         sm.step(model, data, call)
         rows.append(data.qpos.copy())
@@ -154,11 +156,9 @@ def adding(nothing: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], An
     monkeypatch.setenv("PATH", f"{nothing}{os.pathsep}{os.environ['PATH']}")
 
     def start(trouble: str) -> subprocess.Popen[str]:
-        (nothing / "uv").write_text(_UV.format(trouble=trouble))
-        (nothing / "uv").chmod(0o755)
-        command = [sys.executable, "-m", "statemachine", "engines", "add", OLD]
+        written(nothing / "uv", _UV.format(trouble=trouble)).chmod(0o755)
         return subprocess.Popen(
-            command,
+            [sys.executable, "-m", "statemachine", "engines", "add", OLD],
             start_new_session=True,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -198,10 +198,8 @@ def test_the_index_is_asked_by_uv_where_there_is_no_pip(
     nothing: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     versions = f"9.0.0, {engine_version('mujoco')}, 3.10.0, 3.9.0, 3.8.0"
-    (nothing / "uv").write_text(
-        f"#!/bin/sh\ntest $6 = index && echo 'Available versions: {versions}'"
-    )
-    (nothing / "uv").chmod(0o755)
+    script = f"#!/bin/sh\ntest $6 = index && echo 'Available versions: {versions}'"
+    written(nothing / "uv", script).chmod(0o755)
     monkeypatch.setenv("PATH", f"{nothing}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setattr(releases, "find_spec", lambda _name: None)
     assert releases.published("3.9.0") == ["mujoco==3.9.0", "mujoco==3.10.0", "mujoco"]
@@ -266,8 +264,9 @@ def on_raised_ground(model: Any) -> np.ndarray:
 
 def turned(model: Any) -> np.ndarray:
     """What is derived of a pose that was written, whose quaternion is not of length 1."""
-    with opened(model.replace(contacts=False), qpos=[0, 0, 3, 0.5, 0.1, -0.3, 0.7], nstep=1) as it:
-        return np.concatenate([it[1].xquat.ravel(), it[1].qacc])
+    pose = [0, 0, 3, 0.5, 0.1, -0.3, 0.7]
+    with opened(model.replace(contacts=False), qpos=pose, nstep=1) as (_, data):
+        return np.concatenate([data.xquat.ravel(), data.qacc])
 
 
 @pytest.mark.slow
@@ -275,11 +274,10 @@ def turned(model: Any) -> np.ndarray:
 @installs
 class TestReleases:
     def test_the_same_release_gives_the_same_bits(self) -> None:
-        ours, theirs = (
-            run_of(sm.load("so101/scene", backend=name), 600) for name in ("mujoco", SAME)
-        )
-        assert np.array_equal(ours[0], theirs[0])
-        assert bits(ours[1]) == bits(theirs[1])
+        models = [sm.load("so101/scene", backend=name) for name in ("mujoco", SAME)]
+        (rows, ours), (others, theirs) = (run_of(model, 600) for model in models)
+        assert np.array_equal(rows, others)
+        assert bits(ours) == bits(theirs)
 
     @pytest.mark.parametrize(
         ("text", "play", "backends"),
@@ -351,19 +349,21 @@ class TestReleases:
 
     def test_until_3_4_a_clamped_servo_damps(self, capsys: pytest.CaptureFixture[str]) -> None:
         """The update of velocities took kv in where the force is clamped; Euler's never did."""
-        new, old = (sm.load("so101", backend=name) for name in ("mujoco", OLD))
-        gap = np.degrees(np.abs(run_of(new)[0] - run_of(old)[0]).max())
-        assert gap == pytest.approx(6.2, abs=0.05)
-        euler = [run_of(m.replace(integrator="euler"))[0] for m in (new, old)]
-        assert np.degrees(np.abs(euler[0] - euler[1]).max()) < 1e-8
-        sides = ("hold", f"so101@{OLD}", "so101")
-        assert main(["compare", *sides, "--one-step"]) == SAYS_NO
-        assert "stage of a step that differs is “velocity update”" in capsys.readouterr().out
-        assert main(["compare", *sides, "--why"]) == 0
-        said = " ".join(capsys.readouterr().out.split())
-        assert_in(said, "Integrator implicitfast implicitfast", "both sides run with euler")
-        assert main(["compare", "--models", *sides[1:]]) == 0
-        assert "loaded into mujoco 3.3.7" in capsys.readouterr().out
+        models = [sm.load("so101", backend=name) for name in ("mujoco", OLD)]
+        for integrator, gap, most in (("implicitfast", 6.2, 0.05), ("euler", 0.0, 1e-8)):
+            new, old = (run_of(model.replace(integrator=integrator))[0] for model in models)
+            assert np.degrees(np.abs(new - old).max()) == pytest.approx(gap, abs=most)
+        sides = (f"so101@{OLD}", "so101")
+        for words, code, *says in (
+            (("hold", *sides, "--one-step"), SAYS_NO, "that differs is “velocity update”"),
+            (
+                *(("hold", *sides, "--why"), 0),
+                *("Integrator implicitfast implicitfast", "both sides run with euler"),
+            ),
+            (("--models", *sides), 0, "loaded into mujoco 3.3.7"),
+        ):
+            assert main(["compare", *words]) == code
+            assert_in(" ".join(capsys.readouterr().out.split()), *says)
 
     def test_between_which_releases_it_changed(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -371,10 +371,7 @@ class TestReleases:
         versions = ("--versions", "3.3.7," + SAME.partition("==")[2], "--model", "so101")
         assert main(["compare", "hold", *versions, "--json"]) == SAYS_NO
         (found,) = json.loads(capsys.readouterr().out)
-        assert [side["run"]["backend"] for side in (found["left"], found["right"])] == [
-            OLD,
-            "mujoco",
-        ]
+        assert [found[side]["run"]["backend"] for side in ("left", "right")] == [OLD, "mujoco"]
         picture = tmp_path / "releases.svg"
         assert main(["compare", "hold", *versions, "--plot", str(picture)]) == SAYS_NO
         assert f"3.3.7 to {engine_version('mujoco')}" in picture.read_text("utf-8")
@@ -385,8 +382,8 @@ class TestReleases:
     def test_bisection_finds_the_release_that_changed_it(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        since = releases.published("3.3.7")
-        assert (since[0], since[-1]) == (OLD, "mujoco")
+        first, *since, last = releases.published("3.3.7")
+        assert (first, last) == (OLD, "mujoco")
         assert "mujoco==3.4.0" in since
         assert SAME not in since
         refused(
@@ -415,9 +412,7 @@ class TestReleases:
 
     def test_a_dead_process_is_one_error_and_the_others_go_on(self) -> None:
         model = sm.load("so101", backend=OLD)
-        whole, _ = run_of(model, 20)
-        rows, data = run_of(model, 10)
-        other = run_of(model, 10)[1]
+        (whole, _), (rows, data), (_, other) = (run_of(model, nstep) for nstep in (20, 10, 10))
         os.kill(process_of(model), signal.SIGKILL)
         time.sleep(0.2)
         refused(
@@ -433,8 +428,7 @@ class TestReleases:
     def test_another_release_in_its_place_is_seen(self, nothing: Path) -> None:
         strange, broken = nothing / "mujoco==3.3.6", nothing / OLD
         strange.symlink_to(Path(sys.prefix, "engines", OLD))
-        (broken / "bin").mkdir(parents=True)
-        (broken / "bin" / "python").touch()
+        written_all(broken, {"bin/python": ""})
         refused(
             (
                 EngineError,
@@ -532,10 +526,10 @@ class TestReleases:
                 sm.step(data.model, data)
                 if k % 2:
                     data.close()
-            sizes.append(int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * 4096)
+            sizes.append(1e6 * memory_of(pid))
         assert sizes[2] < sizes[0] + 20e6  # forgotten by nobody, 40 took 100 MB
-        own = int(Path("/proc/self/statm").read_text().split()[1]) * 4096
-        assert resident_memory() > own + sizes[2] / 2  # what is there is counted, too
+        # What is there is counted, too.
+        assert resident_memory() > 1e6 * memory_of(os.getpid()) + sizes[2] / 2
 
     def test_worlds_of_it(self) -> None:
         model = sm.load("so101", backend=OLD)

@@ -41,7 +41,7 @@ from statemachine.worlds import (
 )
 
 from . import faulty_world as faulty
-from .conftest import ROOT, after, lives, refused, registered, soon
+from .conftest import ROOT, after, around, assert_has, lives, refused, registered, soon
 from .lives import live
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
@@ -75,10 +75,6 @@ def all_end(numbers: Iterable[int], seconds: float = 10.0) -> bool:
     return soon(lambda: not running(numbers), seconds)
 
 
-def bits(array: Any) -> bytes:
-    return np.ascontiguousarray(array).tobytes()
-
-
 @pytest.mark.parametrize(
     "workers", [2, *(pytest.param(workers, marks=pytest.mark.slow) for workers in (1, 3, 64))]
 )
@@ -98,12 +94,11 @@ def test_what_is_not_written_keeps_what_the_engine_remembers() -> None:
         for _ in range(30):
             sm.step(model, data, 2)
             step(worlds, 2)
-        assert bits(worlds.qpos) == 2 * bits(data.qpos)
+        assert worlds.qpos.tobytes() == 2 * data.qpos.tobytes()
         worlds.qpos[1, 0] += 1e-9
         step(worlds, 5)
         sm.step(model, data, 5)
-        assert bits(worlds.qpos[0]) == bits(data.qpos)
-        assert bits(worlds.qpos[1]) != bits(data.qpos)
+        assert [row.tobytes() == data.qpos.tobytes() for row in worlds.qpos] == [True, False]
 
 
 def test_a_record_longer_than_the_shared_memory(
@@ -122,8 +117,8 @@ def test_a_record_longer_than_the_shared_memory(
             for row in range(7 if world == 2 else 10):
                 data.ctrl[:] = commands[world, row]
                 sm.step(model, data)
-                assert bits(rows["qpos"][world, row]) == bits(data.qpos)
-                assert bits(rows["xpos"][world, row]) == bits(data.xpos)
+                for name, found in rows.items():
+                    assert found[world, row].tobytes() == getattr(data, name).tobytes()
     assert np.isnan(rows["qpos"][2, 7:]).all()
 
 
@@ -142,7 +137,7 @@ def test_a_world_that_diverges_or_breaks_is_left_out(worlds: Worlds) -> None:
     with pytest.warns(DivergedWarning, match=r"2 of 5 worlds .* 1 \(Faulty gave up: it broke"):
         step(worlds, 3)
     diverged: Any = worlds.diverged[2]
-    assert (diverged.quantity, diverged.index, diverged.time) == ("qpos", 1, 0.0)
+    assert_has(diverged, quantity="qpos", index=1, time=0.0)
     assert type(worlds.diverged[1]) is EngineError
     step(worlds, 3)
     assert worlds.time.tolist() == pytest.approx([0.03, 0, 0, 0.03, 0.03])
@@ -159,7 +154,7 @@ def test_a_process_that_is_killed_takes_its_worlds_with_it(worlds: Worlds) -> No
     error = refused((EngineError, r"2 worlds \(1, 3\) .* SIGKILL", lambda: step(worlds, 3)))
     assert error.worlds == (1, 3)
     refused((ClosedDataError, "make others", lambda: reset(worlds)))
-    assert bits(worlds.qpos[3]) == bits(qpos[3])
+    assert worlds.qpos[3].tobytes() == qpos[3].tobytes()
     assert not running(numbers)
 
 
@@ -192,7 +187,7 @@ def test_ctrl_c_ends_a_step_at_once_and_each_world_is_whole(
     worlds.ctrl[:] = 0
     step(worlds, 2)
     assert worlds.time == pytest.approx(times + 0.01)
-    assert bits(worlds.qpos[2]) == bits(after(model, 2))
+    assert worlds.qpos[2].tobytes() == after(model, 2).tobytes()
 
 
 @pytest.mark.slow
@@ -206,25 +201,23 @@ def test_nothing_is_left_and_closed_is_closed(model: sm.Model) -> None:
     worlds = make_worlds(model, N, workers=2)
     step(worlds)
     numbers = pids(worlds)
-    worlds.close()
-    worlds.close()
-    assert not running(numbers)
-    worlds = make_worlds(model, 2, workers=2)
-    numbers = pids(worlds)
-    del worlds
-    gc.collect()
+    for _ in range(2):
+        worlds.close()
     assert not running(numbers)
 
 
 @linux
-def test_worlds_that_are_collected_leave_no_descriptor(model: sm.Model) -> None:
-    def collected() -> int:
-        step(make_worlds(model, 2, workers=2))
+def test_worlds_that_are_collected_leave_no_descriptor_and_no_process(model: sm.Model) -> None:
+    counts = set[int]()
+    for _ in range(4):
+        worlds = make_worlds(model, 2, workers=2)
+        step(worlds)
+        numbers = pids(worlds)
+        del worlds
         gc.collect()
-        return len(os.listdir("/proc/self/fd"))
-
-    first = collected()
-    assert [collected() for _ in range(3)] == [first] * 3
+        assert not running(numbers)
+        counts.add(len(os.listdir("/proc/self/fd")))
+    assert len(counts) == 1
 
 
 def test_what_is_derived_is_computed_when_it_is_read(model: sm.Model) -> None:
@@ -240,14 +233,14 @@ def test_what_is_derived_is_computed_when_it_is_read(model: sm.Model) -> None:
 
 def exchanges(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The verbs that processes are asked for from now on."""
-    verbs = []
-    exchange = pool.PoolWorlds._exchange
+    verbs = list[str]()
 
-    def counted(worlds: Any, numbers: Any, verb: str, *arguments: Any) -> Any:
+    @around(pool.PoolWorlds, "_exchange")
+    def counted(right: Any, worlds: Any, numbers: Any, verb: str, *arguments: Any) -> Any:
         verbs.append(verb)
-        return exchange(worlds, numbers, verb, *arguments)
+        return right(worlds, numbers, verb, *arguments)
 
-    monkeypatch.setattr(pool.PoolWorlds, "_exchange", counted)
+    counted(monkeypatch)
     return verbs
 
 
@@ -259,12 +252,12 @@ def test_what_is_read_after_each_call_comes_with_it(
         for k in range(4):
             step(worlds, 2)
             sm.step(model, data, 2)
-            assert bits(worlds.xpos[3]) == bits(data.xpos)
-            if k:
-                assert bits(worlds.qacc[0]) == bits(data.qacc)
+            assert worlds.xpos[3].tobytes() == data.xpos.tobytes()
+            assert not k or worlds.qacc[0].tobytes() == data.qacc.tobytes()
         step(worlds, ids=[1])
         sm.step(model, data)
-        assert bits(worlds.xpos[1]) == bits(data.xpos) != bits(worlds.xpos[3])
+        equal = [worlds.xpos[world].tobytes() == data.xpos.tobytes() for world in (1, 3)]
+        assert equal == [True, False]
         step(worlds)
         step(worlds)
     assert verbs == ["step", "derive", "step", "derive", "step", "step", "step", "step", "step"]
@@ -320,8 +313,7 @@ def test_engines_are_silent_and_warn_once(
         worlds.ctrl[1::2, 0] = faulty.NOISE  # in the other process
         with pytest.warns(EngineWarning, match="creaks") as told:
             step(worlds, 2)
-        assert len(told) == 1
-        assert told[0].filename == __file__
+        assert [warning.filename for warning in told] == [__file__]
         with warnings.catch_warnings(action="error"):
             step(worlds, 2)
     assert capfd.readouterr() == ("", "")
@@ -335,20 +327,15 @@ def test_memory_is_measured_and_no_process_is_left_by_a_refusal(
     model = sm.load("so101", backend="pybullet")
     monkeypatch.setattr(interface_worlds, "free_memory", lambda: 200 << 20)
     started: list[int] = []
-    begin = pool.PoolWorlds._begun
 
-    def begun(worlds: Any, *arguments: Any) -> Any:
+    @around(pool.PoolWorlds, "_begun")
+    def begun(right: Any, worlds: Any, *arguments: Any) -> Any:
         started.extend(pids(worlds))
-        return begin(worlds, *arguments)
+        return right(worlds, *arguments)
 
-    monkeypatch.setattr(pool.PoolWorlds, "_begun", begun)
-    refused(
-        (
-            EngineError,
-            r"takes [23]\d MB, and 0.2 GB are free: make 1[0-3] ",
-            lambda: make_worlds(model, 1000, workers=2),
-        )
-    )
+    begun(monkeypatch)
+    says = r"takes [23]\d MB, and 0.2 GB are free: make 1[0-3] "
+    refused((EngineError, says, lambda: make_worlds(model, 1000, workers=2)))
     assert len(started) == 3
     assert not running(started)
 
@@ -390,11 +377,11 @@ def script(text: str, **options: Any) -> Any:
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
+        start_new_session=True,
         **options,
     )
-    run.stdin.write(text)
-    run.stdin.close()
-    run.stdin = None
+    with run.stdin:
+        run.stdin.write(text)
     return run
 
 
@@ -408,9 +395,7 @@ def rest(run: Any) -> tuple[int, str, str]:
 @linux
 def test_a_script_without_a_main_and_without_a_close(tmp_path: Path) -> None:
     shared = set(os.listdir("/dev/shm"))
-    run = script(
-        _SCRIPT + "step(worlds, 3)\nprint(worlds.time)", cwd=tmp_path, start_new_session=True
-    )
+    run = script(f"{_SCRIPT}step(worlds, 3)\nprint(worlds.time)", cwd=tmp_path)
     numbers = [int(pid) for pid in run.stdout.readline().split()]
     assert (rest(run), len(numbers)) == ((0, "[0.015 0.015 0.015]\n", ""), 2)
     assert all_end(numbers, 0.5)
@@ -431,7 +416,7 @@ def test_no_process_outlives_one_that_is_killed_in_a_step(
     fork: str, number: signal.Signals
 ) -> None:
     """A forked child, which has their pipes too, does not keep them alive."""
-    run = script(_SCRIPT + fork + _LONG, start_new_session=True)
+    run = script(_SCRIPT + fork + _LONG)
     numbers = [int(pid) for pid in run.stdout.readline().split()]
     assert run.stdout.readline() == "steps\n"
     time.sleep(0.2)
@@ -449,7 +434,7 @@ def test_no_process_outlives_one_that_is_killed_in_a_step(
 @linux
 @pytest.mark.slow
 def test_ctrl_c_while_the_processes_start() -> None:
-    run = script(_SCRIPT, start_new_session=True)
+    run = script(_SCRIPT)
     children: list[int] = []
     listed = Path(f"/proc/{run.pid}/task/{run.pid}/children")
     while not children and run.poll() is None:
