@@ -8,6 +8,7 @@ import json
 import os
 import tracemalloc
 import zipfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -20,7 +21,7 @@ import statemachine as sm
 from statemachine.errors import TraceError
 from statemachine.runs import Trace, export_csv, read, record, whole, write
 
-from .conftest import Cli, refused
+from .conftest import Cli, around, refused, written
 from .test_traces import same
 
 
@@ -95,24 +96,22 @@ def test_no_flipped_bit_of_an_archives_list_hides_a_column(box: Trace, tmp_path:
 
 
 def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> None:
-    zeros = np.zeros(100_000_000, dtype=np.uint8)
-    header = npz(tmp_path / "header.npz", box, header=zeros)
-    column = npz(tmp_path / "column.npz", box, qpos=zeros)
-    del zeros
-    rows = 10_000_000
     claims = {
-        name: claim(rows, *box.header.shape(name))
+        name: claim(10_000_000, *box.header.shape(name))
         for name in box.columns
         if not name.startswith("contact")
     }
-    whole_trace = npz(tmp_path / "rows.npz", box, **claims)
+    files = [
+        (TraceError, says, partial(read, npz(tmp_path / f"{name}.npz", box, **entries)))
+        for name, entries, says in (
+            ("header", {"header": np.zeros(100_000_000, dtype=np.uint8)}, "header of"),
+            ("column", {"qpos": np.zeros(100_000_000, dtype=np.uint8)}, "shape"),
+            ("rows", claims, "unfolds into"),
+        )
+    ]
     tracemalloc.start()
     try:
-        refused(
-            (TraceError, "header of", lambda: read(header)),
-            (TraceError, "shape", lambda: read(column)),
-            (TraceError, "unfolds into", lambda: read(whole_trace)),
-        )
+        refused(*files)
         assert tracemalloc.get_traced_memory()[1] < 20e6
     finally:
         tracemalloc.stop()
@@ -234,17 +233,15 @@ def test_what_a_killed_write_left_is_removed_by_the_next(box: Trace, tmp_path: P
 def test_a_csv_and_its_contacts_are_replaced_together(
     box: Trace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    table, contacts = tmp_path / "box.csv", tmp_path / "box.contacts.csv"
-    for file in (table, contacts):
-        file.write_text("old")
+    table, contacts = (written(tmp_path / f"box.{end}", "old") for end in ("csv", "contacts.csv"))
     seen: list[set[str]] = []
-    replace = os.replace
 
-    def watched(source: str, target: Path) -> None:
+    @around(whole.os, "replace")
+    def watched(right: Any, *paths: Path) -> None:
         seen.append({f.name for f in (table, contacts) if f.exists() and f.read_text() == "old"})
-        replace(source, target)
+        right(*paths)
 
-    monkeypatch.setattr(whole.os, "replace", watched)
+    watched(monkeypatch)
     assert export_csv(box, table) == [table, contacts]
     assert seen == [{"box.csv"}, set()]  # never a new table beside old contacts
     assert "force.normal" in contacts.read_text()

@@ -54,6 +54,12 @@ def traced(name: str, backend: str = "mujoco", seconds: float = 0.5, **options: 
     return record_scenario(scenario, model, seconds=seconds, **options)
 
 
+def as_it_comes(name: str, **options: Any) -> Trace:
+    """A short run of PyBullet with the defaults of the engine."""
+    raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
+    return record_scenario(SCENARIOS[name], raw, seconds=0.1, defaults="engine", **options)
+
+
 def same(one: Trace, two: Trace, columns: Any = None) -> bool:
     return all(one[name].tobytes() == two[name].tobytes() for name in columns or one.columns)
 
@@ -136,25 +142,19 @@ def test_energies_of_a_pendulum_are_those_on_paper(tmp_path: Path) -> None:
 def test_energies_of_both_engines_are_measured_by_one_yardstick() -> None:
     one, two = traced("droop"), traced("droop", "pybullet")
     assert one["energy"][0].tolist() == two["energy"][0].tolist()
-    raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
-    engine = record_scenario(SCENARIOS["droop"], raw, seconds=0.1, defaults="engine")
+    engine = as_it_comes("droop")
     # It has no gravity there; its states are weighed by the model's.
     assert engine["energy"][0].tolist() == one["energy"][0].tolist()
     # Unless it was given one: then that is both sides'.
     moon = {"gravity": [0.0, 0.0, -1.62]}
-    there = [
-        record_scenario(SCENARIOS["droop"], sm.load("so101/scene"), seconds=0.1, options=moon),
-        record_scenario(SCENARIOS["droop"], raw, seconds=0.1, defaults="engine", options=moon),
-    ]
-    there = [trace["energy"][0, 1] for trace in there]
-    assert there[0] == there[1]
-    assert there[0] == pytest.approx(one["energy"][0, 1] * 1.62 / 9.81, rel=1e-12)
+    traces = traced("droop", options=moon), as_it_comes("droop", options=moon)
+    there = [trace["energy"][0, 1] for trace in traces]
+    assert there[0] == there[1] == pytest.approx(one["energy"][0, 1] * 1.62 / 9.81, rel=1e-12)
 
 
 @pytest.mark.usefixtures("bullet")
 def test_an_engine_that_does_not_tell_leaves_nan() -> None:
-    raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
-    trace = record_scenario(SCENARIOS["hold"], raw, seconds=0.05, defaults="engine")
+    trace = as_it_comes("hold")
     assert np.isnan(trace["qfrc_contact"]).all()
     assert np.isfinite(trace["site_xpos"]).all()
     assert trace.header.label.endswith("engine defaults")
@@ -203,8 +203,7 @@ def test_a_controller_that_kicks_is_repeated_exactly(scene: sm.Model) -> None:
     trace = record(scene, kick, 0.3)
     assert trace.header.rewritten == 1
     row = int(np.argmax(np.abs(trace.qvel[:, 1])))
-    assert trace.qvel[row, 1] == 3.0
-    assert abs(trace.time[row] - 0.1) < 1e-6
+    assert (trace.qvel[row, 1], trace.time[row]) == (3.0, pytest.approx(0.1, abs=1e-6))
 
 
 def test_an_engine_that_does_not_repeat_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -291,8 +290,7 @@ def test_a_file_holds_every_bit(name: str, suffix: str, tmp_path: Path) -> None:
     for column in trace.columns:
         assert_has(again[column], dtype=trace[column].dtype, shape=trace[column].shape)
     assert same(trace, again)
-    assert again.header.recorded
-    assert dataclasses.replace(again.header, recorded=False) == trace.header
+    assert again.header == dataclasses.replace(trace.header, recorded=True)
     assert write(trace, tmp_path / f"two{suffix}").read_bytes() == path.read_bytes()
     assert sorted(file.name for file in tmp_path.iterdir()) == [f"one{suffix}", f"two{suffix}"]
 
@@ -347,8 +345,12 @@ def test_what_is_no_trace_at_all(tmp_path: Path, box: Trace) -> None:
         for suffix in (".npz", ".parquet"):
             (tmp_path / f"{name}{suffix}").write_bytes(content)
             says[f"{name}{suffix}"] = "is not a trace"
-    wrong = BadInputError, TraceError
-    refused(*((wrong, words, partial(read, tmp_path / name)) for name, words in says.items()))
+    refused(
+        *(
+            ((BadInputError, TraceError), words, partial(read, tmp_path / name))
+            for name, words in says.items()
+        )
+    )
 
 
 def test_csv_has_a_name_for_every_number(tmp_path: Path, box: Trace) -> None:
@@ -389,8 +391,7 @@ def test_what_a_trace_cannot_do_is_refused(box: Trace, tmp_path: Path) -> None:
 def test_each_scenario_was_recorded_with_both_defaults() -> None:
     expected = {f"{name}.pybullet{end}" for name in SCENARIOS for end in ("", ".engine")}
     assert set(shipped_names()) == {*expected, f"hold.{OLDER}"}
-    trace = shipped("hold", "pybullet", "engine")
-    assert_has(trace.header, recorded=True, defaults="engine")
+    assert_has(shipped("hold", "pybullet", "engine").header, recorded=True, defaults="engine")
     refused((UnknownNameError, "recorded trace", lambda: shipped("hold", "mujoco")))
 
 
@@ -409,8 +410,7 @@ def test_a_recorded_trace_is_what_the_engine_does_here(
     """On any processor, Python and distribution of PyBullet: recorded with its own, on 3.11."""
     if (sys.platform, platform.machine()) != ("linux", "x86_64"):
         pytest.skip("recorded on Linux x86-64: another compiler gives other bits")
-    monkeypatch.syspath_prepend(ROOT / "models" / "so101")
-    _is_as_recorded(name)
+    _is_as_recorded(name, monkeypatch)
 
 
 @pytest.mark.slow
@@ -419,8 +419,7 @@ def test_a_recorded_trace_is_what_the_engine_does_here(
 def test_the_recorded_run_of_an_older_release_is_what_it_does(
     monkeypatch: pytest.MonkeyPatch, mujoco_scene: sm.Model
 ) -> None:
-    monkeypatch.syspath_prepend(ROOT / "models" / "so101")
-    _is_as_recorded(f"hold.{OLDER}")
+    _is_as_recorded(f"hold.{OLDER}", monkeypatch)
     here = take(LESSONS["hold"], mujoco_scene, "mujoco", {}).result.older
     monkeypatch.setenv("STATEMACHINE_ENGINES", "nowhere")
     recorded = vars(take(LESSONS["hold"], mujoco_scene, "mujoco", {}).result.older)
@@ -428,17 +427,17 @@ def test_the_recorded_run_of_an_older_release_is_what_it_does(
     assert np.degrees(here.gap) == pytest.approx(6.12, abs=0.01)
 
 
-def _is_as_recorded(name: str) -> None:
+def _is_as_recorded(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "models" / "so101")
     import make_traces  # pyright: ignore[reportMissingImports]
 
     assert set(make_traces.RUNS) == set(shipped_names())
     trace, kept = make_traces.recorded(name), read(make_traces.FOLDER / f"{name}.npz")
     assert kept.header.provenance.model_sha256 == trace.header.provenance.model_sha256
     assert same(trace, kept, INPUTS)
-    for column in trace.columns:
-        if column not in INPUTS:  # kept in single precision
-            rounded = trace[column].astype(np.float32)
-            np.testing.assert_allclose(rounded, kept[column], rtol=1e-6, atol=1e-6)
+    for column in set(trace.columns) - set(INPUTS):  # kept in single precision
+        rounded = trace[column].astype(np.float32)
+        np.testing.assert_allclose(rounded, kept[column], rtol=1e-6, atol=1e-6)
 
 
 # The command.
@@ -450,7 +449,7 @@ def test_the_command_records_plays_shows_and_exports(here: Cli, tmp_path: Path) 
     assert done.stdout.startswith("hold.mujoco.npz: 41 rows of hold on mujoco ")
     header = json.loads(here("trace", "show", "hold.mujoco.npz", "--json").stdout)
     assert header["command"] == "statemachine trace record hold --seconds 0.2"
-    assert here("trace", "play", "hold.mujoco.npz", "-o", "again.parquet").returncode == 0
+    here("trace", "play", "hold.mujoco.npz", "-o", "again.parquet", code=0)
     assert same(read(tmp_path / "again.parquet"), read(tmp_path / "hold.mujoco.npz"))
     assert here("trace", "csv", "again.parquet").stdout.split() == [
         "again.csv", "again.contacts.csv",
