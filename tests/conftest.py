@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from functools import partial
@@ -24,7 +25,7 @@ import pytest
 from statemachine import backends, load, releases
 from statemachine.backends import backend_engine, backend_names
 from statemachine.cli import main
-from statemachine.errors import MissingEngineError, StateMachineError
+from statemachine.errors import EngineWarning, MissingEngineError, StateMachineError
 from statemachine.installed import ENGINES, engine_version, require
 from statemachine.interface import Data, Model, forward, make_data, reset, step
 from statemachine.lessons import LESSONS
@@ -35,8 +36,8 @@ from statemachine.report import terminal
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
+T = TypeVar("T")
 REQUIRED = set(filter(None, os.environ.get("STATEMACHINE_REQUIRE", "").split(",")))
-_Block = TypeVar("_Block")
 # Options with which a lesson of many steps is a short one.
 QUICK = {
     "worlds": ("--most", "4"),
@@ -145,6 +146,14 @@ def refused(
         raised = caught.value
         assert not isinstance(raised, (StateMachineError, TypeError)) or "\n" not in str(raised)
     return raised
+
+
+def warnings_of(call: Callable[[], T]) -> tuple[T, str]:
+    """What a call gives, and what we warned of in it; nobody else warned."""
+    with warnings.catch_warnings(record=True, action="always") as told:
+        result = call()
+    assert {warning.category for warning in told} <= {EngineWarning}
+    return result, " ".join(str(warning.message) for warning in told)
 
 
 def after(model: Model, nstep: int, keyframe: int | str | None = None, **inputs: Any) -> np.ndarray:
@@ -313,7 +322,7 @@ def shown(page: Page) -> str:
     return said.getvalue()
 
 
-def blocks(page: Page, kind: type[_Block]) -> list[_Block]:
+def blocks(page: Page, kind: type[T]) -> list[T]:
     """The blocks of one kind on a page."""
     return [block for block in page.blocks if isinstance(block, kind)]
 

@@ -27,6 +27,8 @@ from statemachine.errors import (
 from .conftest import (
     ROOT,
     after,
+    around,
+    assert_has,
     assert_in,
     bullet_clients,
     opened,
@@ -163,9 +165,8 @@ open("mark", "w").write("done")
 @pytest.mark.parametrize("shell", ["", "<&- >&- 2>&-", ">&-", "2>&-", ">&- 2>&-"])
 def test_it_prints_nothing_and_works_without_streams(tmp_path: Path, shell: str) -> None:
     """The shell takes streams away before Python starts."""
-    command = f"exec {shlex.quote(sys.executable)} -c {shlex.quote(_ALL)} {shell}"
     done = subprocess.run(
-        ["/bin/sh", "-c", command],
+        ["/bin/sh", "-c", f"exec {shlex.quote(sys.executable)} -c {shlex.quote(_ALL)} {shell}"],
         capture_output=True,
         text=True,
         timeout=120,
@@ -222,7 +223,7 @@ def test_what_it_cannot_do_is_refused_by_name(feature: str, tmp_path: Path) -> N
     file = mjcf(tmp_path, REFUSED[feature])
     sm.load(file)  # MuJoCo takes it
     for defaults in ("model", "engine"):
-        told = partial(sm.load, file, backend="pybullet", defaults=defaults)
+        told = partial(load, file, defaults=defaults)
         error = refused((UnsupportedError, NAMED.get(feature, feature), told))
         assert error.backend == "pybullet"
         assert feature in str(error)
@@ -236,41 +237,31 @@ def test_an_ellipsoid_that_touches_nothing_is_taken(tmp_path: Path) -> None:
 
 
 def test_all_problems_of_a_file_are_named(tmp_path: Path) -> None:
-    both = (
-        '<body><joint name="wrist" range="-1 1" margin="0.1"/>'
-        '<geom mass="1" size="0.1"/></body><geom name="hills" type="hfield" hfield="h"/>'
-    )
-    hills = '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>'
-    error = refused((UnsupportedError, "", lambda: load(mjcf(tmp_path, hills + _world(both)))))
+    both = REFUSED["shape of a geom"] + REFUSED["two limits at once"]
+    error = refused((UnsupportedError, "", lambda: load(mjcf(tmp_path, both))))
     assert_in(str(error), "joint wrist", "geom hills")
 
 
 def test_a_contact_margin_is_told(tmp_path: Path) -> None:
     skin = '<body><joint/><geom name="{}" size="0.1" mass="1" margin="{}" {}/></body>'
-    text = _world(
-        skin.format("skin", 0.01, "") + skin.format("look", 0.1, 'contype="0" conaffinity="0"')
-    )
+    look = skin.format("look", 0.1, 'contype="0" conaffinity="0"')
+    file = mjcf(tmp_path, _world(skin.format("skin", 0.01, "") + look))
     with pytest.warns(EngineWarning, match=r"margin of 1 geoms \(the largest: 10 mm, skin\)"):
-        sm.load(mjcf(tmp_path, text), backend="pybullet")
+        load(file)
     with warnings.catch_warnings(action="error"):
-        sm.load(mjcf(tmp_path, text), backend="pybullet", contacts=False)
+        load(file, contacts=False)
 
 
 def test_what_is_switched_off_at_load_is_not_refused(tmp_path: Path) -> None:
     file = mjcf(tmp_path, REFUSED["shape of a geom"])
-    model = sm.load(file, backend="pybullet", contacts=False, timestep=0.01, substeps=2)
-    same = sm.load(file, contacts=False, timestep=0.01, substeps=2)
-    assert (model.timestep, model.substeps) == (same.timestep, same.substeps) == (0.01, 2)
-    for each in (model, same):
-        with opened(each, qvel=1.0, nstep=10) as (_, data):
+    models = on_both(file, contacts=False, timestep=0.01, substeps=2)
+    for model in models:
+        assert_has(model, timestep=0.01, substeps=2)
+        with opened(model, qvel=1.0, nstep=10) as (_, data):
             assert data.time == pytest.approx(0.1)
     refused(
-        (UnsupportedError, "hills", lambda: model.replace(contacts=True)),
-        (
-            UnsupportedError,
-            "no option named 'contcts'",
-            lambda: sm.load(file, backend="pybullet", contcts=False),
-        ),
+        (UnsupportedError, "hills", lambda: models[1].replace(contacts=True)),
+        (UnsupportedError, "no option named 'contcts'", lambda: load(file, contcts=False)),
     )
 
 
@@ -334,16 +325,13 @@ def test_engine_motors_hold_an_arm_that_nobody_drives() -> None:
 
 def test_engine_bias_of_the_first_step_does_not_follow_writes() -> None:
     """That of a step right after a reset, of which the arrays are the only copy."""
-    model = load("so101", defaults="engine", gravity=(0, 0, -9.81))
-    found = []
-    for write in (False, True):
-        with opened(model, nstep=1) as (_, data):
-            if write:
-                data.qpos[:] = 0.7
-                data.qvel[:] = 3.0
-            found.append(data.qfrc_bias.copy())
-    assert found[0].any()
-    assert np.array_equal(*found)
+    with opened(load("so101", defaults="engine", gravity=(0, 0, -9.81)), nstep=1) as (_, data):
+        bias = data.qfrc_bias.copy()
+    with opened(data.model, nstep=1) as (_, written_to):
+        written_to.qpos[:] = 0.7
+        written_to.qvel[:] = 3.0
+        assert bias.any()
+        assert np.array_equal(written_to.qfrc_bias, bias)
 
 
 def test_engine_does_not_tell_forces_by_part() -> None:
@@ -407,18 +395,12 @@ def test_what_is_dropped_gives_its_clients_back_at_once(monkeypatch: pytest.Monk
 def test_no_room_for_a_client_is_said(monkeypatch: pytest.MonkeyPatch, memory: str) -> None:
     from statemachine.backends import _bullet_client
 
-    model, connect, room = load("so101"), _bullet_client.pb.connect, _bullet_client.free_memory
-    answers = [-1, -1]
-    if memory == "free":
-        monkeypatch.setattr(
-            _bullet_client.pb, "connect", lambda *_: answers.pop() if answers else connect(*_)
-        )
-        said = "1024 worlds in one process at most, of 35 MB each"
-    else:
-        monkeypatch.setattr(
-            _bullet_client, "free_memory", lambda: answers.pop() if answers else room()
-        )
-        said = "no memory for another world of PyBullet's: one takes 35 MB"
+    model, answers = load("so101"), [-1, -1]
+    where, name, said = {
+        "free": (_bullet_client.pb, "connect", "1024 worlds in one process at most, of 35 MB each"),
+        "gone": (_bullet_client, "free_memory", "no memory for another world .*: one takes 35 MB"),
+    }[memory]
+    around(where, name)(lambda right, *_: answers.pop() if answers else right(*_))(monkeypatch)
     refused((EngineError, f"{said}.*close some Data", lambda: sm.make_data(model)))
     answers.append(-1)  # full once, and not after what was dropped is collected
     after(model, 1)
@@ -464,10 +446,10 @@ while True:
         data.qacc
         print("went", flush=True)
 """
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)}
+    begin = partial(subprocess.Popen, [sys.executable, "-c", code], env=environment)
     for delay in (0.0, 0.013, 0.041):
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)}
-        command = [sys.executable, "-c", code]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as child:
+        with begin(stdout=subprocess.PIPE) as child:
             try:
                 assert child.stdout.readline() == b"went\n"
                 time.sleep(delay)
@@ -527,14 +509,12 @@ def test_a_quaternion_of_any_length_is_its_rotation(box: sm.Model) -> None:
         with opened(box, 0) as (model, data):
             data.qpos[9:13] *= length
             sm.forward(model, data)
-            body = model.body_id("box")
             quat = data.qpos[9:13] / np.linalg.norm(data.qpos[9:13])
-            assert np.abs(data.xquat[body] - quat).max() < 1e-15
+            assert np.abs(data.xquat[model.body_id("box")] - quat).max() < 1e-15
             sm.step(model, data, 20)
             assert abs(np.linalg.norm(data.qpos[9:13]) - 1) < 1e-12
             ends.append(data.qpos.copy())
-    for end in ends[1:]:  # a last bit of the length, in contact for 20 steps
-        assert np.abs(end - ends[0]).max() < 1e-6
+    assert np.ptp(ends, axis=0).max() < 1e-6  # a last bit of the length, in contact for 20 steps
 
 
 def test_a_write_that_is_undone_was_none(box: sm.Model) -> None:

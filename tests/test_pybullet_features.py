@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import statemachine as sm
 from statemachine.errors import UnsupportedError
 from statemachine.models import resolve
 
-from .conftest import need_engine, refused, written
+from .conftest import refused, warnings_of, written
 from .small_models import ARM_URDF, BOX_URDF, FEATURED, largest_gap, on_both
 
 pytestmark = pytest.mark.usefixtures("bullet")
@@ -27,12 +26,10 @@ PID = '<pid name="p" joint="a" kp="20" kv="2"/>'
 
 def warned(folder: Path, changes: dict[str, str], **options: Any) -> tuple[list[sm.Model], str]:
     """The model on both engines, and what their loads warned of."""
-    parts = dict.fromkeys(("more", "geom", "joint", "actuator"), "")
-    parts |= {"option": 'integrator="implicitfast"'} | changes
-    file = written(folder / "model.xml", FEATURED.format(**parts | {"more": FLOOR + parts["more"]}))
-    with warnings.catch_warnings(record=True, action="always") as records:
-        models = on_both(file, **options)
-    return models, " ".join(str(record.message) for record in records)
+    parts = {**dict.fromkeys(("more", "geom", "joint", "actuator"), ""), **changes}
+    parts = {"option": 'integrator="implicitfast"', **parts, "more": FLOOR + parts["more"]}
+    file = written(folder / "model.xml", FEATURED.format(**parts))
+    return warnings_of(lambda: on_both(file, **options))
 
 
 def apart(models: list[sm.Model]) -> float:
@@ -115,8 +112,8 @@ def test_nothing_is_lost_in_silence(
 
 
 def test_contact_settings_are_not_spoken_of_without_contacts(tmp_path: Path) -> None:
-    geom = 'solref=".02 .1" priority="1" surfacevel=".5 0 0"'
-    models, text = warned(tmp_path, {"geom": geom}, contacts=False)
+    geom = {"geom": 'solref=".02 .1" priority="1" surfacevel=".5 0 0"'}
+    models, text = warned(tmp_path, geom, contacts=False)
     assert not text
     assert "of their own" not in models[1].capabilities.behaviours["contacts"].note
 
@@ -142,10 +139,7 @@ def test_an_actuator_that_is_off_is_not_refused(tmp_path: Path, actuator: str) -
 @pytest.fixture
 def pb() -> Any:
     """The engine, imported without its banner."""
-    need_engine("pybullet")
-    import pybullet
-
-    return pybullet
+    return pytest.importorskip("pybullet")
 
 
 @pytest.fixture
@@ -162,17 +156,12 @@ Load = Callable[..., int]
 def load(pb: Any, client: int, tmp_path: Path) -> Load:
     """Load a URDF text with the inertias that it states."""
 
-    def run(text: str, fixed: bool = True, name: str = "x.urdf", **more: Any) -> int:
-        file = written(tmp_path / name, text)
-        return pb.loadURDF(
-            str(file),
-            useFixedBase=fixed,
-            flags=pb.URDF_USE_INERTIA_FROM_FILE,
-            physicsClientId=client,
-            **more,
-        )
-
-    return run
+    return lambda text, fixed=True, name="x.urdf": pb.loadURDF(
+        str(written(tmp_path / name, text)),
+        useFixedBase=fixed,
+        flags=pb.URDF_USE_INERTIA_FROM_FILE,
+        physicsClientId=client,
+    )
 
 
 @pytest.mark.parametrize("more", [{}, {"maxJointVelocity": 1e9}])
@@ -182,7 +171,7 @@ def test_a_call_that_sets_the_largest_speed_ignores_damping(
     """One changeDynamics with both leaves the URDF's joint damping on: ours has none to leave."""
     body = load(ARM_URDF.format(dynamics='<dynamics damping="3" friction="0"/>'))
     pb.setJointMotorControl2(body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
-    still = {"linearDamping": 0, "angularDamping": 0, "jointDamping": 0}
+    still = dict.fromkeys(("linearDamping", "angularDamping", "jointDamping"), 0)
     pb.changeDynamics(body, 0, **still, **more, physicsClientId=client)
     pb.resetJointState(body, 0, 0, 1.0, client)
     pb.stepSimulation(client)
@@ -197,19 +186,17 @@ def test_link_frames_are_single_and_centres_of_mass_double(pb: Any, client: int)
     raw = mujoco.MjModel.from_xml_path(str(resolve("so101")))
     data, world = mujoco.MjData(raw), World(Plan(raw), "ghost")
     (tree,) = world.trees
-    random, frame, centre = np.random.default_rng(0), 0.0, 0.0
-    for _ in range(20):
-        data.qpos[:] = random.uniform(*raw.jnt_range.T)
+    gaps, link = [], tree.tips[raw.site("gripperframe").id]
+    for pose in np.random.default_rng(0).uniform(*raw.jnt_range.T, (20, raw.nq)):
+        data.qpos[:] = pose
         mujoco.mj_kinematics(raw, data)
         world.put(data.qpos, np.zeros(raw.nv))
-        link = tree.tips[raw.site("gripperframe").id]
         state = pb.getLinkState(
             tree.body, link, computeForwardKinematics=1, physicsClientId=world.client
         )
-        tip = data.site("gripperframe").xpos
-        centre = max(centre, float(np.abs(np.subtract(state[0], tip)).max()))
-        frame = max(frame, float(np.abs(np.subtract(state[4], tip)).max()))
+        gaps.append(np.abs(np.array([state[0], state[4]]) - data.site("gripperframe").xpos))
     world.close()
+    centre, frame = np.max(gaps, axis=(0, 2))
     assert centre < 1e-14
     assert 1e-10 < frame < 1e-6
 
@@ -242,9 +229,8 @@ def test_a_box_on_a_plane_is_found_one_corner_at_a_time(pb: Any, client: int, lo
     pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), (0, 0, 0, 1), client)
     pb.performCollisionDetection(client)
     assert len(pb.getContactPoints(physicsClientId=client)) == 1
-    for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
-        tilted = np.array([x * 5e-4, y * 5e-4, 0, 1])
-        pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), tilted.tolist(), client)
+    for x, y in ((5e-4, 5e-4), (5e-4, -5e-4), (-5e-4, -5e-4), (-5e-4, 5e-4)):
+        pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), (x, y, 0, 1), client)
         pb.performCollisionDetection(client)
     assert len(pb.getContactPoints(physicsClientId=client)) == 4
 
