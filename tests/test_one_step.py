@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,11 @@ def first(found: Figures) -> str:
     return found.first.stage if found.first else ""
 
 
+def stage(found: Figures, name: str) -> Any:
+    (gap,) = (gap for gap in found.stages if gap.stage == name)
+    return gap
+
+
 def verdict(found: Figures) -> Any:
     return page(found, ("one", "two"), "hold").blocks[-1]
 
@@ -58,11 +64,10 @@ def verdict(found: Figures) -> Any:
 def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> None:
     found = stepped(tmp_path, LINKS_AND_BALL)
     assert [gap.stage for gap in found.stages] == list(STAGES)
-    assert {gap.worst for gap in found.stages} == {0.0}
-    assert {gap.null for gap in found.stages} == {0.0}
+    for gap in found.stages:
+        assert_has(gap, worst=0.0, null=0.0, told=True)
     assert_in(verdict(found).text, "the same step", "last bit")
     assert not found.spikes
-    assert all(gap.told for gap in found.stages)
 
 
 @pytest.mark.parametrize("stage", CHANGES)
@@ -77,9 +82,8 @@ def test_a_change_shows_at_its_own_stage_first(stage: str, tmp_path: Path) -> No
 def test_points_that_are_apart_are_no_depth(tmp_path: Path) -> None:
     """Within a margin MuJoCo pushes before anything touches; the shapes are the same."""
     found = stepped(tmp_path, LINKS_AND_BALL.replace('size="0.05"', 'size="0.05" margin="0.01"'))
-    stages = {gap.stage: gap for gap in found.stages}
     assert first(found) == "contact force"
-    assert (stages["contacts found"].worst, stages["contacts found"].beyond) == (0.0, 0)
+    assert_has(stage(found, "contacts found"), worst=0.0, beyond=0)
 
 
 def test_a_contact_shows_from_the_moment_at_which_it_begins(tmp_path: Path) -> None:
@@ -116,14 +120,10 @@ def test_the_verdict_names_no_cause_that_why_contradicts() -> None:
 
 
 def test_joints_in_another_order_are_matched(tmp_path: Path) -> None:
-    ball = LINKS_AND_BALL[
-        LINKS_AND_BALL.index('  <body name="ball"') : LINKS_AND_BALL.index("</worldbody>")
-    ]
-    other = LINKS_AND_BALL.replace(ball, "").replace(
-        '<body name="upper"', f'{ball}<body name="upper"', 1
+    head, links, ball, tail = re.split(
+        r'(?=<body name="(?:upper|ball)")|(?=</world)', LINKS_AND_BALL
     )
-    assert other != LINKS_AND_BALL
-    assert stepped(tmp_path, other).first is None
+    assert stepped(tmp_path, head + ball + links + tail).first is None
 
 
 def test_what_does_not_count_is_relative_to_the_scale(tmp_path: Path) -> None:
@@ -153,7 +153,7 @@ def test_the_engines_are_alike_until_something_touches(order: tuple[str, str]) -
     found: Any = one_step(rerun_of(hold, one, seconds=0.5), two)
     # PyBullet pushes when the stud is 0.7 mm above the floor; where it touches, it is as deep.
     assert first(found) == "contact force"
-    assert next(gap for gap in found.stages if gap.stage == "contacts found").worst < 1e-6
+    assert stage(found, "contacts found").worst < 1e-6
     assert found.first.first == pytest.approx(0.27, abs=0.011)
     assert "gripper on floor" in found.first.where
     # Before, all is rounding, mass matrices that each engine computes itself included.
@@ -177,10 +177,9 @@ def test_the_null_shows_what_a_restore_forgets() -> None:
 @pytest.mark.usefixtures("bullet")
 def test_an_engine_that_does_not_tell_a_stage_is_not_guessed_at() -> None:
     fall = scenario("fall")
-    one = rerun_of(fall, sm.load(fall.model), seconds=0.2)
     fresh = sm.load(fall.model, backend="pybullet", defaults="engine")
-    two = rerun_of(fall, fresh, seconds=0.2).model
-    found = {gap.stage: gap for gap in one_step(one, two, moments=10).stages}
+    one, two = (rerun_of(fall, side, seconds=0.2) for side in (sm.load(fall.model), fresh))
+    found = {gap.stage: gap for gap in one_step(one, two.model, moments=10).stages}
     assert found["passive"].reason
     assert not found["passive"].told
     # It has no rotors, which the model's motors have.

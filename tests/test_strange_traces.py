@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import stat
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +21,7 @@ from statemachine.report import compare as report
 from statemachine.runs import Trace, model_file, read, record, write
 from statemachine.runs.whole import check_place, replace_file
 
-from .conftest import Cli, assert_has, refused, shown
+from .conftest import Cli, assert_has, refused, shown, written_all
 from .small_models import TWO_NAMELESS, model_of
 
 
@@ -62,8 +61,7 @@ def added(array: Any, row: Any, by: Any) -> Any:
     ],
 )
 def test_what_is_no_number_never_agrees(column: str, quantity: str, box: Trace) -> None:
-    other = changed(box, None, **{column: added(box[column], 20, np.nan)})
-    found = compare(box, other)
+    found = compare(box, changed(box, None, **{column: added(box[column], 20, np.nan)}))
     assert not found.agrees
     assert (named(found)[quantity].verdict, found.worst.name) == ("differs", quantity)
     assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
@@ -88,8 +86,7 @@ def test_a_rotation_that_is_none_differs(box: Trace) -> None:
 
 
 def test_who_ended_early_does_not_agree(box: Trace) -> None:
-    other = cut(box, 5, ended="it diverged")
-    found = compare(box, other)
+    found = compare(box, cut(box, 5, ended="it diverged"))
     assert {each.verdict for each in found.agreements} == {"agrees"}
     assert_has(found, ended=True, agrees=False)
     assert not report.page(found).holds
@@ -99,8 +96,7 @@ def test_who_ended_early_does_not_agree(box: Trace) -> None:
 def test_a_shorter_run_is_compared_as_far_as_it_goes_and_that_is_said(box: Trace) -> None:
     found = compare(cut(box, 30), box)
     assert found.agrees
-    said = [note for note in found.notes if "s long" in note]
-    assert said == [
+    assert [note for note in found.notes if "s long" in note] == [
         "the runs are 0.145 and 0.3 s long: what "
         f"{box.header.label} (second) does after 0.145 s is not compared"
     ]
@@ -123,24 +119,17 @@ def test_bodies_in_another_order_are_the_same_bodies(box: Trace) -> None:
         xpos=box["xpos"][:, order],
         xquat=box["xquat"][:, order],
     )
-    there, back = compare(box, turned), compare(turned, box)
-    assert there.agrees
-    assert back.agrees
-    assert set(named(there)) == set(named(compare(box, box)))
+    for found in (compare(box, turned), compare(turned, box)):
+        assert found.agrees
+        assert named(found).keys() == named(compare(box, box)).keys()
 
 
 def test_bodies_without_names_are_told_apart(tmp_path: Path) -> None:
-    trace = record(
-        model_of(tmp_path, TWO_NAMELESS),
-        seconds=0.2,
-    )
-    assert set(trace.touches()) == {"body 1 on world", "body 2 on world"}
-    force = {
-        each.name: each.tolerance
-        for each in compare(trace, trace).agreements
-        if each.kind == "force"
-    }
-    assert set(force) == {"body 1 on world, normal force", "body 2 on world, normal force"}
+    trace = record(model_of(tmp_path, TWO_NAMELESS), seconds=0.2)
+    pairs = {"body 1 on world", "body 2 on world"}
+    assert trace.touches().keys() == pairs
+    forces = {each.name for each in compare(trace, trace).agreements if each.kind == "force"}
+    assert forces == {f"{pair}, normal force" for pair in pairs}
 
 
 # What one side has otherwise, and the note that says so.
@@ -197,24 +186,20 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
         '<mujoco><worldbody><body name="b"><joint name="j" axis="0 1 0"/>'
         '<geom size=".1" pos=".3 0 0"/><site name="tip" pos=".3 0 0"/></body></worldbody></mujoco>'
     )
-    robots = tmp_path / "robots"
-    robots.mkdir()
-    (robots / "one.xml").write_text(text)
-    trace = record(sm.load(robots / "one.xml"), seconds=0.2, experiment="swing")
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    monkeypatch.chdir(elsewhere)
-    monkeypatch.delenv("MENAGERIE", raising=False)
+    one, other = (tmp_path / name / "one.xml" for name in ("robots", "elsewhere"))
+    written_all(tmp_path, {"robots/one.xml": text, "elsewhere/empty.txt": ""})
+    trace = record(sm.load(one), seconds=0.2, experiment="swing")
+    monkeypatch.chdir(other.parent)
     refused((ModelFileError, "say which it is with --model", lambda: model_file(trace.header)))
-    assert model_file(trace.header, menagerie=tmp_path) == (robots / "one.xml", True)
-    assert model_file(trace.header, beside=robots / "t.npz") == (robots / "one.xml", True)
+    assert model_file(trace.header, beside=one.with_name("t.npz")) == (one, True)
     # Another file of that name here does not take the place of the one that it was.
-    (elsewhere / "one.xml").write_text(text.replace(".3 0 0", ".4 0 0"))
-    assert model_file(trace.header, menagerie=tmp_path) == (robots / "one.xml", True)
-    assert model_file(trace.header) == (elsewhere / "one.xml", False)
+    for _ in range(2):
+        assert model_file(trace.header, menagerie=tmp_path) == (one, True)
+        other.write_text(text.replace(".3 0 0", ".4 0 0"))
+    assert model_file(trace.header) == (other, False)
     assert witness(trace, trace) is None
-    (robots / "one.xml").unlink()
-    write(trace, elsewhere / "swing.npz")
+    one.unlink()
+    write(trace, other.with_name("swing.npz"))
     ran = cli("trace", "play", "elsewhere/swing.npz", "-o", "played.npz", code=0)
     assert "is not the file that the trace was recorded with" in ran.stderr
     again = read(tmp_path / "played.npz").header
@@ -237,13 +222,9 @@ def test_why_finds_common_moments_without_a_table_of_all_pairs(mujoco_arm: sm.Mo
     from statemachine.compare.why.gap import Ruler
 
     short = record(mujoco_arm, seconds=0.1, derive=False)
-    rows = 60_000
-    time = np.arange(rows) * 0.005
-    long = Trace(
-        short.header,
-        {n: np.broadcast_to(short[n][0], (rows, *short[n].shape[1:])).copy()
-         for n in ("qpos", "qvel", "ctrl")} | {"time": time},
-    )  # fmt: skip
+    time = np.arange(60_000) * 0.005
+    columns = {n: np.repeat(short[n][:1], len(time), axis=0) for n in ("qpos", "qvel", "ctrl")}
+    long = Trace(short.header, {**columns, "time": time})
     ruler = Ruler(match_models(mujoco_arm, mujoco_arm), long, long)
     assert np.array_equal(ruler.time, time)
     assert not ruler.between
@@ -267,15 +248,14 @@ def test_what_is_no_file_is_written_into_and_stays(tmp_path: Path) -> None:
     replace_file(pipe, lambda out: out.write(b"whole"))
     reader.join(20)
     assert got == [b"whole"]
-    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert pipe.is_fifo()
     assert [each.name for each in tmp_path.iterdir()] == ["pipe"]
-    null = Path(os.devnull)
+    link, null = tmp_path / "link", Path(os.devnull)
     before = null.stat()
-    link = tmp_path / "link"
     link.symlink_to(null)
     replace_file(link, lambda out: out.write(b"x"))
     assert link.is_symlink()
-    assert (null.stat().st_mode, null.stat().st_rdev) == (before.st_mode, before.st_rdev)
+    assert_has(null.stat(), st_mode=before.st_mode, st_rdev=before.st_rdev)
 
 
 def test_what_a_library_says_of_a_file_is_not_lost(tmp_path: Path) -> None:
