@@ -42,10 +42,9 @@ def rendering_environment() -> dict[str, str]:
 
 def seen_by(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
     """Where points (n, 3) are in the picture: (n, 2), -1 to 1 from edge to edge."""
-    right, up, forward = camera.axes
-    offset, half = points - camera.eye, np.tan(np.radians(camera.fovy) / 2)
-    flat = np.stack([offset @ right / (half * aspect), offset @ up / half], axis=1)
-    return flat / (offset @ forward)[:, None]
+    right, up, depth = (points - camera.eye) @ np.transpose(camera.axes)
+    half = np.tan(np.radians(camera.fovy) / 2)
+    return np.stack([right / (half * aspect), up / half], axis=1) / depth[:, None]
 
 
 def silhouettes(

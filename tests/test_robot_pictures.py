@@ -13,7 +13,7 @@ import pytest
 import statemachine as sm
 from statemachine import cli
 from statemachine.errors import MissingEngineError
-from statemachine.lessons import PATH
+from statemachine.lessons import LESSONS, PATH
 from statemachine.lessons.pictures import PICTURES, with_picture
 from statemachine.page import Page, Printed, Question, RobotPicture, Text
 from statemachine.report import film, site, terminal
@@ -31,12 +31,10 @@ def test_every_lesson_of_the_path_has_one() -> None:
 @pytest.mark.parametrize("name", PICTURES)
 def test_it_is_of_the_lesson_s_model_and_says_what_is_to_be_seen(name: str) -> None:
     picture = PICTURES[name]
-    (lesson,) = [lesson for lesson in PATH if lesson.name == name]
-    assert picture.model == lesson.model
+    assert picture.model == LESSONS[name].model
     assert len(picture.words) > 40
-    model = sm.load(picture.model)
     solid, ghost = picture.poses()
-    assert solid.shape[1] == model.nq
+    assert solid.shape[1] == sm.load(picture.model).nq
     assert ghost is None or ghost.shape == solid.shape
     for command in picture.view.split(" && "):
         program, *words = shlex.split(command)
@@ -83,8 +81,8 @@ def test_without_a_renderer_a_page_has_the_words(
     monkeypatch.setattr(
         film, "renderer_here", Mock(side_effect=MissingEngineError("nothing draws"))
     )
-    path = site._write(tmp_path, "page", Page("t", "o", [_picture()]), "x")  # pyright: ignore
-    text = path.read_text()
+    page = Page("t", "o", [_picture()])
+    text = site._write(tmp_path, "page", page, "x").read_text()  # pyright: ignore
     assert_in(text, "the words", "*the title* Live: `statemachine view`")
     assert "![" not in text
 
@@ -97,15 +95,13 @@ def test_it_is_a_picture_with_its_words_where_there_is_one() -> None:
 def test_a_terminal_says_how_to_look_at_it_to_who_sits_there(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    page = Page("t", "o", [_picture(), Text("rest")])
-    terminal.show(page, "footer")
-    piped = capsys.readouterr().out
-    assert "statemachine view" not in piped
-    terminal.show(Page("t", "o", [Text("rest")]), "footer")
-    assert capsys.readouterr().out == piped
-    terminal.show(page, "footer", Reader())
-    shown = capsys.readouterr().out
-    assert shown.index("rest") < shown.index("statemachine view") < shown.index("footer")
+    def shown(*blocks: Any, reader: Reader | None = None) -> str:
+        terminal.show(Page("t", "o", [*blocks, Text("rest")]), "footer", reader)
+        return capsys.readouterr().out
+
+    assert shown(_picture()) == shown()
+    said = shown(_picture(), reader=Reader())
+    assert said.index("rest") < said.index("statemachine view") < said.index("footer")
 
 
 @pytest.mark.slow

@@ -44,9 +44,9 @@ def test_the_time_until_it_is_ready_does_not_count(tmp_path: Path) -> None:
     code = "import time; time.sleep(1.5); open('ready', 'w').close(); time.sleep(0.2)"
     ready = (tmp_path / "ready").exists
     done = _python(code, wall=1.0, start=100.0, started=ready, cwd=tmp_path)
-    assert (done.started, done.end, done.code) == (True, "code", 0)
+    assert_has(done, started=True, end="code", code=0)
     never = _python("import time; time.sleep(60)", start=0.5, started=lambda: False)
-    assert (never.started, never.end) == (False, "clock")
+    assert_has(never, started=False, end="clock")
 
 
 def test_where_a_process_cannot_limit_itself_it_is_watched(
@@ -57,8 +57,7 @@ def test_where_a_process_cannot_limit_itself_it_is_watched(
     busy = _python("import time\nwhile time.process_time() < 30: pass", cpu=1.0, start_cpu=60.0)
     assert busy.end == "cpu"
     assert busy.cpu < 10
-    idle = _python("import time; time.sleep(1.5)", cpu=1.0)
-    assert (idle.end, idle.code) == ("code", 0)
+    assert_has(_python("import time; time.sleep(1.5)", cpu=1.0), end="code", code=0)
 
 
 def test_it_is_ended_from_outside() -> None:
@@ -172,11 +171,19 @@ def test_shut_in_it_reaches_no_process_and_no_network(folder: Path) -> None:
 
 
 def test_shut_in_nothing_escapes(folder: Path) -> None:
-    code = f"# {folder}\nimport os, time\nfor _ in range(2):\n    if os.fork() == 0:\n"
-    code += "        os.setsid()\n        open(str(os.getpid()), 'w').close()\n"
-    code += "        time.sleep(50)\n        os._exit(0)\n"
-    code += "while len(os.listdir()) < 2: time.sleep(0.01)\nos._exit(7)"
-    done = _shut_in(folder, code)
+    done = _shut_in(
+        folder,
+        f"# {folder}\n"
+        "import os, time\n"
+        "for _ in range(2):\n"
+        "    if os.fork() == 0:\n"
+        "        os.setsid()\n"
+        "        open(str(os.getpid()), 'w').close()\n"
+        "        time.sleep(50)\n"
+        "        os._exit(0)\n"
+        "while len(os.listdir()) < 2: time.sleep(0.01)\n"
+        "os._exit(7)",
+    )
     assert (done.end, done.code) == ("code", 7)
     assert not processes_with(f"# {folder}\n")
     assert done.wall < 20
@@ -202,7 +209,7 @@ def test_signals_and_limits_are_told_alike(shut_in: bool, request: pytest.Fixtur
 @LINUX
 def test_where_it_cannot_be_shut_in_it_runs_all_the_same(tmp_path: Path) -> None:
     done = _python("import os; print(os.getpid() > 2)", writable=tmp_path / "nowhere", cwd=tmp_path)
-    assert (done.code, done.stdout) == (0, "True\n")
+    assert_has(done, code=0, stdout="True\n")
 
 
 # What processes share

@@ -18,7 +18,7 @@ from statemachine.lessons import LESSONS
 from statemachine.probes.conventions import CONCEPTS
 from statemachine.report.conventions import OURS, REMEMBER
 
-from .conftest import ROOT, assert_not_in, refused
+from .conftest import ROOT, assert_not_in, refused, written_all
 from .exercises import WRONG
 
 sys.path.insert(0, str(ROOT / "teaching"))
@@ -65,17 +65,13 @@ def test_the_students_kit_has_no_solution(built: Path, tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="Gradescope runs Linux")
 def test_the_autograder_grades_a_submission(built: Path, tmp_path: Path) -> None:
     home = tmp_path / "autograder"
-    (home / "submission").mkdir(parents=True)
     with zipfile.ZipFile(_zip(tmp_path, built)) as kit:
         kit.extractall(home / "source")
-    for name in ("setup.sh", "run_autograder"):
-        (home / "source" / name).chmod(0o755)
     # setup.sh without a package index: the dependencies are those of this environment.
-    environment = {**os.environ, "AUTOGRADER": str(home)}
-    (home / "env" / "bin").mkdir(parents=True)
-    command = home / "env" / "bin" / "statemachine"
-    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m statemachine "$@"\n')
-    command.chmod(0o755)
+    script = f'#!/bin/sh\nexec "{sys.executable}" -m statemachine "$@"\n'
+    written_all(home, {"env/bin/statemachine": script, "submission/step_loop.py": ""})
+    for name in ("source/setup.sh", "source/run_autograder", "env/bin/statemachine"):
+        (home / name).chmod(0o755)
     solution = (ROOT / "teaching" / "solutions" / "step_loop.py").read_text()
     for text, score, words in (
         (solution, 4, "right"),
@@ -88,7 +84,7 @@ def test_the_autograder_grades_a_submission(built: Path, tmp_path: Path) -> None
             file.write_text(text)
         done = subprocess.run(
             [str(home / "source" / "run_autograder")],
-            env={**environment, "PYTHONPATH": str(ROOT)},
+            env={**os.environ, "AUTOGRADER": str(home), "PYTHONPATH": str(ROOT)},
             capture_output=True,
             check=False,
         )

@@ -17,10 +17,9 @@ import pytest
 from statemachine.page import Page, Table, Text, Verdict
 from statemachine.report import terminal
 
-from .conftest import ROOT, assert_in, need_engine
+from .conftest import ROOT, assert_in, need_engine, of_python
 
 PACKAGE = ROOT / "statemachine"
-SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 # What a question guards that a type checker does not follow: `hasattr`, or an import that may fail.
 GUARDED = {
@@ -52,7 +51,9 @@ def test_no_call_that_windows_lacks_is_unguarded() -> None:
     words = ("--pythonplatform", "Windows", "--pythonpath", sys.executable, "--outputjson")
     found = {
         (Path(each["file"]).relative_to(PACKAGE).as_posix(), each["message"].split('"')[1])
-        for each in json.loads(_checked("pyright", *words))["generalDiagnostics"]
+        for each in json.loads(of_python("-m", "pyright", *words, PACKAGE).stdout)[
+            "generalDiagnostics"
+        ]
     }
     assert found == GUARDED
 
@@ -60,13 +61,7 @@ def test_no_call_that_windows_lacks_is_unguarded() -> None:
 def test_every_text_file_names_its_encoding() -> None:
     """Without, Windows takes the code page of the country."""
     pytest.importorskip("ruff")
-    assert "All checks passed" in _checked("ruff", "check", "--preview", "--select", "PLW1514")
-
-
-def _checked(tool: str, *words: str) -> str:
-    """What a checker says of the package."""
-    command = [sys.executable, "-m", tool, *words, str(PACKAGE)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False).stdout
+    of_python("-m", "ruff", "check", "--preview", "--select", "PLW1514", PACKAGE, code=0)
 
 
 # Letters that nobody prints: they are looked for, or belong to pages of HTML.
@@ -75,7 +70,7 @@ _NOT_PRINTED = ("report/html/", "report/notebook.py", "report/markdown.py", "rep
 
 def test_every_letter_that_is_printed_has_a_spelling() -> None:
     known = set(map(chr, terminal.ASCII))
-    for path in SOURCES:
+    for path in PACKAGE.rglob("*.py"):
         if path.relative_to(PACKAGE).as_posix().startswith(_NOT_PRINTED):
             continue
         tree = ast.parse(path.read_text(encoding="utf-8"))
