@@ -42,7 +42,7 @@ def rendering_environment() -> dict[str, str]:
 
 def seen_by(camera: Camera, points: np.ndarray, aspect: float) -> np.ndarray:
     """Where points (n, 3) are in the picture: (n, 2), -1 to 1 from edge to edge."""
-    right, up, depth = (points - camera.eye) @ np.transpose(camera.axes)
+    right, up, depth = np.array(camera.axes) @ (points - camera.eye).T
     half = np.tan(np.radians(camera.fovy) / 2)
     return np.stack([right / (half * aspect), up / half], axis=1) / depth[:, None]
 

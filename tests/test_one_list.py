@@ -35,9 +35,8 @@ def test_the_words_are_those_of_two_sides(here: Cli, tmp_path):
     right = ARM.replace('"elbow"', '"e"').replace('name="shoulder"', 'name="s"')
     right = right.replace('joint="shoulder"', 'joint="s"')
     _listed(tmp_path, changed(right, Case('range="-2 2"', 'range="-2 0.4"', "")))
-    files = str(tmp_path / "left.xml"), str(tmp_path / "right.xml")
-    words = ("compare", "--models", *files, "--map", "elbow=e", "--map", "shoulder=s", "--json")
-    found = json.loads(here(*words).stdout)["differences"]
+    words = ("left.xml", "right.xml", "--map", "elbow=e", "--map", "shoulder=s", "--json")
+    found = json.loads(here("compare", "--models", *words).stdout)["differences"]
     assert [row["causes"] for row in found] == [["range of shoulder"]]
 
 

@@ -175,7 +175,8 @@ def test_a_delay_of_the_file_starts_as_the_engine_starts_it(tmp_path: Path, back
         (sm.load(model.path, backend, latency=0.05), 0.5, 0.03),
     ):
         assert np.abs(path(made, 30, "home")[1:] - wanted).max() < most
-    for options, wanted in (({}, expected), ({"latency": [0.05]}, held)):
+    rows_of: list[tuple[dict[str, Any], Any]] = [({}, expected), ({"latency": [0.05]}, held)]
+    for options, wanted in rows_of:
         with worlds.make_worlds(model, 1, **options) as many:
             worlds.reset(many, keyframe=0)
             rows = worlds.record(many, 30, ("qpos",))["qpos"][0]

@@ -187,7 +187,7 @@ def test_link_frames_are_single_and_centres_of_mass_double(pb: Any, client: int)
     data, world = mujoco.MjData(raw), World(Plan(raw), "ghost")
     (tree,) = world.trees
     gaps, link = [], tree.tips[raw.site("gripperframe").id]
-    for pose in np.random.default_rng(0).uniform(*raw.jnt_range.T, (20, raw.nq)):
+    for pose in np.random.default_rng(0).uniform(*raw.jnt_range.T, size=(20, raw.nq)):
         data.qpos[:] = pose
         mujoco.mj_kinematics(raw, data)
         world.put(data.qpos, np.zeros(raw.nv))

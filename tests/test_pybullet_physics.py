@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,7 +94,8 @@ def test_the_integrator_of_the_file(tmp_path: Path, flag: str) -> None:
 
 def test_friction_and_limits_in_forward(tmp_path: Path) -> None:
     found = []
-    start = {"qpos": (0.6, -0.2, 0.55), "qvel": (0.3, -0.4, 0.001)}  # two of them beyond 30°
+    # Two of them beyond 30°.
+    start: dict[str, Any] = {"qpos": (0.6, -0.2, 0.55), "qvel": (0.3, -0.4, 0.001)}
     for model in both(tmp_path, chain('frictionloss=".02" range="-20 30" limited="true"')):
         with opened(model, **start, derived=True) as (_, data):
             found.append([data.qacc, data.qfrc_limit, data.qfrc_friction, data.qfrc_bias])

@@ -124,8 +124,8 @@ def _make_traces(cli: Cli, folder: Path, words: list[str]) -> None:
 def test_python_block(tmp_path: Path) -> None:
     out = of_python("-c", PYTHON["README.md"], folder=tmp_path, code=0).stdout
     assert out.startswith("9.0")  # 6 s of the keyframe and 600 steps
-    tip = [float(word) for word in re.findall(r"-?\d\.\d+", out)[1:]]
-    assert f"[{' '.join(f'{value:.4f}' for value in tip[:3])}]" in README
+    tip = [f"{float(word):.4f}" for word in re.findall(r"-?\d\.\d+", out)[1:4]]
+    assert f"[{' '.join(tip)}]" in README
 
 
 # Of each guide with code: what its code prints.
@@ -218,19 +218,15 @@ def test_files_that_are_linked_exist() -> None:
                 assert (file.parent / target).exists(), f"{name}: {target}"
 
 
-def test_numbers_of_the_models_readme(mujoco_arm: Model) -> None:
+def test_numbers_of_the_models_readme(mujoco_arm: Model, mujoco_box: Model) -> None:
     """The figures that the README of the model states are those of the model."""
-    import numpy as np
-
-    import statemachine as sm
-
+    with opened(mujoco_box, keyframe=0, derived=True) as (_, data):
+        box, size = data.raw.geom("box"), mujoco_box.raw.geom("box").size
+        low = box.xpos[2] - abs(box.xmat[6:]) @ size  # of its lowest corner
     text = (ROOT / "models" / "so101" / "README.md").read_text()
-    assert f"{mujoco_arm.raw.body_mass.sum():.2f} kg" in text
-    assert_in(text, "0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744")
+    assert_in(
+        text,
+        *(f"{mujoco_arm.raw.body_mass.sum():.2f} kg", f"{low * 1e3:.0f} mm clear"),
+        *("0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744"),
+    )
     assert mujoco_arm.dof_armature[0] == 0.028
-    with opened(sm.load("so101/scene_box"), keyframe=0, derived=True) as (box, data):
-        geom = box.geom_id("box")
-        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        turn = data.raw.geom_xmat[geom].reshape(3, 3)
-        low = (data.raw.geom_xpos[geom] + (corners * box.raw.geom_size[geom]) @ turn.T)[:, 2].min()
-    assert f"{low * 1e3:.0f} mm clear" in text

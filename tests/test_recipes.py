@@ -28,9 +28,9 @@ def recipe(title: str) -> str:
     return RECIPES.split(f"## {title}\n")[1].split("\n## ")[0]
 
 
-def code(text: str) -> list[str]:
-    """Its blocks of Python and of pages."""
-    found = re.findall(r"^ *```(?:python|markdown)\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE)
+def code(text: str, kinds: str = "python|markdown") -> list[str]:
+    """Its blocks of Python and of pages, or of other kinds."""
+    found = re.findall(rf"^ *```(?:{kinds})\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE)
     return [textwrap.dedent(block) for block in found]
 
 
@@ -57,13 +57,11 @@ class Copy:
             elif where == "at the end":
                 file.write_text(f"{file.read_text()}\n\n{body}")
             else:
-                lines = file.read_text().splitlines()
-                (at,) = [k for k, line in enumerate(lines) if line.startswith(PLACES[place])]
-                body = (
-                    f"{body.rstrip()}," if where.removeprefix("in ").isupper() else body
-                )  # an entry of a table
-                lines[at + 1 : at + 1] = textwrap.indent(body, " " * 4).splitlines()
-                file.write_text("\n".join(lines) + "\n")
+                if where.removeprefix("in ").isupper():  # an entry of a table
+                    body = f"{body.rstrip()},\n"
+                before, start, after = file.read_text().partition(f"\n{PLACES[place]}")
+                line, _, rest = after.partition("\n")
+                file.write_text(f"{before}{start}{line}\n{textwrap.indent(body, ' ' * 4)}{rest}")
 
     def run(self, *words: str, code: int = 0) -> str:
         """A command of the copy; what it prints."""
@@ -93,13 +91,11 @@ def test_a_lesson(copy: Copy) -> None:
 def test_a_quantity(copy: Copy) -> None:
     copy.follow("Add a compared quantity")
     assert_in(copy.run("compare", "hold", "--seconds", "0.5", code=1), "rad/s", "joint speeds")
-    given = ("--tolerance", "joint-speed=100rad/s", "--json")
+    given = ("--tolerance", "joint-speed=100rad/s", "--json", "--html", "hold.html")
     found = json.loads(copy.run("compare", "hold", "--seconds", "0.5", *given, code=1))
-    verdicts = [
-        a["verdict"] for a in found["comparison"]["agreements"] if a["kind"] == "joint speed"
-    ]
-    assert verdicts == ["agrees"] * 6
-    copy.run("compare", "hold", "--seconds", "0.5", "--html", "hold.html", code=1)
+    rows = found["comparison"]["agreements"]
+    speeds = [row["verdict"] for row in rows if row["kind"] == "joint speed"]
+    assert speeds == ["agrees"] * 6
     assert "elbow_flex speed" in (copy.folder / "hold.html").read_text()
 
 
@@ -124,11 +120,8 @@ def test_a_backend(copy: Copy) -> None:
     results = [line.split()[0] for line in done.stdout.splitlines()]
     assert set(results) <= {"passed", "skipped"}
     assert results.count("passed") > 40
-    (toml,) = re.findall(
-        r"^ *```toml\n(.*?)^ *```", recipe("Add a backend"), re.DOTALL | re.MULTILINE
-    )
-    entries = textwrap.dedent(toml).replace("project.entry-points.", "").replace('"', "")
+    (toml,) = code(recipe("Add a backend"), "toml")
+    entries = toml.replace("project.entry-points.", "").replace('"', "")
     distribution(copy.folder, "my-package", "1.0", entries)
     assert "mine" in copy.run("lesson", "hold", "--backend", "mine")
-    words = ("compare", "hold", "--seconds", "0.3", "--backends", "mujoco", "mine")
-    assert "mine" in copy.run(*words)
+    assert "mine" in copy.run("compare", "hold", "--seconds", "0.3", "--backends", "mujoco", "mine")

@@ -435,7 +435,8 @@ def test_who_presses_on_what(hold: Made) -> None:
 
 
 def test_what_was_commanded(hold: Made) -> None:
-    ((table,),) = [section.blocks for section in commanded(hold[0])]
+    sections: Any = commanded(hold[0])
+    ((table,),) = [section.blocks for section in sections]
     for row, value in zip(table.rows, hold[1].ctrl[0], strict=True):
         assert float(row[1]) == float(row[2]) == pytest.approx(value, rel=1e-2)
     assert table.rows[0][0] in page_of(hold)

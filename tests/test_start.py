@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from collections.abc import Iterable
 from functools import partial
@@ -18,7 +17,16 @@ from statemachine import cli as command_line
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.installed import ENGINES, require
 
-from .conftest import REQUIRED, ROOT, Cli, in_its_own_python, one_line, refused, written_all
+from .conftest import (
+    REQUIRED,
+    ROOT,
+    Cli,
+    in_its_own_python,
+    of_python,
+    one_line,
+    refused,
+    written_all,
+)
 
 HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "viser", "xml.etree")
 
@@ -94,17 +102,10 @@ THEIRS = {
 def test_a_clash_of_import_names_is_said_in_one_line(
     tmp_path: Path, theirs: Iterable[str], ours: Iterable[str], typed: tuple[str, ...], code: int
 ) -> None:
-    files = {name: THEIRS[name] for name in theirs}
-    files |= {name: (ROOT / name).read_text() for name in ours}
+    files = {name: (ROOT / name).read_text() for name in ours}
+    files |= {name: THEIRS[name] for name in theirs}
     written_all(tmp_path, files)
-    done = subprocess.run(
-        [sys.executable, *typed],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path if files else ROOT,
-        check=False,
-    )
-    assert done.returncode == code
+    done = of_python(*typed, folder=tmp_path if files else ROOT, code=code, PYTHONPATH="")
     said = done.stdout if code == 0 else done.stderr.splitlines()[-1]
     assert ("pip uninstall python-statemachine" if code else "statemachine ") in said
     assert code == 1 or len(done.stderr.splitlines()) == bool(code), done.stderr
