@@ -238,10 +238,9 @@ def test_poses_are_those_of_the_trace_not_of_its_qpos(
 ) -> None:
     """An engine that says its bodies are elsewhere is drawn as it says."""
     model, one, _ = sides
-    moved = edited(one, xpos=one["xpos"] + np.array([0, 0, 0.1]))
     (here,), (there,) = (
         frames([trace], [model], SIZE, Timing(0.1, 10), mujoco_here, _camera(model, one))
-        for trace in (one, moved)
+        for trace in (one, edited(one, xpos=one["xpos"] + np.array([0, 0, 0.1])))
     )
     assert _differ(here, there).mean() > 0.05
 
@@ -519,9 +518,8 @@ def test_nothing_is_cut_off_at_the_edges(
     one, two, found = compared
     if what == "recorded":
         found = compare(edited(one, {"recorded": True, "defaults": "engine"}), two)
-    figure = of_trace(two) if what == "alone" else of_comparison(found)
     with matplotlib.rc_context(FIGURE_SETTINGS):
-        canvas = draw(figure)
+        canvas = draw(of_trace(two) if what == "alone" else of_comparison(found))
         pen = FigureCanvasAgg(canvas)
         pen.draw()
         width, height = canvas.bbox.width, canvas.bbox.height

@@ -223,9 +223,8 @@ def test_numbers_of_the_models_readme(mujoco_arm: Model, mujoco_box: Model) -> N
     with opened(mujoco_box, keyframe=0, derived=True) as (_, data):
         box, size = data.raw.geom("box"), mujoco_box.raw.geom("box").size
         low = box.xpos[2] - abs(box.xmat[6:]) @ size  # of its lowest corner
-    text = (ROOT / "models" / "so101" / "README.md").read_text()
     assert_in(
-        text,
+        (ROOT / "models" / "so101" / "README.md").read_text(),
         *(f"{mujoco_arm.raw.body_mass.sum():.2f} kg", f"{low * 1e3:.0f} mm clear"),
         *("0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744"),
     )

@@ -457,8 +457,7 @@ class TestReleases:
 
     def test_a_fork_while_a_thread_steps(self) -> None:
         model = sm.load("so101", backend=OLD)
-        data = sm.make_data(model)
-        thread = threading.Thread(target=sm.step, args=(model, data, 100_000))
+        thread = threading.Thread(target=sm.step, args=(model, sm.make_data(model), 100_000))
         thread.start()
         pid = os.fork()
         if not pid:

@@ -375,8 +375,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         (explanation_of(hold, negligible=1.0), "^The two sides move alike"),
     ):
         assert re.search(says, answer(explanation)), says
-    no_part = dict.fromkeys(("share", "alone", "last"), 2e-4)
-    tiny = [with_figures(row, **no_part) for row in rows]
+    tiny = [with_figures(row, **dict.fromkeys(("share", "alone", "last"), 2e-4)) for row in rows]
     for explanation, column, cells in (
         (explanation_of(hold, floor=0.2 * worse.gap), 3, ["60.0 %", "< 20.0 %", "50.0 %*"]),
         (
@@ -460,8 +459,7 @@ def test_charts_show_what_was_compared_and_are_few(hold: Made) -> None:
     charts = charts_of(comparison)
     assert [chart.curve.name for chart in charts] == [curve.name for curve in curves]
     lift = next(chart for chart in charts if chart.title == "shoulder_lift")
-    values = lift.values()
-    for (_, shown), trace in zip(values.curves.values(), (one, two), strict=True):
+    for (_, shown), trace in zip(lift.values().curves.values(), (one, two), strict=True):
         np.testing.assert_allclose(shown, np.degrees(trace.qpos[:, 1]))
     ((_, gap),) = lift.gap().curves.values()
     np.testing.assert_allclose(gap, np.degrees(np.abs(one.qpos[:, 1] - two.qpos[:, 1])))
@@ -505,10 +503,9 @@ def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
 
 def test_it_opens_near_the_tool_where_the_gap_is_small(hold: Made, tmp_path: Path) -> None:
     _, one, two, look = hold  # 7 mm apart
-    far = edited(two, site_xpos=two["site_xpos"] + 0.2)
     near = [
         data_of(page_of(of_look(one, other, look)))["scene"]["begin_near"]
-        for other in (two, far, one)
+        for other in (two, edited(two, site_xpos=two["site_xpos"] + 0.2), one)
     ]
     assert near == [True, False, False]
 
@@ -763,9 +760,8 @@ def test_the_sides_differ_for_the_colour_blind() -> None:
 
 @pytest.mark.slow
 def test_what_a_screen_reader_hears(tab: Tab) -> None:
-    heard = tab.locator("body").aria_snapshot()
     assert_in(
-        heard,
+        tab.locator("body").aria_snapshot(),
         "- main:",
         "- contentinfo:",
         'heading "Joint wrist_flex is up to',
@@ -805,8 +801,7 @@ def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
         assert (
             tab.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
         )
-        text = tab.locator("main").inner_text()
-        assert_in(text, *tab.locator("h2").all_inner_texts())
+        assert_in(tab.locator("main").inner_text(), *tab.locator("h2").all_inner_texts())
         assert "shoulder_pan" in tab.locator("#curves > details").inner_text()
         assert tab.locator("#printed").is_visible()
         assert picture(tab, "#printed").std() > 10
@@ -848,8 +843,7 @@ def test_other_traces(hold: Made, kind: str, seen: Seen) -> None:
     made = of_look(*OTHERS[kind](*hold[1:3]), hold[3])
     with seen(made) as tab:
         assert tab.locator("#scene").is_visible()
-        last = int(tab.locator("#slider").get_attribute("max"))
-        go(tab, last)
+        go(tab, int(tab.locator("#slider").get_attribute("max")))
         assert tab.locator("#clock").inner_text() == f"{made[0].until:.3f} s"
         text = tab.locator("body").inner_text()
         assert ("it diverged at 0.745 s" in text) == (kind == "ended")
@@ -976,9 +970,8 @@ def test_any_page_can_be_drawn() -> None:
         ],
         Headline("It differs", holds=False),
     )
-    text = report(page)
     assert_in(
-        text,
+        report(page),
         "<script></script>",
         *("An origin", "First.", "●", "&lt;b&gt;", "<li>two</li>", 'data-t="1.500000"'),
     )

@@ -98,9 +98,8 @@ def test_a_name_that_is_not_utf_8_is_refused(name: str, backend: str, tmp_path: 
 def test_a_negative_number_that_engines_take_is_told(
     named: str, backend: str, tmp_path: Path
 ) -> None:
-    file = written(tmp_path / "m.xml", NEGATIVE[named])
     with pytest.warns(EngineWarning, match=rf"m\.xml: {named} is negative$") as caught:
-        sm.load(file, backend=backend)
+        sm.load(written(tmp_path / "m.xml", NEGATIVE[named]), backend=backend)
     assert caught[0].filename == __file__
 
 

@@ -704,8 +704,7 @@ def test_cells_that_failed_are_run_again_if_asked(
         "sweep._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "main(sys.argv[1:])"
     )
-    killed = start("--retry-failed", program=["-c", code, *words])
-    assert killed.wait() == -signal.SIGKILL
+    assert start("--retry-failed", program=["-c", code, *words]).wait() == -signal.SIGKILL
     assert list(dict(counted(tmp_path / "out")).values()) == ["done", "done"]
     last = run("--retry-failed")
     assert (last["done"], last["failed"], last["ran"]) == (8, {}, 6)

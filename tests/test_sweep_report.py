@@ -388,8 +388,7 @@ def test_an_axis_says_what_its_values_are_in() -> None:
         Vary("qpos", "elbow_flex", "state", values=(0.5, 1.0)),
         Vary("gain", kind="parameter", values=(0.5, 1.0)),
     ]
-    units = facts_of({"files": {"so101/scene_box": ""}}, factors, ["mujoco"]).units
-    assert units == {
+    assert facts_of({"files": {"so101/scene_box": ""}}, factors, ["mujoco"]).units == {
         "timestep": "s", "damping": "", "damping[elbow_flex]": "N·m·s/rad",
         "qpos[elbow_flex]": "rad", "gain": "",
     }  # fmt: skip
@@ -453,9 +452,8 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
         cells=2 * (1 + REFINED),
     )
     assert found.after == min(the(found.tried)[1]) == pytest.approx(5.1e-3)
-    said = " ".join(shown(page(Figures(**vars(report) | {"together": (found,)}))).split())
     assert_in(
-        said,
+        " ".join(shown(page(Figures(**vars(report) | {"together": (found,)}))).split()),
         "gain = 0.625 ± 0.031 in both brings mujoco and pybullet closer",
         "9 values from 0.5 to 0.75 were run, 0.03125 apart",
     )

@@ -72,9 +72,8 @@ def test_the_autograder_grades_a_submission(built: Path, tmp_path: Path) -> None
     written_all(home, {"env/bin/statemachine": script, "submission/step_loop.py": ""})
     for name in ("source/setup.sh", "source/run_autograder", "env/bin/statemachine"):
         (home / name).chmod(0o755)
-    solution = (ROOT / "teaching" / "solutions" / "step_loop.py").read_text()
     for text, score, words in (
-        (solution, 4, "right"),
+        ((ROOT / "teaching" / "solutions" / "step_loop.py").read_text(), 4, "right"),
         ("def demo_gravity(:\n", 0, "invalid syntax"),
         (None, 0, "no Python file in it has one of the functions"),
     ):

@@ -68,8 +68,7 @@ class Stage:
 
     def slider(self, index: int) -> float:
         """What a slider shows."""
-        thumb = self.tab.get_by_role("slider").nth(index)
-        return float(thumb.get_attribute("aria-valuenow"))
+        return float(self.tab.get_by_role("slider").nth(index).get_attribute("aria-valuenow"))
 
 
 @pytest.fixture(scope="module")
@@ -194,9 +193,8 @@ def test_both_arms_are_seen_and_the_ghost_can_be_put_away(stage: Stage) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
     """End to end: the process, the page, time that passes by itself, and Ctrl-C while watched."""
-    port = _free_pair()
     with (
-        Viewer(tmp_path, "--ghost", "pybullet", "--port", str(port)) as viewer,
+        Viewer(tmp_path, "--ghost", "pybullet", "--port", str(_free_pair())) as viewer,
         browser() as tab,
     ):
         address = viewer.line().strip()
