@@ -47,7 +47,7 @@ from statemachine.report.html.scene import moments_of, rows_at
 from statemachine.report.notebook import markdown
 from statemachine.report.over_time import CHARTS_SHOWN, charts_of
 from statemachine.report.sides import commanded
-from statemachine.report.why import answer, causes
+from statemachine.report.why import answer, causes, parts
 from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
@@ -293,12 +293,12 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     def row(name: str, share: float) -> Figures:
         values = ((name, "kp 998.2", "its motors"),)
         return Figures(
-            name=name, values=values, unit="", share=share, alone=share, last=share, error=0.0,
+            name=name, kind="engine", values=values, unit="", share=share, alone=share, last=share, error=0.0,
             note="", place=None, chosen=None,
         )  # fmt: skip
 
     fields: dict[str, Any] = {
-        "experiment": "hold", "says": "", "seconds": 2.0, "one": "mujoco", "two": "pybullet",
+        "experiment": "hold", "says": "", "seconds": 2.0, "labels": ("mujoco", "pybullet:engine"),
         "quantity": quantity, "unit": "rad", "measure": "worst", "first": {quantity: gap},
         "gap": gap.worst, "shares": (row("servo law", 0.6), row("armature", -0.1)),
         "method": "all sets", "orders": 0, "brought": 0.5 * gap.worst,
@@ -336,19 +336,22 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
 
 def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     located = explanation_of(hold, shares=(), explained=0.0, located=1.0)
-    worse = explanation_of(hold, explained=-0.26, located=1.26)  # all brought over widens the gap
+    wider = {"explained": -0.25, "located": 1.25, "brought": 1.25 * located.gap}
+    worse = explanation_of(hold, **wider)  # all brought over widens the gap
     (contact,), rows = located.found_in, worse.shares
     switch = with_figures(rows[0], name="contact", values=(("contact", True, False),), share=0.1)
     # Two values that read the same are shown with all their digits.
     close = ("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
     rounded = with_figures(rows[0], values=(close,), unit="rad")
     masked = [
-        [with_figures(row, **{part: value}) for row, value in zip(rows, parts, strict=True)]
-        for part, *parts in (
+        [with_figures(row, **{part: value}) for row, value in zip(rows, values, strict=True)]
+        for part, *values in (
             *(("share", -217.0, 127.0), ("share", 127.0, -126.5)),
             *(("alone", -0.094, 0.0), ("last", -0.094, 0.0)),  # it widens the gap at first, or last
         )
     ]
+    apart = [with_figures(row, alone=0.05, last=1.1) for row in rows]
+    still = with_figures(located, found_in=[with_figures(contact, is_still=True)])
     for explanation, says in (
         (located, "^50.0 % of the 2.58° comes from contact"),
         (
@@ -357,9 +360,11 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         ),
         *(
             (each, "^No single difference causes the 2.58°")
-            for each in (worse, *(explanation_of(hold, shares=shares) for shares in masked))
+            for each in (explanation_of(hold, shares=shares) for shares in masked)
         ),
-        (with_figures(located, found_in=[with_figures(contact, is_still=True)]), "a weak hint$"),
+        (worse, "^The differences do not cause the 2.58°: without them it is 3.22°$"),
+        (explanation_of(hold, shares=apart), "5.0 % alone and 110.0 % last"),
+        (still, "a weak hint$"),
         (
             explanation_of(hold, shares=(switch,)),
             r"^50.0 % of the 2.58° comes from contact \(left: on, right: off\)$",
@@ -389,8 +394,9 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     # Where something cannot be brought to the same, a location is not an explanation.
     row = Figures(name="shape of box", note="another size", share=None)
     found = (with_figures(contact, share=1.0),)
+    assert parts(worse).endswith("Of the 3.22°, 100.0 % is localised and < 0.1 % unexplained")
     assert located.is_explained
-    assert not worse.is_explained
+    assert not (worse.is_explained or still.is_explained)
     assert not with_figures(located, shares=(row,), found_in=found).is_explained
 
 
@@ -516,16 +522,16 @@ def test_without_a_script_every_figure_of_the_comparison_is_on_the_page(
     parts = "#curves .plot svg", "#slider", "#play", ".cursor"
     with looking(page, java_script_enabled=False) as tab:
         seen = [part for part in parts if tab.locator(part).first.is_visible()]
-        whole, table = (
-            tab.locator(name).first.inner_text().replace("−", "-").replace("\u00a0", " ")
-            for name in ("main", "#figures table")
+        whole, *tables = (
+            part.inner_text().replace("−", "-").replace("\u00a0", " ")
+            for part in tab.locator("main, #figures table").all()[:3]
         )
     assert seen == ["#curves .plot svg"]
     assert_in(whole, "How far apart, over time", "What happens when", "Where this comes from")
     for found in hold[0].agreements:
         (line,) = [
             row
-            for row in table.splitlines()
+            for row in "\n".join(tables).splitlines()
             if row.startswith(found.name.replace(", ", " ") + "\t")
         ]
         apart = (found.max, found.rms, found.settled) if found.kind != "contact" else ()

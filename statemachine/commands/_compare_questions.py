@@ -136,7 +136,7 @@ def _versions(options: argparse.Namespace, request: Any) -> int:
 
 OF_WHY: tuple[Row, ...] = (
     ("--why", "", "which difference explains how much of the gap"),
-    ("--quantity", "NAME", "what the gap is measured in"),
+    ("--quantity", "NAME", "what the gap is measured in, such as joints, one joint or a body"),
     (
         "--measure",
         None,

@@ -116,7 +116,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             "backends",
             "why",
             "html",
-            "plot",
+            "converge",
             "seconds",
             "tolerance",
             "one_step",

@@ -88,8 +88,10 @@ def series(left: Trace, right: Trace, tip: str | None = None) -> list[Series]:
         curves.append(_curve(f"{site}, position", "tip", time, p, q))
         curves.append(_turned(f"{site}, rotation", "tip rotation", time, r, s))
     if tell(left, right, "energy"):
-        totals = (trace["energy"].sum(axis=1)[rows] for trace, rows in sides)
-        curves.append(_curve("energy", "energy", time, *totals))
+        # From that of the start, where a mass of another file has another height.
+        totals = (trace["energy"].sum(axis=1) for trace, _ in sides)
+        changes = (t[rows] - t[0] for t, (_, rows) in zip(totals, sides, strict=True))
+        curves.append(_curve("energy", "energy", time, *changes))
     if tell(left, right, "contact_force"):
         forces = [normal_forces(left), normal_forces(right)]
         forces[1] = same_pairs(forces[0], forces[1])

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from ..compare.why import Explanation
 
 _ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
+_CONTACTS_SHOWN = 12  # rows; the rest is folded away
 _EMULATED = ("emulated", "What is emulated")
 
 
@@ -103,7 +104,6 @@ def page(
         *loop_note(run),
         *commanded(comparison),
         *in_words(comparison),
-        *([contact_words(comparison)] if comparison.touches and not comparison.ended else []),
         *([Items(notes)] if notes else []),
         both,
         *loops(comparison, played),
@@ -170,32 +170,42 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
             "left_off": f"{1e3 * witness.left:.0e}",
             "right_off": f"{1e3 * witness.right:.0e}",
         }
-    figures = Table.of(
-        agreements,
-        {
-            "quantity": lambda agreement: name_of(agreement.name),
-            "verdict": lambda agreement: TableCell(agreement.verdict, verdict=agreement.verdict),
-            "largest": lambda agreement: (
-                agreement.note or quantity(agreement.max, agreement.unit)
-                if agreement.kind == "contact"
-                else _small(agreement.max, agreement)
-            ),
-            "at, s": lambda agreement: moment(agreement.at),
-            "RMS": lambda agreement: (
-                NONE if agreement.kind == "contact" else _small(agreement.rms, agreement)
-            ),
-            "settled": lambda f: NONE if f.kind == "contact" else _small(f.settled, f),
-            "from, s": lambda agreement: (
-                NONE if agreement.kind == "contact" else moment(agreement.since)
-            ),
-            "tolerance": lambda agreement: quantity(agreement.tolerance, agreement.unit),
-            **(_floor_columns(floor) if floor else {}),
-        },
-        f"{left} against {right}: how far apart",
-        words={"verdict"},
-        emphasis=lambda agreement: agreement.verdict == "differs",
-        wide={"tolerance", "floor", "inside from, s"},
-    )
+    columns: dict[str, Callable[[Agreement], str]] = {
+        "quantity": lambda agreement: name_of(agreement.name),
+        "verdict": lambda agreement: TableCell(agreement.verdict, verdict=agreement.verdict),
+        "largest": lambda agreement: (
+            agreement.note or quantity(agreement.max, agreement.unit)
+            if agreement.kind == "contact"
+            else _small(agreement.max, agreement)
+        ),
+        "at, s": lambda agreement: moment(agreement.at),
+        "RMS": lambda agreement: (
+            NONE if agreement.kind == "contact" else _small(agreement.rms, agreement)
+        ),
+        "settled": lambda f: NONE if f.kind == "contact" else _small(f.settled, f),
+        "from, s": lambda agreement: (
+            NONE if agreement.kind == "contact" else moment(agreement.since)
+        ),
+        "tolerance": lambda agreement: quantity(agreement.tolerance, agreement.unit),
+        **(_floor_columns(floor) if floor else {}),
+    }
+
+    def table(rows: Sequence[Agreement], title: str, *wide: str) -> Table:
+        return Table.of(
+            rows,
+            columns,
+            title,
+            words={"verdict"},
+            emphasis=lambda agreement: agreement.verdict == "differs",
+            wide={"tolerance", "floor", "inside from, s", *wide},
+        )
+
+    contacts = [a for a in agreements if a.kind in ("force", "contact")]
+    farthest = sorted(contacts, key=lambda a: (a.verdict == "agrees", -a.tolerances()))
+    shown, rest = farthest[:_CONTACTS_SHOWN], farthest[_CONTACTS_SHOWN:]
+    title = f"{left} against {right}: how far apart"
+    farther = f"Contacts, the farthest apart ({len(shown)} of {len(contacts)})"
+    folded = Section("", f"Other contacts: {len(rest)}", [table(rest, title)], True, detail=True)
     # One row for each reason: who shares it, how much.
     shared = grouped(((agreement.reason, agreement.unit), agreement) for agreement in agreements)
     reasons = Table.of(
@@ -212,7 +222,10 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
     )
     return template.blocks(
         "compare_figures",
-        figures=figures,
+        figures=table([a for a in agreements if a not in contacts], title),
+        contacts=table(shown, farther, "RMS", "from, s"),
+        others=[folded] if rest else [],
+        pressing=[contact_words(comparison)] if comparison.touches else [],
         moments=comparison.moments,
         until=comparison.until,
         window=window(comparison),

@@ -38,6 +38,7 @@ PARTING = {
     "coarse": "; they are apart from the common moment {time} on",
 }
 ENDS = {
+    "alike": "All of the motion is within its tolerance at all moments.",
     "within": "On average over {window}, all of the motion is within its tolerance.",
     "settled": "On average over {window} {what} is still {far} apart.",
     "changing": "On average over {window} {what} is still {far} apart, and still changing: {last} "
@@ -124,7 +125,8 @@ def _in_the_end(comparison: Comparison) -> str:
     known = [a for a in differ if a.settled >= 0]  # what is not a number is on neither side
     over = window(comparison)
     if not known:
-        return ENDS["within"].format(window=over) if motion and not differ else ""
+        kind = "alike" if all(a.verdict == "agrees" for a in motion) else "within"
+        return "" if differ or not motion else ENDS[kind].format(window=over)
     most = max(known, key=lambda a: a.settled / (a.tolerance or 1e-300))
     last = next(_last(curve, most) for curve in comparison.curves if curve.name == most.name)
     return ENDS["settled" if last is None else "changing"].format(
@@ -237,15 +239,15 @@ def floor_words(comparison: Comparison, floor: Figures) -> list[Block]:
         for unit in ("rad", "m")
     ]
     sizes = [f"{quantity(b.most, b.unit)} ({name_of(b.name)})" for b in largest if b]
+    verdicts = {agreement.name: agreement.verdict for agreement in comparison.agreements}
     motion = [band for band in floor.bands if band.kind != "contact"]
     moving = [
         f"{name_of(band.name)} from {short_time(band.inside_from)} on"
         for band in motion
-        if band.inside_from is not None and band.most > 0
+        if band.inside_from is not None and band.most > 0 and verdicts[band.name] != "agrees"
     ]
     everywhere = all(band.inside_from == 0 for band in motion)
     inside = bool(moving) and not everywhere
-    verdicts = {agreement.name: agreement.verdict for agreement in comparison.agreements}
     chance = [
         name_of(band.name)
         for band in floor.bands
@@ -258,8 +260,8 @@ def floor_words(comparison: Comparison, floor: Figures) -> list[Block]:
         changed=changed_by(floor),
         ended=floor.ended or None,
         most=listed(sizes) if sizes and not floor.ended else None,
-        no_gap=if_true(not moving),
-        every_gap=if_true(moving and everywhere),
+        no_gap=if_true(not (moving or everywhere or comparison.agrees)),
+        every_gap=if_true(everywhere and any(band.most > 0 for band in motion)),
         inside=", ".join(moving) if inside else None,
         chance=listed(chance) if chance else None,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 from ..compare.models.ledger import SUBJECTS, Value
@@ -128,7 +129,7 @@ def page(result: Figures, sides: Sequence[str], everything: bool = False) -> Pag
         emulated=next((side.reader.split()[0] for side in named.values() if side._emulated), None),
         refused_too=if_true(refused),
         refused=Items([f"{capital(name)}: {why}." for name, why in refused.items()]),
-        equal=_equal(result.agreements),
+        equal=_equal(result.agreements, Counter(row.subject for row in rows)),
         joints=posed.joints or None,
         distance=_tiny(posed.distance, "m"),
         angle=_tiny(posed.angle, "rad"),
@@ -220,19 +221,20 @@ def _number(value: float, unit: str, units: dict[str, tuple[float, str]]) -> str
     return f"{significant(value * factor)}{shown}"
 
 
-def _equal(agreements: Sequence[Figures]) -> Table:
+def _equal(agreements: Sequence[Figures], differ: Mapping[str, int]) -> Table:
     """A row for each subject: how well both sides agree in it, at the worst in each unit."""
     groups = grouped((figures.subject, figures) for figures in agreements)
+    counts = {name: sum(figures.count for figures in group) for name, group in groups.items()}
     digits = {name: min(figures.digits for figures in group) for name, group in groups.items()}
     return Table.of(
         groups,
         {
             "subject": lambda name: SUBJECTS[name].partition(":")[0],
-            "figures": lambda name: str(sum(figures.count for figures in groups[name])),
+            "equal": lambda name: f"{counts[name]} of {counts[name] + differ[name]}",
             "apart, at most": lambda name: ", ".join(map(_worst, groups[name])).strip(", ") or "0",
             "to digits": lambda name: "all" if digits[name] == 17 else str(digits[name]),
         },
-        "What is equal",
+        "Figures that are equal",
     )
 
 

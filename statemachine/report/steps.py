@@ -27,9 +27,12 @@ from .template import if_true
 LEADS = {
     "rounding": "There is no gap beyond rounding, whatever the timestep",
     "vanishes": "The gap vanishes with the timestep: it is discretisation",
-    "unclear": "It is unclear whether the gap vanishes with the timestep: it has no steady order",
+    "unclear": "It is unclear whether the gap vanishes with the timestep: for {unclear} of {total} "
+    "quantities it has no steady order",
     "stays": "The gap does not vanish with the timestep: that of {name} is {coarse}, and {fine} "
     "with the finest steps",
+    "in part": "The gap vanishes with the timestep in part only: that of {name} is {coarse}, and "
+    "{fine} with the finest steps",
 }
 TOUCH = {
     True: "Before the first touch, at {touch}, there is no gap.",
@@ -90,12 +93,13 @@ def _of_the_limit(result: Figures, touch: str) -> Headline:
         verdicts = {limit.verdict for limit in result.whole}
         return Headline(LEADS["vanishes" if verdicts - {"rounding"} else "rounding"])
     stay = [limit for limit in result.whole if limit.verdict in ("stays", "in part")]
-    lead = LEADS["unclear"]
-    if stay:
+    unclear = sum(limit.verdict == "unclear" for limit in result.whole)
+    lead = LEADS["unclear"].format(unclear=unclear, total=len(result.whole))
+    if len(stay) > unclear:
         same = (limit for limit in stay if limit.unit == stay[0].unit)
         most = max(same, key=lambda limit: limit.gaps[-1])
         coarse, fine = (quantity(most.gaps[k], most.unit) for k in (0, -1))
-        lead = LEADS["stays"].format(name=name_of(most.name), coarse=coarse, fine=fine)
+        lead = LEADS[most.verdict].format(name=name_of(most.name), coarse=coarse, fine=fine)
     before = {limit.verdict for limit in result.before}
     tells = touch and before and before <= {"rounding", "discretisation"}
     end = TOUCH[before == {"rounding"}].format(touch=touch) if tells else ""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compare.labels import lacking
+from ..installed import DEFAULT
 from ..measures.text import NONE, capital, few, percent, quantity, sentence, short_time, significant
 from ..page import Block, Figures, Items, Page, Section, Table, TableCell, Text
 from . import template
@@ -18,9 +19,10 @@ if TYPE_CHECKING:
     from ..compare.why import Explanation
 
 _SHOWN = 12  # rows; the rest is folded away
-_WIDE = 15  # characters of a value
+_WIDE = 18  # characters of a value
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
+_INTERACTS = 0.5  # of the gap, between alone and last: it is said with the cause
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 _OFF = ("place", "anchor", "com", "axis")
 _HEADS = ("what", "left", "right", "part", "alone", "last")
@@ -40,6 +42,7 @@ ANSWERS = {
     "chaos": "Nothing can be concluded: the gap is {gap}, and the chaos floor {floor}",
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
+    "hidden": "The differences do not cause the {gap}: without them it is {brought}",
     "masked": "No single difference causes the {gap}: the differences act together",
     "located": "{part} of the {gap} comes from {cause}, which no setting makes the same",
     "still": "{part} of the {gap} goes without {cause}, but so does the motion: a weak hint",
@@ -48,6 +51,11 @@ ANSWERS = {
 }
 TOUCH = "Until the first touch, {what} at {time}, the gap of the {quantity} is {before} at most."
 TITLE = "What differs, and its part of the {gap} of the {quantity} ({measure})"
+INTERACT = "{answer}, but {alone} alone and {last} last: it acts together with others"
+HIDDEN = (
+    "With the left's values on the right the gap is {brought}, not {gap}: the differences hide a "
+    "part of it. Of the {brought}, {located} is localised and {unexplained} unexplained"
+)
 PARTS = "{explained} of the gap is explained, {located} is localised, {unexplained} is unexplained"
 
 
@@ -114,7 +122,7 @@ def answer(result: Explanation) -> str:
     kind = max(parts, key=parts.__getitem__)
     part, cause, left, right = percent(parts[kind]), "", NONE, NONE
     if result.is_masked:
-        kind = "masked"
+        kind = "hidden" if result.is_wider else "masked"
     elif kind == "located":
         cause = f"the {places[0].name}" if places[0].values else places[0].name
         # What only one side has is a setting, and closes the gap only where both are without it.
@@ -124,7 +132,15 @@ def answer(result: Explanation) -> str:
     elif kind == "cause":
         cause, (left, right) = capital(causes[0].name), _values(causes[0])
         kind = "bare" if NONE in (left, right) else "cause"
-    return ANSWERS[kind].format(cause=cause, left=left, right=right, part=part, gap=gap)
+    brought = _amount(result, result.brought or 0.0)
+    said = ANSWERS[kind].format(
+        cause=cause, left=left, right=right, part=part, gap=gap, brought=brought
+    )
+    if kind in ("cause", "bare"):
+        alone, last = causes[0].alone, causes[0].last
+        if None not in (alone, last) and abs(alone - last) > _INTERACTS:
+            return INTERACT.format(answer=said, alone=percent(alone), last=percent(last))
+    return said
 
 
 def proofs(result: Explanation) -> tuple[str, ...]:
@@ -211,9 +227,17 @@ def steps(result: Explanation) -> list[Block]:
         change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
         lines.append(f"{place}{row.name}: {change.format(left=left, right=right)}")
     side, integrator = next((row.chosen for row in result.shares if row.chosen), (None, None))
+    own = lines and any(row.kind == "engine" for row in result.shares)
+    sides = zip(result.labels, result.provenance, strict=True)
+    engines = [
+        made.backend
+        for label, made in sides
+        if label.endswith(("engine", "defaults")) and made.backend != DEFAULT
+    ]
     return template.blocks(
         "why_changes",
         any=if_true(lines),
+        engine=engines[0] if own and engines else None,
         changes=Items(lines),
         side=side,
         integrator=integrator,
@@ -223,16 +247,22 @@ def steps(result: Explanation) -> list[Block]:
 
 def parts(result: Explanation) -> str:
     """The three parts of a gap, in a sentence without its end."""
-    return PARTS.format(
+    scale = result.gap / result.brought if result.is_wider and result.brought else 1.0
+    return (HIDDEN if result.is_wider else PARTS).format(
+        gap=_amount(result, result.gap),
+        brought=_amount(result, result.brought or 0.0),
         explained=percent(result.explained),
-        located=percent(result.located),
-        unexplained=percent(result.unexplained),
+        located=percent(scale * result.located),
+        unexplained=percent(scale * result.unexplained),
     )
 
 
 def three_parts(result: Explanation) -> list[Block]:
     """The three parts of the gap, and what they mean; nothing where there is none to explain."""
-    return [] if result.is_rounding else template.blocks("why_parts", parts=parts(result))
+    if result.is_rounding:
+        return []
+    clear = result.is_explained and not result.located
+    return template.blocks("why_parts", parts=parts(result))[: 1 if clear else None]
 
 
 def _table(result: Explanation, able: Sequence[Figures], small: Sequence[Figures]) -> list[Block]:

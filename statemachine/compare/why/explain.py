@@ -80,10 +80,16 @@ class Explanation(Figures):
 
         Nothing is explained where the gap grows when the differences are brought to the same.
         Where something differs that cannot be brought to the same, what is only located may come
-        from that, and counts as unexplained.
+        from that, and counts as unexplained; so does a part that goes with the motion itself.
         """
-        stays = 1.0 - self.explained if any(row.note for row in self.shares) else self.unexplained
-        return self.is_rounding or (abs(stays) <= UNEXPLAINED and self.explained >= -UNEXPLAINED)
+        weak = any(row.note for row in self.shares) or any(p.is_still for p in self.found_in)
+        stays = 1.0 - self.explained if weak else self.unexplained
+        return self.is_rounding or (abs(stays) <= UNEXPLAINED and not self.is_wider)
+
+    @property
+    def is_wider(self) -> bool:
+        """Whether the gap is wider with all differences brought to the same."""
+        return self.explained < -UNEXPLAINED
 
     @property
     def is_masked(self) -> bool:
@@ -169,11 +175,11 @@ def explain(
         progress(0.99 * runs / expected)
 
     length = scenario.seconds if seconds is None else seconds
-    trials = Trials((left, right), matched, scenario, recordings, length, seed, ran, jobs)
+    trials = Trials((left, right), matched, scenario, recordings, length, seed, ran, jobs, quantity)
     units = trials.ruler.units
     if quantity is not None:
         quantity = trials.ruler.named(quantity)
-        check_name("quantity", quantity, units)
+        check_name("quantity", quantity.replace(",", ""), [n.replace(",", "") for n in units])
     listed = trials.causes(finer)
     able = [cause.name for cause in listed if not cause.refused]
     first = trials.gaps(frozenset())

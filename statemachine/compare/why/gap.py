@@ -25,6 +25,7 @@ from ...runs import Trace
 from ..matching import Matched
 
 BALLS = "ball joints"
+_SINGLE = {int(JointType.HINGE): "joint", int(JointType.SLIDE): "slide"}  # kind of a quantity
 # One run, as the quantities that runs are compared by: for each moment k numbers (n, k), in the
 # unit of the quantity.
 Curves = dict[str, Array]
@@ -39,7 +40,9 @@ class Ruler:
         units: Unit of each quantity.
     """
 
-    def __init__(self, matched: Matched, left: Trace, right: Trace) -> None:
+    def __init__(
+        self, matched: Matched, left: Trace, right: Trace, quantity: str | None = None
+    ) -> None:
         """Of two runs as they come.
 
         Args:
@@ -47,6 +50,7 @@ class Ruler:
                 first, unless `curves` is given another.
             left: A run of the first Model.
             right: One of the second.
+            quantity: A joint that is measured beside all of them, hinge or slide, as on the left.
         """
         try:
             self.between = False
@@ -81,6 +85,12 @@ class Ruler:
             )
             if len(places)
         }
+        self._single: dict[str, tuple[int, int]] = {}
+        for a, b in matched.joints:
+            name, kind = left.header.joint_labels[a], _SINGLE.get(int(model.jnt_type[a]))
+            if name == quantity and kind:
+                self._kinds[name] = kind
+                self._single[name] = int(model.jnt_qposadr[a]), int(matched.right.jnt_qposadr[b])
         if self._tip:
             self._kinds[self._tip] = "body"
         for name in self._names:
@@ -118,6 +128,7 @@ class Ruler:
             "joints": qpos[:, places.hinges],
             "slides": qpos[:, places.slides],
             BALLS: qpos[:, places.balls[:, None] + np.arange(4)],
+            **{name: qpos[:, [at[side]]] for name, at in self._single.items()},
         }
         for name, start in zip(self._names, places.free, strict=True):
             curves[f"{name}, rotation"] = qpos[:, start + 3 : start + 7]
@@ -227,7 +238,7 @@ def first_touch(traces: Sequence[Trace], time: Array, apart: Array) -> Figures |
     ]
     if not met:
         return None
-    when, what = min(met)
+    when, what = min(met, key=lambda touch: touch[0])
     # A contact found at a moment acts from that moment on: the moment itself is before it. Where
     # something touches at the start no moment shows the rest alone.
     before = apart[(time <= when + 1e-9) & (when > 0)]

@@ -160,7 +160,7 @@ def _word(name: str, model: Model) -> str:
             gains = model.actuator_kp[np.isfinite(model.actuator_kp)]
             return f"kp {_span(gains)}" if gains.size else "no servos"
         case "limits":
-            return f"of {int(model.jnt_limited.sum())} joints"
+            return f"soft, {int(model.jnt_limited.sum())} joints"
         case "surfaces" if model.compiled is not None:
             return f"friction {_span(model.compiled.geom_friction[:, 0])}"
     return "of the file"

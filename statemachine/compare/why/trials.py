@@ -85,6 +85,7 @@ class Trials:
         ran: Called after each run.
         jobs: How many runs are made at once; None for one a processor where that pays,
             and for one where a function of the user's commands.
+        quantity: What was asked for; see `Ruler`.
 
     Attributes:
         traces: Both runs as they come, with what the engines derive.
@@ -105,6 +106,7 @@ class Trials:
         seed: int,
         ran: Callable[[], None],
         jobs: int | None = None,
+        quantity: str | None = None,
     ) -> None:
         checked_jobs(jobs)  # refuses what is not a number of them
         options = dict(scenario.options)
@@ -138,7 +140,7 @@ class Trials:
         # What is derived is read from a second run: so four were made.
         self._took = (time.perf_counter() - began) / 4
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
-        self.ruler = Ruler(matched, traces[0], traces[1])
+        self.ruler = Ruler(matched, traces[0], traces[1], quantity)
         for side, trace in enumerate(traces):
             self._runs[_Run(side, _NONE)] = self._measured(side, self._models[side], trace)
             self.ended = self.ended or trace.header.ended
