@@ -115,6 +115,7 @@ def test_bodies_in_another_order_are_the_same_bodies(box: Trace) -> None:
             "bodies": tuple(header.bodies[body] for body in order),
             "body_parentid": tuple(place[header.body_parentid[body]] for body in order),
             "geom_bodyid": tuple(place[body] for body in header.geom_bodyid),
+            "jnt_bodyid": tuple(place[body] for body in header.jnt_bodyid),
         },
         xpos=box["xpos"][:, order],
         xquat=box["xquat"][:, order],

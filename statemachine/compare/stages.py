@@ -195,7 +195,8 @@ def _dofs(model: Model, joints: Sequence[int]) -> tuple[Ints, list[str], Ints]:
     for joint in joints:
         kind, start = JointType(int(model.jnt_type[joint])), int(model.jnt_dofadr[joint])
         dofs += range(start, start + kind.nv)
-        names += [model.joint_names[joint] or f"joint {joint}"] * kind.nv
+        body = model.body_names[model.jnt_bodyid[joint]] if kind is JointType.FREE else ""
+        names += [body or model.joint_names[joint] or f"joint {joint}"] * kind.nv
         free = [0] * 3 + [1] * 3
         turns += free if kind is JointType.FREE else [int(kind is not JointType.SLIDE)] * kind.nv
     return np.array(dofs, dtype=np.int64), names, np.array(turns, dtype=np.int64)

@@ -144,7 +144,7 @@ class Header:
         nq, nv, nu, nmocap: Lengths of qpos, qvel, ctrl and mocap_pos.
         joints, sites, bodies, geoms, actuators: Names by id.
         jnt_type, jnt_qposadr, jnt_dofadr: As in a Model.
-        geom_bodyid, body_parentid, actuator_jntid: As in a Model.
+        geom_bodyid, body_parentid, actuator_jntid, jnt_bodyid: As in a Model.
         ctrlrange: (nu, 2), infinite where unlimited.
         energy_by: The engine that computed the energies, or "".
         rewritten: Rows whose state is not what the step before left: the controller wrote it
@@ -185,6 +185,7 @@ class Header:
     single: bool = False
     recorded: bool = False
     nmocap: int = 0
+    jnt_bodyid: tuple[int, ...] = ()  # traces before it have none
     schema: int = SCHEMA
 
     @property
@@ -248,8 +249,12 @@ class Header:
 
     @property
     def joint_labels(self) -> tuple[str, ...]:
-        """A name for each joint: its own, or "joint 0" by its number."""
-        return tuple(name or f"joint {k}" for k, name in enumerate(self.joints))
+        """A name for each joint: its own, or "joint 0" by its number; of a free joint its body's."""
+        labels = [name or f"joint {k}" for k, name in enumerate(self.joints)]
+        for k, body in enumerate(self.jnt_bodyid):
+            if self.jnt_type[k] == int(JointType.FREE) and self.bodies[body] not in labels:
+                labels[k] = self.bodies[body] or labels[k]
+        return tuple(labels)
 
     @property
     def body_labels(self) -> tuple[str, ...]:
@@ -269,6 +274,7 @@ class Header:
             ("actuator_jntid", nu, -1, joints),
             ("actuators", nu, None, None),
             ("ctrlrange", nu, None, None),
+            ("jnt_bodyid", len(self.jnt_bodyid) and joints, 0, bodies),
         ):
             entries = getattr(self, name)
             beyond = below is not None and not all(least <= k < below for k in entries)
@@ -337,7 +343,7 @@ _KINDS: dict[str, Callable[[Any], bool]] = {
     **dict.fromkeys(
         (
             *("jnt_type", "jnt_qposadr", "jnt_dofadr"),
-            *("geom_bodyid", "body_parentid", "actuator_jntid"),
+            *("jnt_bodyid", "geom_bodyid", "body_parentid", "actuator_jntid"),
         ),
         _tuple_of(_integer),
     ),

@@ -156,7 +156,7 @@ def layout_of(model: Model) -> dict[str, Any]:
             name: tuple(getattr(model, name).tolist())
             for name in (
                 *("jnt_type", "jnt_qposadr", "jnt_dofadr"),
-                *("geom_bodyid", "body_parentid", "actuator_jntid"),
+                *("jnt_bodyid", "geom_bodyid", "body_parentid", "actuator_jntid"),
             )
         },
         "ctrlrange": tuple(tuple(row) for row in model.actuator_ctrlrange.tolist()),

@@ -71,8 +71,7 @@ class Ruler:
             for m, j in zip(models, joints, strict=True)
         ]
         free = joints[0][model.jnt_type[joints[0]] == int(JointType.FREE)]
-        self._joints = [left.header.joint_labels[joint] for joint in free]
-        self._names = [model.body_names[b] or f"body {b}" for b in self._bodies[0]]
+        self._names = [left.header.joint_labels[joint] for joint in free]
         tip = self._tips[0]
         self._tip = "" if tip is None else model.site_names[tip] or f"site {tip}"
         # What kind each quantity is of: that says its unit and its tolerance.
@@ -105,11 +104,9 @@ class Ruler:
             )
 
     def named(self, words: str) -> str:
-        """The quantity that a table calls so: "torso rotation", or by its joint "root position"."""
-        names = {name: name for name in self.units} | {f"{self._tip}, position": self._tip}
-        for joint, body in zip(self._joints, self._names, strict=True):
-            names |= {f"{joint}, position": body, f"{joint}, rotation": f"{body}, rotation"}
-        known = {name.replace(",", ""): quantity for name, quantity in names.items()}
+        """The quantity that a table calls so: "torso rotation", "torso position"."""
+        places = {f"{name} position": name for name in self.units}
+        known = places | {name.replace(",", ""): name for name in self.units}
         return known.get(words.replace(",", ""), words)
 
     def curves(self, trace: Trace, model: Model | None = None, side: int = 0) -> Curves | None:
