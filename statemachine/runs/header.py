@@ -249,7 +249,7 @@ class Header:
 
     @property
     def joint_labels(self) -> tuple[str, ...]:
-        """A name for each joint: its own, or "joint 0" by its number; of a free joint its body's."""
+        """A name for each joint: its own, or "joint 0"; a free joint is called by its body."""
         labels = [name or f"joint {k}" for k, name in enumerate(self.joints)]
         for k, body in enumerate(self.jnt_bodyid):
             if self.jnt_type[k] == int(JointType.FREE) and self.bodies[body] not in labels:
