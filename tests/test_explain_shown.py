@@ -131,7 +131,7 @@ def test_json_terminal_and_page_say_what_was_found(name, ran, tmp_path, here):
         begins = cause.split()[0]
         lines = [line for line in text.splitlines() if line.strip().startswith(begins)]
         assert rounding or any(share in line for line in lines)
-    assert found.shares or "All that is compared is the same" in text
+    assert found.shares or "Files, options and starts are the same" in text
     tables = [block for block in why.causes(found) if isinstance(block, Table)]
     shown = [row for table in tables for row in table.rows]
     cells = [(row[0].partition(" (")[0], row[3].partition(" ±")[0]) for row in shown]

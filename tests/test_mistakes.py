@@ -232,7 +232,7 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("compare hold --model a.xml --model b.xml", "compare hold a.xml b.xml"),
         ("compare hold --map a=b", "--map is of two sides"),
         ("compare hold --every 2", "--every goes with FILE.py:FUNCTION"),
-        ("compare hold so101 so101 --keyframe x", "--keyframe goes with FILE.py:FUNCTION"),
+        ("compare hold so101 so101 --keyframe x", "no keyframe named 'x'"),
         ("compare own.py:hold arm.xml arm.xml --every 0", "at least 1; got 0"),
         (
             "compare own.py:drawn arm.xml arm.xml damping=0.5 --why",

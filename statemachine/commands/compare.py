@@ -98,7 +98,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         ),
         ("--floor", "SIDE", "both have that of the left, or of the right", {"choices": SIDES}),
         ("--every", "N", "steps for which what FUNCTION(model, data) returned holds (1)"),
-        ("--keyframe", "NAME", "where a FUNCTION starts, on both sides"),
+        ("--keyframe", "NAME", "where it starts, on both sides"),
     )
     for title, rows in (
         ("why", questions.OF_WHY),
@@ -239,7 +239,7 @@ def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any)
         refuse_given(options, ["map"], map_of)
         refuse_given(options, PARTS, f"{{}} is of two sides: {PROGRAM} compare hold LEFT RIGHT")
     if not (len(what) == 1 and is_function(what[0])):
-        refuse_given(options, ["every", "keyframe"], "{} goes with FILE.py:FUNCTION")
+        refuse_given(options, ["every"], "{} goes with FILE.py:FUNCTION")
     refuse(
         (
             options.every is not None and options.every < 1,

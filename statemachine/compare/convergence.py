@@ -153,8 +153,8 @@ def verdict_of(gaps: list[float], rounding: float) -> tuple[Limit, float | None]
     distance, and the greatest of a run: where the limits of the two sides differ, it may cross
     zero on its way, and another moment or touch may become the greatest. So two triples in a row,
     of four gaps, must say that something is left. Nothing is left where each of three halvings
-    divides the gap by what an order does: of a gap c + a·h less than a tenth of the first can
-    be. Three gaps that are level need no order.
+    divides the gap by what an order does, and the last three extrapolate to nothing. Three gaps
+    that are level need no order.
 
     Args:
         gaps: Three or more, each with half of the steps of the one before.
@@ -165,10 +165,11 @@ def verdict_of(gaps: list[float], rounding: float) -> tuple[Limit, float | None]
     last = gaps[-3:]
     if min(last) >= _LEVEL * max(last):
         return ("stays" if last[-1] >= _MOST * gaps[0] else "in part"), None
-    if len(gaps) > 3 and all(a >= _SLOWEST * b for a, b in pairwise(gaps[-4:])):
-        return "discretisation", 0.0
     before, now = (_extrapolated(gaps[0], *gaps[k:][:3]) for k in (-4, -3))
-    return now if len(gaps) > 3 and before[0] == now[0] else ("unclear", None)
+    if len(gaps) > 3 and before[0] == now[0] != "unclear":
+        return now
+    halved = len(gaps) > 3 and all(a >= _SLOWEST * b for a, b in pairwise(gaps[-4:]))
+    return ("discretisation", 0.0) if halved and now[1] is None else ("unclear", None)
 
 
 def _extrapolated(

@@ -265,7 +265,7 @@ class Request:
         names: Joints, bodies, sites and actuators of the left that go by other names on the
             right.
         every: Steps for which what a FUNCTION returns holds.
-        keyframe: Where a FUNCTION starts; None for the default state.
+        keyframe: Where it starts; None for the experiment's own, and a FUNCTION's default state.
     """
 
     what: Sequence[str]
@@ -320,7 +320,8 @@ class Request:
             )
         (what,) = self.what
         if not is_function(what):
-            return scenario(what)
+            known = scenario(what)
+            return replace(known, keyframe=self.keyframe or known.keyframe)
         return function_scenario(what, self.every, self.keyframe)
 
 
@@ -369,7 +370,7 @@ def split_words(
     sides = tuple(parse_sides(rest, menagerie))
     if len(sides) == 2 or not (sides or is_function(what[0])):
         return what, sides
-    typed = f"statemachine compare {what[0]} {sides[0].label if sides else 'so101@mujoco'}"
+    typed = f"statemachine compare {what[0]} {' '.join(rest) or 'so101@mujoco'}"
     if len(sides) > 2:
         raise BadInputError(
             f"{len(sides)} sides, {listed([side.label for side in sides])}: compare takes two"
@@ -398,4 +399,4 @@ def _another(sides: Sequence[Side]) -> str:
     if not sides:
         return "so101@pybullet"
     other = next(name for name in reversed(PAIR) if name != sides[0].engine)
-    return f"{Path(sides[0].file).name}@{other}"
+    return f"{sides[0].file}@{other}"

@@ -13,7 +13,7 @@ from ..engines import room
 from ..interface import Array, Data, Ints, JointType, Model, forward, step
 from ..measures import ContactNames
 from ..rotations import angle_between, matrix_from_quat
-from ..runs.recorder import array_or_nan
+from ..runs.recorder import array_or_nan, is_stale
 from .matching import Matched
 
 KINEMATICS, MASS, FOUND, FORCE = "kinematics", "mass matrix", "contacts found", "contact force"
@@ -115,9 +115,7 @@ class StageReader:
             qvel: See qpos.
         """
         model, dofs = self._models[side], self._dofs[side]
-        # After a step, derived arrays are of the state before its last engine step.
-        stale = model.capabilities.behaviours["stale after a step"].support != "unsupported"
-        stale = stale and model.substeps == 1
+        stale = is_stale(model)
         (step if stale else forward)(model, data)
         values, contacts = self._read(side, data, qpos), self._contacts(side, data)
         if not stale:

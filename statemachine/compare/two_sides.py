@@ -379,7 +379,12 @@ def _other_side(request: Request, own: Side) -> Side:
 
 def _refuse_of_run(request: Request, **given: bool) -> None:
     """Raise BadInputError for an option that has no meaning for a trace."""
-    refused = {"seconds": request.seconds is not None, "seed": request.seed != 0, **given}
+    refused = {
+        "seconds": request.seconds is not None,
+        "seed": request.seed != 0,
+        "keyframe": request.keyframe is not None,
+        **given,
+    }
     refuse(
         *(
             (wrong, f"--{option} is of a run, and a trace is a run that was made")

@@ -260,7 +260,6 @@ def floor_words(comparison: Comparison, floor: Figures) -> list[Block]:
         changed=changed_by(floor),
         ended=floor.ended or None,
         most=listed(sizes) if sizes and not floor.ended else None,
-        no_gap=if_true(not (moving or everywhere or comparison.agrees)),
         every_gap=if_true(everywhere and any(band.most > 0 for band in motion)),
         inside=", ".join(moving) if inside else None,
         chance=listed(chance) if chance else None,

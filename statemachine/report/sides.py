@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +43,7 @@ def commanded(comparison: Comparison) -> list[Block]:
     actuators = left.header.actuators
     if not actuators or actuators != right.header.actuators:
         return []
-    if all(trace.header.options.get("actuation") is False for trace in (left, right)):
+    if without_actuation((left, right)):
         return [Text("The actuators of the file are off on both sides: nothing is commanded.")]
     same = commands_alike(left, right)
     traces = {"": left} if same else {f"{labels[0]}, ": left, f"{labels[1]}, ": right}
@@ -55,6 +56,11 @@ def commanded(comparison: Comparison) -> list[Block]:
     heading = f"What was commanded ({'' if same else 'not '}the same on both sides)"
     table = Table(("actuator", *columns), rows, "ctrl, by actuator")
     return [Section("", heading, [table], folded=True, detail=True)]
+
+
+def without_actuation(traces: Sequence[Trace]) -> bool:
+    """Whether nobody commands any of some runs."""
+    return all(trace.header.options.get("actuation") is False for trace in traces)
 
 
 def contact_words(comparison: Comparison) -> Table:
@@ -72,7 +78,7 @@ def contact_words(comparison: Comparison) -> Table:
             for touch in hardest
             for label, side in zip(labels, (touch.left, touch.right), strict=True)
         ],
-        f"Who presses on what ({len(hardest)} of {len(touches)} pairs; forces are means over "
+        f"Who presses hardest ({len(hardest)} of {len(touches)} pairs; forces are means over "
         f"{window(comparison)})",
         words=frozenset({0, 1}),
         wide=frozenset({5}),
@@ -105,7 +111,7 @@ def loop_note(run: SidesRun | None) -> list[Block]:
     commands = run.commands
     return template.blocks(
         "loops_told",
-        same=if_true(commands == "the same"),
+        same=if_true(commands == "the same" and not without_actuation(run.traces)),
         recorded=if_true(commands == "recorded"),
         more=if_true(commands == "more than ctrl"),
         lacking=if_true(lacking and commands != "its own"),

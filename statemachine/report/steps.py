@@ -52,6 +52,7 @@ def convergence(result: Figures, experiment: str) -> Page:
         experiment: What was run.
     """
     at = "" if result.touch is None else short_time(result.touch)
+    limited = {limit.verdict for limit in result.before} - {"rounding"}  # else one line says so
     title = f"The gap with finer steps, before the first touch at {at}"
     return template.page(
         "convergence",
@@ -61,7 +62,7 @@ def convergence(result: Figures, experiment: str) -> Page:
         right=result.labels[1],
         until=result.until,
         steps=" and ".join(dict.fromkeys(milliseconds(step, 3) for step in result.steps)),
-        before=_limits(result.before, title) if result.before and at else None,
+        before=_limits(result.before, title) if at and limited else None,
         whole=_limits(result.whole, "The gap with finer steps, over the whole run"),
         touch=if_true(at),
         quarter=significant(min(result.steps) / 4) if result.unclear else None,

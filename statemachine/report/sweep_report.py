@@ -242,15 +242,16 @@ def summary_page(ready: PreparedSweep, summary: Figures) -> Page:
 
 NONE_FITTED = {
     True: "Nothing is to be brought together: every gap is inside the chaos floor.",
-    False: "No parameter has three numbers or a range: nothing is fitted.",
+    False: "No property of the robot has three numbers or a range (the timestep is none): nothing "
+    "is fitted.",
 }
 LINES = {
     "not fitted": "{label} is not fitted: {why_not}.",
     "own": "The model's own {label} is the best already: at {value}, {sizes}.",
     "none": "No value of {label} is better than {other} by more than 10 %: at the best, "
     "{value}, {sizes}.",
-    "edge": "{label} {where}: the gap is least at the edge of the range, {value} ({sizes}): look "
-    "beyond it.",
+    "edge": "{label} {where}: the gap is least at the edge of the range, {value} ({sizes}). That "
+    "is not the best value: look beyond it, and ask compare --why what causes the gap.",
     "together": "{label} = {value} {where} brings {pair} together: {sizes}.",
     "closer": "{label} = {value} {where} brings {pair} closer, not together: {sizes}.",
 }
@@ -271,7 +272,11 @@ def line(sweep: Figures, parameter: Figures) -> str:
     own = parameter.verdict == "none" and _is_own(parameter)
     return LINES["own" if own else parameter.verdict].format(
         label=parameter.label,
-        value=_fitted(parameter),
+        value=(
+            _times(parameter, parameter.value)
+            if parameter.verdict == "edge"
+            else _fitted(parameter)
+        ),
         where=f"in {sweep.sides[1]}" if parameter.varied == "right" else "in both",
         pair=listed(list(sweep.sides)),
         other="any other" if parameter.own is None else "the model's own",

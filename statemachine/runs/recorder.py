@@ -235,9 +235,7 @@ def derived(
     rows = len(inputs["time"])
     arrays: dict[str, list[Array]] = {name: [] for name in _TOLD}
     contacts: dict[str, list[Any]] = {name: [] for name in CONTACTS}
-    # After a step, derived values are of the state before its last engine step: with one of
-    # those they are of the row that began it. With more, they must be asked for before.
-    after = model.substeps == 1
+    after = is_stale(model)
     rewritten = 0
     with make_data(model) as data:
         begin(model, data)
@@ -263,6 +261,16 @@ def derived(
         rows_of = [np.reshape(part, (-1, *width)) for part in contacts[name]]
         columns[name] = np.concatenate([np.empty((0, *width), kind), *rows_of], dtype=kind)
     return columns, rewritten
+
+
+def is_stale(model: Model) -> bool:
+    """Whether derived values are, after a step, of the state that the step began in.
+
+    They are of the state before its last engine step, or of none (RK4): of a Model with several
+    engine steps in one, or with that integrator, they must be asked for before the step.
+    """
+    behaviour = model.capabilities.behaviours["stale after a step"]
+    return model.substeps == 1 and behaviour.support != "unsupported"
 
 
 def put_row(data: Data, inputs: Mapping[str, Array], k: int) -> bool:

@@ -55,8 +55,8 @@ class Scenario:
     def on(self, model: Model) -> Scenario:
         """This scenario as it is on a Model: its start, and words that are true of it.
 
-        The arm starts where the scenario says; another robot at its keyframe "home" if it has
-        one, else in its default state.
+        It starts where the scenario says; where it says nothing, a robot that is not the arm
+        starts at its keyframe "home" if it has one, else in its default state.
 
         Raises:
             BadInputError: It makes no sense on the Model; with the names of those that do.
@@ -71,7 +71,7 @@ class Scenario:
             raise BadInputError(f"{error}{known}") from None
         if is_the_arm(model):
             return replace(self, says=self.elsewhere)
-        key = home(model)
+        key = self.keyframe or home(model)
         begins = "" if key is None else f" It starts in the keyframe {key!r}."
         return replace(self, says=self.elsewhere + begins, keyframe=key)
 
@@ -159,7 +159,7 @@ SCENARIOS = {
             2.0,
             lambda _model, _seed: _constant(None),
             "No actuator of the file acts and nothing can touch anything: what can move is left "
-            "to gravity. A robot that floats falls as a whole, and its joints hardly move.",
+            "to gravity. A robot that floats falls as a whole.",
             _need_joints,
             options={"actuation": False, "contacts": False},
         ),

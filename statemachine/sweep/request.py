@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -163,13 +162,12 @@ class PreparedSweep:
     def provenance(self) -> dict[str, Any]:
         """What was asked for, as plain values, for the metadata of each file."""
         asked = self.sweep
-        what = Path(asked.what).name if self.function else asked.what
         request = {name: getattr(asked, name) for name in REQUEST}
         design = {name: getattr(asked, name) for name in DESIGN}
         return {
             "schema": MANIFEST_VERSION,
             "command": asked.typed("DIR"),
-            "request": {"what": what, "function": self.function, **request},
+            "request": {"what": asked.what, "function": self.function, **request},
             "files": dict(self.files),
             "versions": dict(self.versions),
             "design": {**design, "backends": list(self.backends)},

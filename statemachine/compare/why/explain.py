@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...errors import BadInputError, EndedEarlyError, check_name
+from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import JointType, Model
 from ...measures import Deviation
 from ...page import Figures
@@ -179,7 +179,10 @@ def explain(
     units = trials.ruler.units
     if quantity is not None:
         quantity = trials.ruler.named(quantity)
-        check_name("quantity", quantity.replace(",", ""), [n.replace(",", "") for n in units])
+        if quantity not in units:
+            known = (*units, *trials.traces[0].header.joint_labels)
+            names = dict.fromkeys(name.replace(",", "") for name in known)
+            raise unknown_name("quantity", quantity, names)
     listed = trials.causes(finer)
     able = [cause.name for cause in listed if not cause.refused]
     first = trials.gaps(frozenset())
