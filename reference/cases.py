@@ -31,7 +31,7 @@ _LESSONS = (
     *("objects", "state", "write", "forward", "hold", "gravity", "reset", "replay", "time"),
     *("speed", "questions"),
 )
-_AUDITED = {"arm with a box", "inverted pendulum", "fixed ant", "newton cradle"}
+_AUDITED = {"arm with a box", "inverted pendulum", "fixed ant"}
 # Without them the lesson looks how fast the machine is.
 _LENGTHS = {"gravity": ("--seconds", "4", "--longer", "20")}
 _EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
