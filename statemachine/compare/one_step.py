@@ -283,7 +283,7 @@ def _notes(matched: Matched, failed: bool) -> tuple[str, ...]:
         *(
             (
                 bool(laws),
-                f"on {backend} this library computes {', '.join(laws)} from the model: "
+                f"on {backend} this library computes {', '.join(laws)}, where the model has them: "
                 "that these agree is by construction",
             )
             for backend, laws in by_us

@@ -38,7 +38,7 @@ _LAST = {
     "places": "effect",
     "armature": "share",
     "drive": "effect",
-    "effort": "ratio",
+    "effort": "effect",
     "damping": "slows in, left / right",
     "dry friction": "share",
     "limits": "effect",

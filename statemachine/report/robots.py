@@ -208,7 +208,7 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
         "gap without contacts": lambda backend: _gap_in_full(backend.without_contacts),
         "gap with contacts": lambda backend: _gap_in_full(backend.with_contacts),
         **{f"experiment {name}": partial(_scenario, name) for name in TRIED},
-        "cost of a step, on this machine": lambda backend: (
+        "cost of a step over the engine's own, here": lambda backend: (
             NONE if backend.cost is None else f"{backend.cost:.3g} ×"
         ),
     }
