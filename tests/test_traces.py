@@ -84,9 +84,18 @@ def test_the_rows_are_those_of_a_bare_loop(backend: str) -> None:
     assert (len(trace), trace.header.rewritten) == (101, 0)
 
 
-@pytest.mark.parametrize("substeps", [1, 3])
-def test_derived_columns_are_of_the_state_of_their_row(backend: str, substeps: int) -> None:
-    model = sm.load("so101/scene", backend=backend).replace(substeps=substeps)
+@pytest.mark.parametrize(("substeps", "integrator"), [(1, "Euler"), (3, "Euler"), (1, "RK4")])
+@pytest.mark.filterwarnings("ignore:PyBullet. the integrator RK4")
+def test_derived_columns_are_of_the_state_of_their_row(
+    tmp_path: Path, backend: str, substeps: int, integrator: str
+) -> None:
+    file = sm.load("so101/scene").path
+    scene = mjcf(
+        "",
+        f'<include file="{file}"/><compiler meshdir="{file.parent}/look"/>'
+        f'<option integrator="{integrator}"/>',
+    )
+    model = model_of(tmp_path, scene, backend=backend).replace(substeps=substeps)
     trace = record_scenario(SCENARIOS["hold"], model, seconds=0.2)
     with sm.make_data(model) as data:
         for row in (0, 7, 20, len(trace) - 1):
