@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -324,6 +325,16 @@ def test_one_edit_of_the_file_is_one_cause(
     numbers = tuple(float(value.split('"')[1]) if value else 1000.0 for value in values)
     assert_has(row, name=name, unit=unit, share=pytest.approx(1.0))
     assert (*row.values[0][1:], row.place.line) == pytest.approx((*numbers, line))
+
+
+def test_a_mass_that_moves_the_centre_of_its_body_is_one_cause(tmp_path: Path) -> None:
+    other = '/><geom type="sphere" pos="0 0 0.1" size="0.02" mass="0.2"'
+    texts = (LINKS.format(geom="", beam=f'mass="{mass}"{other}') for mass in (1.0, 1.5))
+    run = partial(explained, tmp_path, *texts, scenario=STILL, seconds=0.5)
+    (row,) = run().shares
+    assert_has(row, name="mass, centre of mass and inertia of a", share=pytest.approx(1.0))
+    assert (*row.values[0][1:], row.place.line) == pytest.approx((1.2, 1.7, 3))
+    assert {"mass of a", "centre of mass (x) of a"} < set(shares(run(finer=True)))
 
 
 @pytest.mark.usefixtures("bullet")

@@ -277,7 +277,7 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("compare --models so101 so101 --frame gripperframe", "--frame wants A=B"),
         ("compare --models so101 so101 --frame x=y", "no frame in so101/so101.xml named 'x'"),
         ("compare --models so101 so101 --digits 0", "--digits wants a number from 1 to 17"),
-        ("compare hold --models so101 so101", "hold is a run"),
+        ("compare hold --models so101 so101", "compare --models LEFT RIGHT"),
         ("compare --models so101 so101 --seconds 1", "--seconds is of a run"),
         ("compare hold --all", "--all goes with --models"),
         ("compare hold --one-step --converge", "goes without"),

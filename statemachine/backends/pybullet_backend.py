@@ -185,7 +185,7 @@ def load(
 
 def _tell(plan: Plan, settings: list[str], stacklevel: int) -> None:
     """Warn of what is not as the model has it: settings, and friction of the first few pairs."""
-    pairs = few(plan.surfaces.differences, between="; ")
+    pairs = few(plan.surfaces.differences, 1)
     rubbing = [f"it has one friction for each body, a model one for each pair: {pairs}"]
     if differences := "; ".join([*settings, *(rubbing if pairs else [])]):
         warnings.warn(f"PyBullet: {differences}", EngineWarning, stacklevel=stacklevel)

@@ -49,8 +49,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
-        "Exit code 1: something differs, or a run ends before its time; with --why:\n"
-        "something stays unexplained."
+        "Exit code 1: something differs, or a run ends before its time; with --why, but\n"
+        "without --html: something stays unexplained, or is only a weak hint."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add_table(
@@ -295,7 +295,7 @@ def _run_compare(
     options: argparse.Namespace, request: Any, renderer: Any, uncertain: Any, why_not: str
 ) -> int:
     from ..compare import compare, run_sides, witness
-    from ..measures import parse_tolerances
+    from ..measures import QUANTITIES, parse_tolerances
     from ..report import compare as report
     from ..report.terminal import progress
 
@@ -316,6 +316,8 @@ def _run_compare(
         "witness": witness(*run.traces, run.file),
         "floor": _floor(options, comparison, run.reruns[0], uncertain),
     }
+    if all(a.verdict == "agrees" for a in comparison.agreements if QUANTITIES[a.kind].moves):
+        why_not = "Next: another experiment, such as gravity or waves, may move what this does not."
     more: dict[str, Any] = {
         "why_not": "" if comparison.ended or comparison.agrees else why_not  # the page says it
     }

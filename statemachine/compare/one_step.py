@@ -284,7 +284,7 @@ def _notes(matched: Matched, failed: bool) -> tuple[str, ...]:
             (
                 bool(laws),
                 f"on {backend} this library computes {', '.join(laws)}, where the model has them: "
-                "that these agree is by construction",
+                "that these agree is by construction, as far as contact agrees",
             )
             for backend, laws in by_us
         ),

@@ -113,7 +113,7 @@ def page(
         f"{both.title}: {' and '.join(long_labels(comparison))}",
         _origin(comparison),
         blocks,
-        also_open(headline(comparison, events, explanation), played),
+        also_open(headline(comparison, events, explanation, floor), played),
     )
 
 

@@ -38,6 +38,7 @@ PARTING = {
     "coarse": "; they are apart from the common moment {time} on",
 }
 ENDS = {
+    "chance": "The chaos floor of it is {floor}: so large a gap may be chance.",
     "alike": "All of the motion is within its tolerance at all moments.",
     "within": "On average over {window}, all of the motion is within its tolerance.",
     "settled": "On average over {window} {what} is still {far} apart.",
@@ -50,6 +51,7 @@ def headline(
     comparison: Comparison,
     events: Sequence[Figures],
     explanation: Explanation | None = None,
+    floor: Figures | None = None,
 ) -> Headline:
     """The largest difference, what explains it, and what is left of it in the end."""
     agreements, until = comparison.agreements, comparison.until
@@ -77,6 +79,10 @@ def headline(
         parting=_parting(comparison, events),
     )
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
+    bands = [b for b in floor.bands if agreement and b.name == agreement.name] if floor else []
+    if agreement and bands and bands[0].most >= agreement.max:
+        most = quantity(bands[0].most, agreement.unit)
+        return Headline(capital(lead), causes, ENDS["chance"].format(floor=most), holds=False)
     return Headline(capital(lead), causes, _in_the_end(comparison), holds=False)
 
 

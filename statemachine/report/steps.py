@@ -12,6 +12,7 @@ from ..measures.text import (
     NONE,
     command,
     figure,
+    grouped,
     listed,
     milliseconds,
     quantity,
@@ -27,8 +28,9 @@ from .template import if_true
 LEADS = {
     "rounding": "There is no gap beyond rounding, whatever the timestep",
     "vanishes": "The gap vanishes with the timestep: it is discretisation",
-    "unclear": "It is unclear whether the gap vanishes with the timestep: for {unclear} of {total} "
-    "quantities it has no steady order",
+    "unclear": "It is unclear whether the gap vanishes with the timestep: that of {name} is "
+    "{coarse}, and {fine} with the finest steps, in no steady order (so {unclear} of {total} "
+    "quantities)",
     "stays": "The gap does not vanish with the timestep: that of {name} is {coarse}, and {fine} "
     "with the finest steps",
     "in part": "The gap vanishes with the timestep in part only: that of {name} is {coarse}, and "
@@ -93,14 +95,20 @@ def _of_the_limit(result: Figures, touch: str) -> Headline:
     if result.vanishes:
         verdicts = {limit.verdict for limit in result.whole}
         return Headline(LEADS["vanishes" if verdicts - {"rounding"} else "rounding"])
-    stay = [limit for limit in result.whole if limit.verdict in ("stays", "in part")]
-    unclear = sum(limit.verdict == "unclear" for limit in result.whole)
-    lead = LEADS["unclear"].format(unclear=unclear, total=len(result.whole))
-    if len(stay) > unclear:
-        same = (limit for limit in stay if limit.unit == stay[0].unit)
-        most = max(same, key=lambda limit: limit.gaps[-1])
-        coarse, fine = (quantity(most.gaps[k], most.unit) for k in (0, -1))
-        lead = LEADS[most.verdict].format(name=name_of(most.name), coarse=coarse, fine=fine)
+    by_verdict = grouped((limit.verdict, limit) for limit in result.whole)
+    unclear = by_verdict.get("unclear", [])
+    stay = by_verdict.get("stays", []) + by_verdict.get("in part", [])
+    said = stay if len(stay) > len(unclear) else unclear
+    same = (limit for limit in said if limit.unit == said[0].unit)
+    most = max(same, key=lambda limit: limit.gaps[-1 if said is stay else 0])
+    coarse, fine = (quantity(most.gaps[k], most.unit) for k in (0, -1))
+    lead = LEADS[most.verdict].format(
+        name=name_of(most.name),
+        coarse=coarse,
+        fine=fine,
+        unclear=len(unclear),
+        total=len(result.whole),
+    )
     before = {limit.verdict for limit in result.before}
     tells = touch and before and before <= {"rounding", "discretisation"}
     end = TOUCH[before == {"rounding"}].format(touch=touch) if tells else ""

@@ -27,7 +27,11 @@ _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch p
 _OFF = ("place", "anchor", "com", "axis")
 _HEADS = ("what", "left", "right", "part", "alone", "last")
 _SINGULAR = {"joints": "worst joint", "slides": "worst slide", "ball joints": "worst ball joint"}
-_MEASURES = {"worst": "at its largest", "end": "in the end", "rms": "as a root mean square"}
+_MEASURES = {
+    "worst": "each run at its largest",
+    "end": "in the end",
+    "rms": "as a root mean square",
+}
 
 # Line one: what a side has nothing of, and what the gap comes from.
 MISSING = {
@@ -91,7 +95,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         files=if_true(stays and not refused and len(engines) == 1),
         both=if_true(min(len(engines), len(files)) > 1),
         parts=three_parts(result)[1:],
-        holds=not refused if result.is_rounding else result.is_explained,
+        holds=result.is_explained and not (result.is_rounding and refused),
         answer=answer(result),
         three=None if result.is_rounding else parts(result),
     )

@@ -17,6 +17,7 @@ from ...engines.records import Edit, ModelDifference
 from ...installed import DEFAULT
 from ...interface import Model
 from ...measures import farthest
+from ...measures.text import listed
 from ...page import Figures
 from ...runs import SideStart
 from ..matching import Matched
@@ -25,6 +26,8 @@ START, COMMANDS, ORDER = "start", "commands", "order of ctrl"  # of the run itse
 _SAME = 1e-12
 _MOST = 24  # causes, before all of one quantity are taken together
 _NAMED = 3  # elements of one cause, before they are counted
+CENTRE = "centre of mass"
+_WEIGHT = ("mass", CENTRE, "inertia")
 _DENSITY = 1000.0  # kg/m³, where an MJCF says none
 _SCALING = {"density": "kg/m³", "mass": "kg"}  # attributes of a geom, and their units
 _PLURALS = {"body": "bodies", "equality": "equalities", "flex": "flexes"}
@@ -113,8 +116,8 @@ def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause,
     """Differences as causes: what was changed alike in several elements is one.
 
     A changed default of a file's class is such a change; so are masses and moments of inertia that
-    are multiplied alike, as by a density. Where there are more than 24 causes, all of one quantity
-    are one.
+    are multiplied alike, as by a density, and a mass that takes the centre of its body along.
+    Where there are more than 24 causes, all of one quantity are one.
 
     Args:
         rows: Differences, in their order.
@@ -124,7 +127,14 @@ def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause,
     refused = _grouped([row for row in rows if row.refused], lambda row: row.title)
     if finer:
         return (*_grouped(able, lambda row: row.title), *refused)
-    grouped = _grouped(able, _change)
+    moved = {row.where for row in able if row.kind == "body" and row.subject == CENTRE}
+    moved &= {row.where for row in able if row.kind == "body" and row.subject == "mass"}
+
+    def change(row: ModelDifference) -> object:
+        weighs = row.kind == "body" and row.subject in _WEIGHT and row.where in moved
+        return (row.kind, row.where) if weighs else _change(row)
+
+    grouped = _grouped(able, change)
     if len(grouped) > _MOST:
         grouped = _grouped(able, lambda row: (row.kind, row.subject))
     return (*grouped, *refused)
@@ -161,7 +171,7 @@ def _grouped(
 def _name(rows: list[ModelDifference]) -> str:
     """What a cause is, and of what: of up to three elements by name."""
     first, places = rows[0], list(dict.fromkeys(row.where for row in rows))
-    subject = " and ".join(dict.fromkeys(row.subject for row in rows))
+    subject = listed(list(dict.fromkeys(row.subject for row in rows)))
     if len(rows) == 1:
         return first.title
     if len(places) <= _NAMED:
@@ -279,12 +289,15 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
     )
     for cause in causes:
         name, rows = cause.name, cause.differences
-        scale = scale_of(rows[0])
-        values, unit = (
-            tuple(value for row in rows[: 1 if scale else None] for value in row.values),
-            rows[0].unit,
-        )
+        moved = cause.kind == "body" and len({row.subject for row in rows} & {"mass", CENTRE}) > 1
+        scale = "" if moved else scale_of(rows[0])
+        shown = [row for row in rows if row.subject == "mass"] if moved else rows
+        values = tuple(value for row in shown[: 1 if scale else None] for value in row.values)
+        unit = shown[0].unit
         lines = {element.place for element in theirs if _says(element, cause)}
+        if moved and not lines:  # the mass of one of its geoms
+            known = {said[:2] for said in _weights(ours)}
+            lines = {place for *said, place in _weights(theirs) if tuple(said) not in known}
         if scale and len(rows) > 1:
             said = _scalings(ours, theirs, float(scale))
             if len(said) == 1:
@@ -300,17 +313,22 @@ def _scalings(
     ours: Sequence[Figures], theirs: Sequence[Figures], scale: float
 ) -> list[tuple[str, float, float, Place]]:
     """Attributes that are multiplied so in the right's file: both values, and the place."""
-    left, right = (
-        [(word, float(e.attributes[word]), e.place) for e in elements for word in _SCALING
-         if word in e.attributes]
-        for elements in (ours, theirs)
-    )  # fmt: skip
-    known = {("density", _DENSITY), *(row[:2] for row in left)}
+    known = {("density", _DENSITY), *(row[:2] for row in _weights(ours))}
     return [
         (word, value / scale, value, place)
-        for word, value, place in right
+        for word, value, place in _weights(theirs)
         if (word, value) not in known
         and any(word == w and np.isclose(scale * v, value, 1e-6) for w, v in known)
+    ]
+
+
+def _weights(elements: Sequence[Figures]) -> list[tuple[str, float, Place]]:
+    """Each density and mass of a file, and where it is."""
+    return [
+        (word, float(element.attributes[word]), element.place)
+        for element in elements
+        for word in _SCALING
+        if word in element.attributes
     ]
 
 

@@ -78,13 +78,16 @@ class Explanation(Figures):
     def is_explained(self) -> bool:
         """Whether no more than a twentieth of the gap stays unexplained.
 
-        Nothing is explained where the gap grows when the differences are brought to the same.
+        Nothing is explained of a gap that may be chaos, nor where the gap grows when the
+        differences are brought to the same.
         Where something differs that cannot be brought to the same, what is only located may come
         from that, and counts as unexplained; so does a part that goes with the motion itself.
         """
         weak = any(row.note for row in self.shares) or any(p.is_still for p in self.found_in)
         stays = 1.0 - self.explained if weak else self.unexplained
-        return self.is_rounding or (abs(stays) <= UNEXPLAINED and not self.is_wider)
+        if self.is_rounding:
+            return self.gap <= self.negligible
+        return abs(stays) <= UNEXPLAINED and not self.is_wider
 
     @property
     def is_wider(self) -> bool:

@@ -98,9 +98,9 @@ def _frames(raw: Any, edits: Iterable[Edit]) -> None:
     """What lay in another frame, and was not computed apart, may lie elsewhere now."""
     for name, index, _ in edits:
         if name in ("geom_pos", "geom_quat", "site_pos", "site_quat"):
-            getattr(raw, f"{name[:4]}_sameframe")[index] = 0
+            getattr(raw, f"{name[:4]}_sameframe")[index[0]] = 0
         elif name in ("body_ipos", "body_iquat") and not raw.body_simple[index[0]]:
-            raw.body_sameframe[index] = 0
+            raw.body_sameframe[index[0]] = 0
             raw.geom_sameframe[raw.geom_bodyid == index[0]] = 0
             raw.site_sameframe[raw.site_bodyid == index[0]] = 0
 
