@@ -266,7 +266,9 @@ def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path
         "<geom size='.1' friction='.1'/><geom pos='1 0 0' size='.1' friction='.9'/></body>"
     )
     done = cli("lesson", "state", "--model", _model(tmp_path, body), "--backend", "pybullet")
-    assert re.fullmatch(r"statemachine: PyBullet: it has one friction (?:(?!\.py).)*\n", done.stderr)
+    assert re.fullmatch(
+        r"statemachine: PyBullet: it has one friction (?:(?!\.py).)*\n", done.stderr
+    )
 
 
 @pytest.mark.parametrize("command", ["compare", "sweep"])
