@@ -184,8 +184,8 @@ def explain(
         quantity = trials.ruler.named(quantity)
         if quantity not in units:
             known = (*units, *trials.traces[0].header.joint_labels)
-            names = dict.fromkeys(name.replace(",", "") for name in known)
-            raise unknown_name("quantity", quantity, names)
+            called = dict.fromkeys(name.replace(",", "") for name in known)
+            raise unknown_name("quantity", quantity, called)
     listed = trials.causes(finer)
     able = [cause.name for cause in listed if not cause.refused]
     first = trials.gaps(frozenset())
