@@ -221,7 +221,7 @@ def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:
     )
     _, text = warnings_of(lambda: both(tmp_path, bodies))
     assert "friction of b0 and b1 is" in text
-    # Each of the six pairs has three frictions: the first three are named, the others counted.
+    # Each of the six pairs has three frictions: the first is named, the others are counted.
     assert (text.count("friction of"), text.count(" more")) == (1, 1)
     assert not warnings_of(lambda: sm.load("so101/scene_box", backend="pybullet"))[1]
 

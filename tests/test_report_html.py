@@ -293,8 +293,8 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     def row(name: str, share: float) -> Figures:
         values = ((name, "kp 998.2", "its motors"),)
         return Figures(
-            name=name, kind="engine", values=values, unit="", share=share, alone=share, last=share, error=0.0,
-            note="", place=None, chosen=None,
+            name=name, kind="engine", values=values, unit="", share=share, alone=share,
+            last=share, error=0.0, note="", place=None, chosen=None,
         )  # fmt: skip
 
     fields: dict[str, Any] = {
@@ -396,7 +396,8 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     found = (with_figures(contact, share=1.0),)
     assert parts(worse).endswith("Of the 3.22°, 100.0 % is localised and < 0.1 % unexplained")
     assert located.is_explained
-    assert not (worse.is_explained or still.is_explained)
+    assert not worse.is_explained
+    assert not still.is_explained
     assert not with_figures(located, shares=(row,), found_in=found).is_explained
 
 
