@@ -395,9 +395,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     row = Figures(name="shape of box", note="another size", share=None)
     found = (with_figures(contact, share=1.0),)
     assert parts(worse).endswith("Of the 3.22°, 100.0 % is localised and < 0.1 % unexplained")
-    assert located.is_explained
-    assert not worse.is_explained
-    assert not still.is_explained
+    assert [each.is_explained for each in (located, worse, still)] == [True, False, False]
     assert not with_figures(located, shares=(row,), found_in=found).is_explained
 
 
