@@ -116,7 +116,8 @@ def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause,
     """Differences as causes: what was changed alike in several elements is one.
 
     A changed default of a file's class is such a change; so are masses and moments of inertia that
-    are multiplied alike, as by a density, and a mass that takes the centre of its body along.
+    are multiplied alike, as by a density, and the mass of a geom that takes the centre and the
+    inertia of its body along.
     Where there are more than 24 causes, all of one quantity are one.
 
     Args:
@@ -127,12 +128,11 @@ def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause,
     refused = _grouped([row for row in rows if row.refused], lambda row: row.title)
     if finer:
         return (*_grouped(able, lambda row: row.title), *refused)
-    moved = {row.where for row in able if row.kind == "body" and row.subject == CENTRE}
-    moved &= {row.where for row in able if row.kind == "body" and row.subject == "mass"}
+    weights = [(row.subject, row.where) for row in able if row.kind == "body"]
 
     def change(row: ModelDifference) -> object:
-        weighs = row.kind == "body" and row.subject in _WEIGHT and row.where in moved
-        return (row.kind, row.where) if weighs else _change(row)
+        moved = row.subject in _WEIGHT and all((of, row.where) in weights for of in _WEIGHT)
+        return (row.kind, row.where) if moved and row.kind == "body" else _change(row)
 
     grouped = _grouped(able, change)
     if len(grouped) > _MOST:
