@@ -15,7 +15,7 @@ from statemachine.compare.why import Explanation, explain
 from statemachine.compare.why.shapley import shapley
 from statemachine.runs.scenarios import scenario
 
-from .conftest import ROOT, assert_has, written
+from .conftest import ROOT, assert_has, assert_in, written
 from .explained import (
     ALONE,
     ARM,
@@ -349,6 +349,15 @@ def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):
     assert told[case.cause] >= 0.95, told
     assert all(abs(share) <= 0.02 for cause, share in told.items() if cause != case.cause), told
     assert found.is_explained
+
+
+@pytest.mark.usefixtures("bullet")
+@pytest.mark.filterwarnings("ignore:PyBullet. contacts begin")
+def test_what_an_engine_leaves_out_is_said(tmp_path: Path) -> None:
+    text = ARM.replace('name="ball_shape"', 'name="ball_shape" margin="0.01"')
+    engines = ("mujoco", "pybullet")
+    found = explained(tmp_path, text, text, engines=engines, quantity="ball", seconds=0.5)
+    assert_in(" ".join(found.notes), "pybullet: contacts begin at a distance of 0", "ball_shape")
 
 
 def test_the_robot_of_a_urdf_is_that_of_the_mjcf():

@@ -212,6 +212,7 @@ def test_another_order_of_integration_is_discretisation_and_one_side_twice_no_ga
         ([21.7, 9.06, 3.39, 4.54, 5.26], "unclear", None),  # damping 1 and 0.7: 5.7 is left
         ([25.9, 6.10, 5.94, 1.13, 0.777], "unclear", None),  # it vanishes, below 0.5 ms
         ([0.0074, 11.9, 3.87], "unclear", None),
+        ([0.0074, 11.9, 3.87, 0.577, 0.0371], "unclear", None),
     ],
 )
 def test_a_verdict_wants_a_steady_order(

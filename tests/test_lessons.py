@@ -12,6 +12,7 @@ import pty
 import re
 import select
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -548,10 +549,15 @@ def _at_a_terminal(
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"}
     for name in ("COLUMNS", "LINES"):
         environment.pop(name, None)
+
+    def begin() -> None:  # for Ctrl-C, which a job in the background ignores
+        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
     process = subprocess.Popen(
         [sys.executable, "-m", "statemachine", *words],
         stdin=theirs, stdout=theirs, stderr=theirs, env=environment, start_new_session=True,
-        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # noqa: PLW1509 (for Ctrl-C)
+        preexec_fn=begin,  # noqa: PLW1509
     )  # fmt: skip
     os.close(theirs)
     seen, answered, waiting, deadline = "", 0, list(typed), time.monotonic() + 60

@@ -122,7 +122,7 @@ def test_commands_without_any(nothing: Path, capsys: pytest.CaptureFixture[str])
     }
     assert {words: main(words.split()) for words in asked} == asked
     said = capsys.readouterr().err
-    assert_in(said, "'mujoco=='", "hold is a run")
+    assert_in(said, "'mujoco=='", "compare --models a b")
     assert "Traceback" not in said
     assert said.endswith("statemachine engines add mujoco==3.1.6 mujoco==3.3.7\n")
     assert not list(nothing.iterdir())

@@ -7,15 +7,12 @@ They are also as quick, at these sizes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import mujoco
 import numpy as np
 
 from ..interface import Array
 
 _TINY = 1e-15  # smallest pivot
-dot: Callable[[Array, Array], float] = mujoco.mju_dot  # of vectors (n,)
 _PIVOTS, _SWEEPS, _SETTLED = 30, 500, 1e-9
 
 
@@ -31,6 +28,11 @@ def product(left: Array, right: Array) -> Array:
     result = np.empty((len(left), right.shape[1]))
     mujoco.mju_mulMatMat(result, left, right)
     return result
+
+
+def dot(left: Array, right: Array) -> float:
+    """The product of two vectors (n,)."""
+    return mujoco.mju_dot(left, right)
 
 
 def factored(matrix: Array) -> Array:

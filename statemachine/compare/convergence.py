@@ -106,6 +106,7 @@ def _result(runs: list[tuple[Trace, Trace]]) -> Figures:
             left.header.timestep / left.header.substeps,
             right.header.timestep / right.header.substeps,
         ),
+        _engines={left.header.backend, right.header.backend},
         until=float(time[-1]),
         touch=touch,
         before=before,
@@ -169,7 +170,9 @@ def verdict_of(gaps: list[float], rounding: float) -> tuple[Limit, float | None]
     if len(gaps) > 3 and before[0] == now[0] != "unclear":
         return now
     halved = len(gaps) > 3 and all(a >= _SLOWEST * b for a, b in pairwise(gaps[-4:]))
-    return ("discretisation", 0.0) if halved and now[1] is None else ("unclear", None)
+    if halved and gaps[0] == max(gaps) and now[1] is None:
+        return "discretisation", 0.0
+    return "unclear", None
 
 
 def _extrapolated(

@@ -107,6 +107,10 @@ class RawEngine:
         """Whether its room has a method of its own."""
         return getattr(type(self), method) is not getattr(RawEngine, method)
 
+    def ignored(self, model: Model) -> list[str]:
+        """What of a Model's file its backend leaves out, each in a few words."""
+        return []
+
     # The engine as it comes. Nothing here goes through an adapter that emulates the contract.
 
     def terms(self, model: Model) -> tuple[Figures, ...]:

@@ -79,7 +79,7 @@ def contact_words(comparison: Comparison) -> Table:
             for label, side in zip(labels, (touch.left, touch.right), strict=True)
         ],
         f"Who presses hardest ({len(hardest)} of {len(touches)} pairs; forces are means over "
-        f"{window(comparison)})",
+        f"{window(comparison)}, depths are of the whole run)",
         words=frozenset({0, 1}),
         wide=frozenset({5}),
     )

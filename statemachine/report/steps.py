@@ -66,8 +66,8 @@ def convergence(result: Figures, experiment: str) -> Page:
         steps=" and ".join(dict.fromkeys(milliseconds(step, 3) for step in result.steps)),
         before=_limits(result.before, title) if at and limited else None,
         whole=_limits(result.whole, "The gap with finer steps, over the whole run"),
-        touch=if_true(at),
-        quarter=significant(min(result.steps) / 4) if result.unclear else None,
+        touch=if_true(at and len(result._engines) > 1),
+        quarter=significant(min(result.steps) / 4) if result.unclear and not at else None,
     )
 
 

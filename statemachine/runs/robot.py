@@ -116,8 +116,8 @@ _PART = 0.25  # of its range: how far a servo is sent
 _FARTHEST = {JointType.HINGE: 0.5, JointType.SLIDE: 0.1}  # rad, m; of a wide range or none
 _OUTSIDE = 1e-3  # rad, m; less is how a file rounds its numbers
 _START = (
-    "the run starts outside of joint limits [rad or m]: {joints}. A keyframe of the file "
-    "(--keyframe NAME) can start it inside"
+    "the run starts outside of joint limits [rad or m]: {joints}. A keyframe in the file can start "
+    "it inside (--keyframe NAME)"
 )
 _NO_FORCE = 1e-9  # N·m or N; less is rounding
 _DIGITS = 4  # of what is computed, so that it can be typed and is the same on every engine

@@ -45,6 +45,14 @@ class PybulletEngine(RawEngine):
         emulated = backend.load(model.path).replace(**options)
         return PybulletDials(model.replace(**options), emulated)
 
+    def ignored(self, model: Model) -> list[str]:
+        from ...backends._bullet_scope import ignored
+        from ...backends.pybullet_backend import PybulletModel
+
+        if not isinstance(model, PybulletModel) or model.defaults == "engine":
+            return []
+        return ignored(model.plan)
+
     def measurement(self, question: str) -> Callable[..., Any] | None:
         """A function of `conventions`."""
         from . import conventions
