@@ -573,6 +573,8 @@ def _at_a_terminal(
                 seen += chunk.decode(errors="replace")
             last = seen[answered:].rpartition("\n")[2]
             if waiting and waiting[0][0] in last:
+                # Python loses a Ctrl-C between the prompt that it shows and the read behind it.
+                time.sleep(0.5 if waiting[0][1] == "\x03" else 0.0)
                 os.write(ours, waiting.pop(0)[1].encode())
                 answered = len(seen)
             elif more and _MORE in last:
