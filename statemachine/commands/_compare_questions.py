@@ -232,13 +232,10 @@ def run_models(options: argparse.Namespace) -> int:
 
     digits = 6 if options.digits is None else options.digits
     refuse(
-        *(
-            (
-                True,
-                f"--models compares descriptions, and runs nothing: {PROGRAM} compare --models "
-                f"{' '.join(options.what[1:] or ['LEFT', 'RIGHT'])}",
-            )
-            for word in options.what[:1]
+        (
+            options.what,
+            f"--models compares descriptions, and runs nothing: {PROGRAM} compare --models "
+            f"{' '.join(options.what[1:] or ['LEFT', 'RIGHT'])}",
         ),
         (not 1 <= digits <= 17, f"--digits wants a number from 1 to 17; got {digits}"),
         (options.seed < 0, f"--seed must not be negative; got {options.seed}"),

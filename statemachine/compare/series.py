@@ -17,6 +17,8 @@ from ..runs import Header, Trace
 
 NORMAL = ", normal force"  # after a pair of bodies: the sum over its contacts
 SETTLED = 0.1  # share of the common time, at its end, that "settled" is taken over
+# Joints whose position is one number, and what kind of quantity it is.
+SCALARS = {JointType.HINGE: "joint", JointType.SLIDE: "slide"}
 Sides = Sequence[tuple[Trace, Ints]]  # each run, and its rows at the common moments
 
 
@@ -122,9 +124,8 @@ def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
     if kind is not joints[1].kind:
         return []
     values = [t.qpos[rows, joint.qpos] for (t, rows), joint in zip(sides, joints, strict=True)]
-    if kind in (JointType.HINGE, JointType.SLIDE):
-        what = "joint" if kind is JointType.HINGE else "slide"
-        return [_curve(name, what, time, *(side[:, 0] for side in values))]
+    if kind in SCALARS:
+        return [_curve(name, SCALARS[kind], time, *(side[:, 0] for side in values))]
     curves = []
     if kind is JointType.FREE:
         curves.append(_curve(f"{name}, position", "body", time, *(side[:, :3] for side in values)))

@@ -13,6 +13,7 @@ from ..engines import room
 from ..interface import Array, Data, Ints, JointType, Model, forward, step
 from ..measures import ContactNames
 from ..rotations import angle_between, matrix_from_quat
+from ..runs.header import labels_of_joints
 from ..runs.recorder import array_or_nan, is_stale
 from .matching import Matched
 
@@ -189,12 +190,12 @@ def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
 
 def _dofs(model: Model, joints: Sequence[int]) -> tuple[Ints, list[str], Ints]:
     """The degrees of freedom of some joints, a name for each, and 1 for one that turns."""
+    labels = labels_of_joints(model.joint_names, model.jnt_type, model.jnt_bodyid, model.body_names)
     dofs, names, turns = [], [], []
     for joint in joints:
         kind, start = JointType(int(model.jnt_type[joint])), int(model.jnt_dofadr[joint])
         dofs += range(start, start + kind.nv)
-        body = model.body_names[model.jnt_bodyid[joint]] if kind is JointType.FREE else ""
-        names += [body or model.joint_names[joint] or f"joint {joint}"] * kind.nv
+        names += [labels[joint]] * kind.nv
         free = [0] * 3 + [1] * 3
         turns += free if kind is JointType.FREE else [int(kind is not JointType.SLIDE)] * kind.nv
     return np.array(dofs, dtype=np.int64), names, np.array(turns, dtype=np.int64)

@@ -200,7 +200,10 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
             wide={"tolerance", "floor", "inside from, s", *wide},
         )
 
-    contacts = [a for a in agreements if a.kind in ("force", "contact")]
+    motion, contacts = (
+        [a for a in agreements if (a.kind in ("force", "contact")) is touching]
+        for touching in (False, True)
+    )
     farthest = sorted(contacts, key=lambda a: (a.verdict == "agrees", -a.tolerances()))
     shown, rest = farthest[:_CONTACTS_SHOWN], farthest[_CONTACTS_SHOWN:]
     title = f"{left} against {right}: how far apart"
@@ -222,7 +225,7 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
     )
     return template.blocks(
         "compare_figures",
-        figures=table([a for a in agreements if a not in contacts], title),
+        figures=table(motion, title),
         contacts=table(shown, farther, "RMS", "from, s"),
         others=[folded] if rest else [],
         pressing=[contact_words(comparison)] if comparison.touches else [],

@@ -80,10 +80,10 @@ def headline(
     )
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
     bands = [b for b in floor.bands if agreement and b.name == agreement.name] if floor else []
+    end = _in_the_end(comparison)
     if agreement and bands and bands[0].most >= agreement.max:
-        most = quantity(bands[0].most, agreement.unit)
-        return Headline(capital(lead), causes, ENDS["chance"].format(floor=most), holds=False)
-    return Headline(capital(lead), causes, _in_the_end(comparison), holds=False)
+        end = ENDS["chance"].format(floor=quantity(bands[0].most, agreement.unit))
+    return Headline(capital(lead), causes, end, holds=False)
 
 
 def _parting(comparison: Comparison, events: Sequence[Figures]) -> str:

@@ -8,7 +8,7 @@ import json
 import math
 import platform
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -250,11 +250,7 @@ class Header:
     @property
     def joint_labels(self) -> tuple[str, ...]:
         """A name for each joint: its own, or "joint 0"; a free joint is called by its body."""
-        labels = [name or f"joint {k}" for k, name in enumerate(self.joints)]
-        for k, body in enumerate(self.jnt_bodyid):
-            if self.jnt_type[k] == int(JointType.FREE) and self.bodies[body] not in labels:
-                labels[k] = self.bodies[body] or labels[k]
-        return tuple(labels)
+        return labels_of_joints(self.joints, self.jnt_type, self.jnt_bodyid, self.bodies)
 
     @property
     def body_labels(self) -> tuple[str, ...]:
@@ -289,6 +285,24 @@ class Header:
             of = JointType(kind)
             if qpos + of.nq > self.nq or dof + of.nv > self.nv:
                 raise TraceError(f"{name} of the trace has no place in qpos and qvel")
+
+
+def labels_of_joints(
+    joints: Sequence[str], kinds: Iterable[int], owners: Iterable[int], bodies: Sequence[str]
+) -> tuple[str, ...]:
+    """See `Header.joint_labels`.
+
+    Args:
+        joints: Names by id.
+        kinds: `jnt_type`; owners: `jnt_bodyid`, empty if they are not known.
+        owners: See kinds.
+        bodies: Names by id.
+    """
+    labels = [name or f"joint {k}" for k, name in enumerate(joints)]
+    for k, (kind, body) in enumerate(zip(kinds, owners, strict=False)):
+        if kind == int(JointType.FREE) and bodies[body] not in labels:
+            labels[k] = bodies[body] or labels[k]
+    return tuple(labels)
 
 
 def _frozen(value: Any) -> Any:

@@ -26,8 +26,7 @@ START, COMMANDS, ORDER = "start", "commands", "order of ctrl"  # of the run itse
 _SAME = 1e-12
 _MOST = 24  # causes, before all of one quantity are taken together
 _NAMED = 3  # elements of one cause, before they are counted
-CENTRE = "centre of mass"
-_WEIGHT = ("mass", CENTRE, "inertia")
+_WEIGHT = {"mass", "centre of mass", "inertia"}  # what the mass of a geom changes of its body
 _DENSITY = 1000.0  # kg/m³, where an MJCF says none
 _SCALING = {"density": "kg/m³", "mass": "kg"}  # attributes of a geom, and their units
 _PLURALS = {"body": "bodies", "equality": "equalities", "flex": "flexes"}
@@ -128,11 +127,13 @@ def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause,
     refused = _grouped([row for row in rows if row.refused], lambda row: row.title)
     if finer:
         return (*_grouped(able, lambda row: row.title), *refused)
-    weights = [(row.subject, row.where) for row in able if row.kind == "body"]
+    weighed = {
+        (row.where, row.subject) for row in able if row.kind == "body" and row.subject in _WEIGHT
+    }
 
     def change(row: ModelDifference) -> object:
-        moved = row.subject in _WEIGHT and all((of, row.where) in weights for of in _WEIGHT)
-        return (row.kind, row.where) if moved and row.kind == "body" else _change(row)
+        parts = {(row.where, subject) for subject in (row.subject, *_WEIGHT)}
+        return (row.kind, row.where) if row.kind == "body" and parts <= weighed else _change(row)
 
     grouped = _grouped(able, change)
     if len(grouped) > _MOST:
@@ -289,7 +290,7 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
     )
     for cause in causes:
         name, rows = cause.name, cause.differences
-        moved = cause.kind == "body" and len({row.subject for row in rows} & {"mass", CENTRE}) > 1
+        moved = cause.kind == "body" and {row.subject for row in rows} >= _WEIGHT
         scale = "" if moved else scale_of(rows[0])
         shown = [row for row in rows if row.subject == "mass"] if moved else rows
         values = tuple(value for row in shown[: 1 if scale else None] for value in row.values)

@@ -23,9 +23,9 @@ from ...measures import (
 from ...page import Figures
 from ...runs import Trace
 from ..matching import Matched
+from ..series import SCALARS
 
 BALLS = "ball joints"
-_SINGLE = {int(JointType.HINGE): "joint", int(JointType.SLIDE): "slide"}  # kind of a quantity
 # One run, as the quantities that runs are compared by: for each moment k numbers (n, k), in the
 # unit of the quantity.
 Curves = dict[str, Array]
@@ -86,7 +86,7 @@ class Ruler:
         }
         self._single: dict[str, tuple[int, int]] = {}
         for a, b in matched.joints:
-            name, kind = left.header.joint_labels[a], _SINGLE.get(int(model.jnt_type[a]))
+            name, kind = left.header.joint_labels[a], SCALARS.get(JointType(model.jnt_type[a]))
             if name == quantity and kind:
                 self._kinds[name] = kind
                 self._single[name] = int(model.jnt_qposadr[a]), int(matched.right.jnt_qposadr[b])
