@@ -358,6 +358,14 @@ def test_what_an_engine_leaves_out_is_said(tmp_path: Path) -> None:
     engines = ("mujoco", "pybullet")
     found = explained(tmp_path, text, text, engines=engines, quantity="ball", seconds=0.5)
     assert_in(" ".join(found.notes), "pybullet: contacts begin at a distance of 0", "ball_shape")
+    # MuJoCo raises both to two timesteps: another value, the same motion.
+    stiff = [
+        ARM.replace('name="ball_shape"', f'name="ball_shape" priority="1" solref="{time} 1"')
+        for time in ("0.0005", "0.001")
+    ]
+    found = explained(tmp_path, *stiff, seconds=0.2)
+    assert_in(" ".join(found.notes), "mujoco: a contact's solref below two timesteps acts")
+    assert found.gap == 0.0
 
 
 def test_the_robot_of_a_urdf_is_that_of_the_mjcf():

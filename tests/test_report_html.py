@@ -288,7 +288,10 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     comparison, one, two, _ = made
     worst = max((a for a in comparison.agreements if a.kind == "joint"), key=lambda a: a.max)
     gap = Deviation("rad", worst.max, worst.at, worst.rms, worst.settled)
-    contact = Figures(name="contact", values=None, share=0.5, gap=1e-8 * gap.worst, is_still=False)
+    contact = Figures(
+        name="contact", values=None, without="nothing touches", share=0.5, alone=None,
+        gap=1e-8 * gap.worst, is_still=False,
+    )  # fmt: skip
 
     def row(name: str, share: float) -> Figures:
         values = ((name, "kp 998.2", "its motors"),)
@@ -380,6 +383,23 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         (explanation_of(hold, negligible=1.0), "^The two sides move alike"),
     ):
         assert re.search(says, answer(explanation)), says
+    # An integrator that parts the sides only where nothing touches says what it does with contact.
+    chosen = with_figures(contact, name="integrator", values=("rk4", "its own"), without="euler")
+    chosen = with_figures(chosen, share=0.2, alone=0.013)
+    beyond = [with_figures(row, share=share) for row, share in zip(rows, (1.4, 0.1), strict=True)]
+    for explanation, says in (
+        (
+            with_figures(located, found_in=(contact, chosen)),
+            "As the sides come, with contact, euler takes away 1.3 % of the gap.",
+        ),
+        (
+            with_figures(located, found_in=(chosen,)),
+            "† Integrator: this part goes when both sides run with euler, as far as they can",
+        ),
+        (explanation_of(hold, shares=beyond), "A part beyond 100 % says that the gap cannot be"),
+    ):
+        texts = [block.text for block in causes(explanation) if isinstance(block, Text)]
+        assert sum(says in text for text in texts) == 1, says
     tiny = [with_figures(row, **dict.fromkeys(("share", "alone", "last"), 2e-4)) for row in rows]
     for explanation, column, cells in (
         (explanation_of(hold, floor=0.2 * worse.gap), 3, ["60.0 %", "< 20.0 %", "50.0 %*"]),

@@ -548,10 +548,19 @@ def test_an_integrator_is_found_behind_contact_too() -> None:
     """Contact hides it: it is tried again once contact is left out."""
     raw = sm.load("so101/scene").replace()
     raw.raw.opt.integrator = 1  # RK4, which PyBullet does not have
-    result = explain(raw.replace(), quietly("so101/scene"), HOLD, uncertain=None)
+    left, right = raw.replace(), quietly("so101/scene")
+    result = explain(left, right, HOLD, uncertain=None)
     assert [part.name for part in result.found_in] == ["contact", "integrator"]
-    assert result.found_in[1].share > 0.1
+    chosen = result.found_in[1]
+    assert chosen.share > 0.1
     assert result.unexplained == pytest.approx(0.0, abs=1e-9)
+    # By itself, where the arm touches, it takes away another part: by hand.
+    gaps = [
+        np.abs(path_of(model, HOLD) - path_of(right, HOLD)).max()
+        for model in (left, left.replace(integrator=chosen.without))
+    ]
+    assert chosen.alone == pytest.approx((gaps[0] - gaps[1]) / result.gap, abs=1e-6)
+    assert chosen.alone < 0.9 * chosen.share
 
 
 @pytest.mark.usefixtures("bullet")

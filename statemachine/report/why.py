@@ -10,7 +10,17 @@ import numpy as np
 
 from ..compare.labels import lacking
 from ..installed import DEFAULT
-from ..measures.text import NONE, capital, few, percent, quantity, sentence, short_time, significant
+from ..measures.text import (
+    NONE,
+    capital,
+    few,
+    listed,
+    percent,
+    quantity,
+    sentence,
+    short_time,
+    significant,
+)
 from ..page import Block, Figures, Items, Page, Section, Table, TableCell, Text
 from . import template
 from .template import if_true
@@ -19,9 +29,10 @@ if TYPE_CHECKING:
     from ..compare.why import Explanation
 
 _SHOWN = 12  # rows; the rest is folded away
-_WIDE = 18  # characters of a value
+_WIDE = 24  # characters of a value
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
+_MOST = 0.5  # of the gap: where more is localised between engines, what to do next is said
 _INTERACTS = 0.5  # of the gap, between alone and last: it is said with the cause
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 _OFF = ("place", "anchor", "com", "axis")
@@ -48,7 +59,9 @@ ANSWERS = {
     "bare": "{cause}: {part} of the {gap}",
     "hidden": "The differences do not cause the {gap}: without them it is {brought}",
     "masked": "No single difference causes the {gap}: the differences act together",
-    "located": "{part} of the {gap} comes from {cause}, which no setting makes the same",
+    "located": (
+        "{part} of the {gap} comes from {cause}, which no setting that both read makes the same"
+    ),
     "still": "{part} of the {gap} goes without {cause}, but so does the motion: a weak hint",
     "switched": "{part} of the {gap} comes from {cause} (left: {left}, right: {right})",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
@@ -92,12 +105,13 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         changes=steps(result),
         refused=", ".join(refused[:4]) if stays and refused else None,
         engines=if_true(stays and not refused and len(engines) > 1),
+        between=if_true(not stays and result.located > _MOST and len(engines) > 1),
         files=if_true(stays and not refused and len(engines) == 1),
         both=if_true(min(len(engines), len(files)) > 1),
         parts=three_parts(result)[1:],
         holds=result.is_explained and not (result.is_rounding and refused),
         answer=answer(result),
-        three=None if result.is_rounding else parts(result),
+        three="" if result.is_rounding else f" {parts(result)}.",
     )
 
 
@@ -191,13 +205,16 @@ def causes(result: Explanation) -> list[Block]:
         more=few([row.name for row in hardly], 6) or None,
         located=[
             block
-            for place in result.found_in  # left out on both sides, or an integrator
+            for at, place in enumerate(result.found_in)  # left out on both sides, or an integrator
             for block in template.blocks(
                 "why_located",
                 cause=None if place.values or place.is_still else place.name,
                 idle=place.name if place.is_still and not place.values else None,
                 still=result.quantity,
-                integrator=place.values and place.without,
+                integrator=None if at else place.values and place.without,
+                before=listed([row.name for row in result.found_in[:at]]) or None,
+                then=place.values and place.without,
+                alone=percent(place.alone),
             )
         ],
         hardly_move=", ".join(result.still) or None,
@@ -209,6 +226,7 @@ def causes(result: Explanation) -> list[Block]:
         no_figure=if_true(
             method != "nothing" and any(None in (row.alone, row.last) for row in able)
         ),
+        beyond=if_true(any(abs(row.share or 0.0) > 1.0 + _NO_PART for row in able)),
         redundant=", ".join(result.redundant) or None,
         refused_too=if_true(refused),
         refused=Items(refused),
@@ -273,7 +291,8 @@ def _table(result: Explanation, able: Sequence[Figures], small: Sequence[Figures
     """The differences, the largest share first; the small ones, without an effect, are one row."""
     rows = [_row(result, row) for row in able if row not in small]
     for place in result.found_in:  # what a feature takes away when it is left out on both sides
-        explains = TableCell(f"{percent(place.share)}*", share=place.share)
+        mark = "†" if place.values else "*"
+        explains = TableCell(f"{percent(place.share)}{mark}", share=place.share)
         rows.append((capital(place.name), *(place.values or (NONE, NONE)), explains, NONE, NONE))
     if small:
         share = sum(row.share or 0.0 for row in small)

@@ -33,7 +33,7 @@ UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
 _MASKED = 2.0  # of the gap: a cause with more has others against it
 _STILL = 1e-3  # [rad or m] over a whole run
 NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
-_LEFT_OUT = "{engine}: {what}. No cause has that, and the gap may come from it, in part"
+_LEFT_OUT = "{engine}: {what}, which the table does not show"
 _NOT_RUN = "no set of causes with it could be run"
 
 
@@ -235,7 +235,7 @@ def explain(
         _LEFT_OUT.format(engine=model.backend, what=what)
         for model in (left, right)
         for what in room(engine_of(model.backend)).ignored(model)
-        if not nothing and "integrator" not in what  # which is a cause
+        if "integrator" not in what  # which is a cause
     ]
     explained, located, unexplained = _parts(gap, brought, rest, nothing)
     # Each of them explains nearly all alone, and next to nothing after the others.
@@ -272,7 +272,11 @@ def explain(
         unmatched=matched.only,
         missing=missing_parts(left, right),
         # What a function of the user's may stumble over.
-        notes=(*matched.notes, *(order_of_joints(matched) if scenario.own else ()), *left_out),
+        notes=tuple(
+            dict.fromkeys(
+                (*matched.notes, *(order_of_joints(matched) if scenario.own else ()), *left_out)
+            )
+        ),
         still=_still(listed, left, trials.traces[0]),
         touch=None if nothing else trials.touch(quantity),
         moments=len(trials.ruler.time),
@@ -361,7 +365,7 @@ def _shares(
             unit="",
             share=part.share,
             error=0.0,
-            alone=None,
+            alone=part.alone,
             last=part.share,
             note="",
             place=None,

@@ -288,18 +288,20 @@ def locate(
         name: What was left out, or chosen.
         without: What a run without it is, in words; of an integrator, the one that was chosen.
         values: The integrators of the two sides as they come; None of what was left out.
-        share: The part of the gap that went.
+        share: The part of the gap that went; alone: without what was left out before, of an
+            integrator; None if that could not be run, and of what was left out.
         gap: What was left of it, in the unit of the gap.
         is_still: Whether nothing moves any more, so that there can be no gap.
         _side: Of a setting of one side, chosen while nothing was left out, that side: "left" or
             "right"; "" of the others.
     """
     rows: list[Figures] = []
-    without, integrator = frozenset[str](), ""
+    without, integrator, start = frozenset[str](), "", left
+    enough = max(_NOTHING * gap, bound)
     able = filter(trials.can_be_without, FEATURES)
     # None: an integrator is chosen. A run that was made already is not made again.
     for feature in (None, *(choice for one_able in able for choice in (one_able, None))):
-        if left <= max(_NOTHING * gap, bound):
+        if left <= enough:
             break
         more = without | {feature.name} if feature else without
         choices = [integrator] if feature or integrator else trials.integrators
@@ -308,10 +310,14 @@ def locate(
             for choice in choices
             if (gaps := trials.gaps(brought, more, choice))
         ]
-        rest, best = min(rests, default=(left, ""))
+        # Of those that leave nothing none is better.
+        rest, best = min(
+            rests, key=lambda pair: (max(pair[0], enough), pair[1]), default=(left, "")
+        )
         setting = len(trials.selects) == 1 and not more
         if left - rest <= (least if setting else _LEAST) * left:
             continue
+        alone = None if feature else trials.gaps(brought, integrator=best)
         without, integrator = more, best
         rows.append(
             Figures(
@@ -319,6 +325,7 @@ def locate(
                 without=feature.without if feature else best,
                 values=None if feature else (trials.integrator_of(0), trials.integrator_of(1)),
                 share=(left - rest) / gap,
+                alone=(start - getattr(alone[quantity], measure)) / gap if alone else None,
                 gap=rest,
                 is_still=trials.extent(quantity, without) < _STILL * trials.extent(quantity),
                 _side=("left", "right")[trials.selects[0]] if setting else "",

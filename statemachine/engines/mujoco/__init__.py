@@ -67,6 +67,16 @@ class MujocoEngine(RawEngine):
             rows.append(np.concatenate((data.qpos, data.qvel)))
         return np.array(rows)
 
+    def ignored(self, model: Model) -> list[str]:
+        """Time constants of contacts that it raises (its flag refsafe)."""
+        raw, off = model.compiled, require("mujoco").mjtDisableBit.mjDSBL_REFSAFE
+        if raw is None or raw.opt.disableflags & int(off):
+            return []
+        times = raw.geom_solref[:, 0]
+        raised = int(((times > 0) & (times < 2 * raw.opt.timestep)).sum())
+        what = f"a contact's solref below two timesteps acts as two (refsafe; geoms: {raised})"
+        return [what] if raised else []
+
     def measurement(self, question: str) -> Callable[..., Any] | None:
         """A function of `conventions`."""
         from . import conventions
