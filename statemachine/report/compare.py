@@ -72,7 +72,7 @@ def page(
         said: What stood in for a run, line by line.
         witness: What a third party says of both sides' fingertips, if asked.
         explanation: What two sides differ in, and what each of it explains, if that was asked.
-        why_not: Why there is none, as a sentence.
+        why_not: Why there is none, or what to ask next, as a sentence.
         models: The differences between what the engines make of the model, if asked.
         command: What makes the page again.
         run: How two sides were run, if sides were given.
@@ -82,7 +82,8 @@ def page(
     events, says = events_of(comparison), comparison.left.trace.header.says
     notes = [sentence(line) for line in (*said, *comparison.notes)]
     both = _over_time(comparison, events, explanation, floor)
-    reasons: list[Block] = [Text(why_not)] if why_not else []
+    note: list[Block] = [Text(why_not)] if why_not else []
+    reasons = note if command else []  # in a terminal it stands at the end, where one reads on
     if explanation is not None:
         reasons = [*why.causes(explanation), *why.three_parts(explanation)]
     emulated_parts = emulated(comparison)
@@ -108,6 +109,7 @@ def page(
         both,
         *loops(comparison, played),
         *(section for section in sections if section.blocks),
+        *([] if command else note),
     ]
     return Page(
         f"{both.title}: {' and '.join(long_labels(comparison))}",
