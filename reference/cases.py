@@ -57,32 +57,32 @@ class Case:
 def of_model(model: str) -> Iterator[Case]:
     """Every question about a model, on both engines."""
     path = str(MODELS[model])
-    both = ("--model", path, "--backend", "all")
+    both = ("--backend", "all")
     for name in _LESSONS:
         case = f"lesson {name}"
-        command = ("lesson", name, *both, *_LENGTHS.get(name, ()))
+        command = ("lesson", name, "--model", path, *both, *_LENGTHS.get(name, ()))
         yield Case(case, case, (*command, "--json"))
         if name not in {"speed", "time"}:
             yield Case(f"{case}, marks", "", (*command, "--no-questions"))
     for name in _EXPERIMENTS:
-        command = ("compare", name, "--model", path, "--json")
+        command = ("compare", name, path, "--json")
         yield Case(f"compare {name}", "compare", command)
-    compare = ("compare", "hold", "--model", path, "--json")
+    compare = ("compare", "hold", path, "--json")
     yield Case("what explains hold", "why", (*compare, "--why"))
     yield Case("one step of hold", "onestep", (*compare, "--one-step"))
     yield Case("convergence of hold", "converge", (*compare, "--converge"))
     models = ("compare", "--models", path, "--backends", "mujoco", "pybullet", "--json")
     yield Case("what the engines make of it", "models", models)
-    yield Case("fingertip", "fingertip", ("fingertip", *both, "--poses", "20", "--json"))
+    yield Case("fingertip", "fingertip", ("fingertip", path, *both, "--poses", "20", "--json"))
     if model in _AUDITED:
-        yield Case("audit", "audit", ("audit", *both, "--steps", "10", "--json"))
+        yield Case("audit", "audit", ("audit", path, *both, "--steps", "10", "--json"))
     shipped = ROOT / "models" / (f"{path}.xml" if "/" in path else f"{path}/{path}.xml")
     file = path if Path(path).exists() else str(shipped)
     yield Case("robots", "robots", ("robots", file, "--quick", "--json"))
     for engine in ("mujoco", "pybullet"):
         for name in ("waves", "gravity"):
             out = f"{name}-{engine}.npz"
-            run = ("trace", "record", name, "--model", path, "--backend", engine, "-o", out)
+            run = ("trace", "record", name, path, "--backend", engine, "-o", out)
             yield Case(f"trace of {name}, {engine}", "", run, out)
 
 

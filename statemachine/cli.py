@@ -35,12 +35,22 @@ class _Parser(argparse.ArgumentParser):
     def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, args: Any = None, namespace: Any = None
     ) -> Any:
-        """As argparse does it, but words behind an option are taken where words are wanted."""
+        """As argparse does it, but words behind an option are taken where words are wanted.
+
+        What argparse leaves over goes to the positionals that take several words, or have none yet.
+        What still is over is refused here, by the parser that knows its options.
+        """
         found, rest = super().parse_known_args(args, namespace)
-        words = self.get_default("words_in")
-        if words and not any(word.startswith("-") for word in rest):
-            setattr(found, words, [*getattr(found, words), *rest])
-            rest = []
+        if not any(word.startswith("-") for word in rest):
+            for action in self._get_positional_actions():
+                given: Any = getattr(found, action.dest, None)
+                if action.nargs == "*":
+                    setattr(found, action.dest, [*given, *rest])
+                    rest = []
+                elif rest and action.nargs == "?" and given is action.default:
+                    setattr(found, action.dest, rest.pop(0))
+        if rest:
+            self.error(f"unrecognized arguments: {' '.join(rest)}")
         return found, rest
 
     def error(self, message: str) -> NoReturn:
@@ -67,30 +77,20 @@ class _Parser(argparse.ArgumentParser):
                 message += f": {flag} {metavar}"
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
-            known = _flags(_parser(COMMANDS), sys.argv[1:])
+            known = self._option_string_actions
             from .lessons import LESSONS
 
             others = [x.name for x in LESSONS.values() if given.removeprefix("--") in x.defaults]
             if "lesson" in sys.argv and others:
                 message += f"; it is an option of {PROGRAM} lesson {' and '.join(others)}"
             else:
-                message += did_you_mean(given, known, 0.6)
+                plain = given == "--model" and "; type the model without it"
+                message += plain or did_you_mean(given, known, 0.6)
         elif message.startswith("unrecognized arguments: "):
-            message += "; a command that takes one model takes it as --model FILE"
+            option = "--model" in self._option_string_actions
+            message += "; a model is --model FILE" if option else "; this takes no more words"
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
-
-
-def _flags(parser: argparse.ArgumentParser, words: Sequence[str]) -> set[str]:
-    """The options of the command that was typed; of all commands if none was."""
-    found: set[str] = set()
-    for action in parser._actions:
-        found.update(action.option_strings)
-        if isinstance(action, argparse._SubParsersAction):
-            meant = [word for word in words if word in action.choices]
-            for name in meant[:1] or action.choices:
-                found |= _flags(action.choices[name], words)
-    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

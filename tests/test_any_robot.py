@@ -138,7 +138,7 @@ def test_a_force_is_never_read_as_a_place(model: Any) -> None:
 
 def test_what_has_no_servo_is_pointed_to_what_runs_it(model: Any) -> None:
     floating, mixed = model(FLOATING), model(MIXED.format(rest=""), "mixed.xml")
-    says = r"compare {0} --model \S+robot.xml, or statemachine trace record {0} --model"
+    says = r"statemachine compare {0} \S+robot.xml \(on one engine: trace record"
     refused(
         *(
             (errors.BadInputError, says.format(name), partial(lesson, name, floating))
@@ -362,7 +362,7 @@ def no_network(menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch) ->
         ("robot_descriptions:panda_mj_description", 3, "pip install 'statemachine-sim[robots]'"),
     ],
 )
-@pytest.mark.parametrize("command", ["lesson gravity", "compare hold", "trace record hold"])
+@pytest.mark.parametrize("command", ["lesson gravity --model", "compare hold", "trace record hold"])
 def test_a_robot_that_cannot_be_had_is_one_line(
     monkeypatch: pytest.MonkeyPatch,
     here: Cli,
@@ -373,7 +373,7 @@ def test_a_robot_that_cannot_be_had_is_one_line(
     no_network: list[float],
 ) -> None:
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
-    one_line(here(*command.split(), "--model", name), said, code)
+    one_line(here(*command.split(), name), said, code)
     assert no_network == [5.0] * ("downloaded" in said)  # and no further try
 
 
@@ -434,8 +434,8 @@ def test_shapes_inside_each_other_at_the_start_are_told(model: Any) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        "lesson hold --seconds .1",
-        "lesson replay --steps 9",
+        "lesson hold --seconds .1 --model",
+        "lesson replay --steps 9 --model",
         "trace record hold --seconds .1",
         "compare hold --seconds .1",
     ],
@@ -444,7 +444,7 @@ def test_a_start_outside_of_joint_limits_is_told(words: str, model: Any, here: C
     file = model(
         MIXED.format(rest=HOME.replace(".2", f"1.{len(words)}")), "a.xml"
     ).path  # told once
-    assert here(*words.split(), "--model", file).stderr.count(": rail by 0.") == 1
+    assert here(*words.split(), file).stderr.count(": rail by 0.") == 1
 
 
 def test_nothing_is_told_of_shapes_that_touch_or_start_apart(

@@ -71,7 +71,7 @@ def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
 
 def test_fingertip_of_other_models_and_frames(here: Cli, pinocchio: None) -> None:
     here("fingertip", "--site", "baseframe", code=0)
-    scene = ("fingertip", "--model", "so101/scene_box")
+    scene = ("fingertip", "so101/scene_box")
     assert_in(here(*scene, code=0).stdout, "included files read in: 2", "own reading")
     here(*scene, "--witness", "so101", code=0)
 

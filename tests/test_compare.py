@@ -376,7 +376,7 @@ def test_the_command(here: Cli) -> None:
 def test_a_robot_that_stands_still_agrees_with_itself(form: str, here: Cli, tmp_path: Path) -> None:
     file = written(tmp_path / "still.xml", STILL)
     out = tmp_path / ("a.html" if form == "html" else "a.svg")
-    done = here("compare", "fall", "--model", file, f"--{form}", out, code=0)
+    done = here("compare", "fall", file, f"--{form}", out, code=0)
     assert "Traceback" not in done.stderr
     # As it is spelt in the file, or as a page escapes it.
     assert "a$b$c" in out.read_text()

@@ -418,7 +418,7 @@ def test_a_recorded_run_is_played_on_both(files: Path, here: Cli) -> None:
     refused(
         (
             BadInputError,
-            "--seconds is of a run",
+            "seconds is of a run",
             lambda: run_sides(Request((str(path),), sides=sides, seconds=1.0)),
         )
     )

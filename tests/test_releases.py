@@ -368,7 +368,7 @@ class TestReleases:
     def test_between_which_releases_it_changed(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        versions = ("--versions", "3.3.7," + SAME.partition("==")[2], "--model", "so101")
+        versions = ("--versions", "3.3.7," + SAME.partition("==")[2], "so101")
         assert main(["compare", "hold", *versions, "--json"]) == SAYS_NO
         (found,) = json.loads(capsys.readouterr().out)
         assert [found[side]["run"]["backend"] for side in ("left", "right")] == [OLD, "mujoco"]
@@ -393,7 +393,7 @@ class TestReleases:
         monkeypatch.setattr(
             releases, "published", lambda _since: [OLD] * 4 + [SAME] * 3 + ["mujoco"]
         )
-        asked = ("--versions", "3.3.7", "--bisect", "--model", "so101", "--json")
+        asked = ("--versions", "3.3.7", "--bisect", "so101", "--json")
         assert main(["compare", "hold", *asked]) == SAYS_NO
         pairs = [
             (pair["left"]["run"]["backend"], pair["right"]["run"]["backend"], pair["agrees"])

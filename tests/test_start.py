@@ -218,8 +218,8 @@ def test_a_model_whose_file_name_is_no_text_is_refused(cli: Cli, tmp_path: Path)
     path = os.fsencode(tmp_path) + b"/\xff.xml"
     with open(path, "w") as out:
         out.write("<mujoco/>")
-    for command in (["lesson", "state"], ["fingertip"]):
-        one_line(cli(*command, "--model", os.fsdecode(path)), "is not UTF-8")
+    for command in (["lesson", "state", "--model"], ["fingertip"]):
+        one_line(cli(*command, os.fsdecode(path)), "is not UTF-8")
 
 
 @pytest.mark.usefixtures("pinocchio")

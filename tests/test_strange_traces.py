@@ -191,7 +191,7 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     written_all(tmp_path, {"robots/one.xml": text, "elsewhere/empty.txt": ""})
     trace = record(sm.load(one), seconds=0.2, experiment="swing")
     monkeypatch.chdir(other.parent)
-    refused((ModelFileError, "say which it is with --model", lambda: model_file(trace.header)))
+    refused((ModelFileError, "name it behind the trace", lambda: model_file(trace.header)))
     assert model_file(trace.header, beside=one.with_name("t.npz")) == (one, True)
     # Another file of that name here does not take the place of the one that it was.
     for _ in range(2):
@@ -211,9 +211,9 @@ def test_the_command_of_a_played_trace_says_what_was_asked(
     box: Trace, tmp_path: Path, here: Cli
 ) -> None:
     path, out = write(box, tmp_path / "box.npz"), tmp_path / "played.npz"
-    here("trace", "play", path, "--defaults", "engine", "--model", "so101/scene_box", "-o", out)
+    here("trace", "play", path, "so101/scene_box", "--defaults", "engine", "-o", out)
     assert read(out).header.command == (
-        "statemachine trace play box.npz --backend mujoco --defaults engine --model scene_box"
+        "statemachine trace play box.npz so101/scene_box --backend mujoco --defaults engine"
     )
 
 

@@ -171,7 +171,7 @@ def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
         (("damping==1",), "damping must be real numbers; got '=1'"),
         (("damping=",), "damping has an empty value"),
         (("integrator=Euler4",), "no integrator named"),
-        (("model=so101,so102",), "--model says one model"),
+        (("model=so101,so102",), "one model is named"),
         (("model=",), "model has an empty value"),
         (("damping=0:1:20000", "frictionloss=0:1:20000"), "more than a sweep can hold"),
         ({"what": "holt"}, "Did you mean 'hold'"),
@@ -587,7 +587,7 @@ def test_without_an_alarm_a_function_that_hangs_ends_its_process(tmp_path: Path)
 
 def slow_sweep(policy: str, *more: str) -> list[str]:
     """The command of a sweep that takes some seconds."""
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
+    words = ["sweep", f"{policy}:slow", "so101", "--vary", "gain=1:60:60"]
     return [*words, "--seconds", "0.1", "--backend", "mujoco", "--out", "out", *more]
 
 
@@ -681,7 +681,7 @@ def test_cells_that_failed_are_run_again_if_asked(
 ) -> None:
     mended = tmp_path / "mended"
     monkeypatch.setenv("MENDED", str(mended))
-    words = ["sweep", f"{policy}:mended", "--vary", "gain=1:8:8", "--model", "so101", "--json"]
+    words = ["sweep", f"{policy}:mended", "so101", "--vary", "gain=1:8:8", "--json"]
     words += ["--seconds", "0.05", "--backend", "mujoco", "--jobs", "1", "--out", "out"]
 
     def run(*more: str) -> dict[str, Any]:

@@ -200,9 +200,10 @@ def json_of(what: str = "result") -> Row:
     return "--json", "", f"print the {what} as JSON"
 
 
-def model_of(model: str) -> Row:
-    """The option --model."""
-    return "--model", "NAME|FILE", f"the model (default {model})", {"default": model}
+def model_of(says: str = "the model", default: str | None = None) -> Row:
+    """The model, as a word."""
+    says += f" (default {default})" if default else ""
+    return "model", "NAME|FILE", says, {"nargs": "?", "default": default}
 
 
 def seed_of(what: str) -> Row:

@@ -115,10 +115,10 @@ def write_pictures(
 
     Args:
         renderer: From `checked`.
-        options: `plot`, `film` and those of a film; `model` and `menagerie` say what it shows, if
-            not the traces.
+        options: `plot`, `film` and those of a film; `model`, of one trace, and `menagerie` say
+            what it shows, if not the traces.
         traces: One, or the two of a comparison.
-        request: The `compare.Request`; its sides say what a film of theirs shows.
+        request: The `compare.Request`; its sides, or its model, say what a film of it shows.
         comparison: Of the two.
         floor: The chaos floor of the comparison, or None.
     """
@@ -174,7 +174,7 @@ def _model_of(
     from ..runs.header import provenance
 
     known, sides = trace.header.provenance, request.sides if request else ()
-    file = sides[place].path if sides else options.model or known.model_file
+    file = sides[place].path if sides else (request or options).model or known.model_file
     model = load(file, menagerie=options.menagerie)
     return file, model, provenance(model).model_sha256 == known.model_sha256
 
@@ -184,7 +184,7 @@ def _filmed(options: argparse.Namespace, request: Any, place: int, trace: Any) -
     try:
         file, model, same = _model_of(options, request, place, trace)
     except (ModelFileError, UnknownNameError) as error:
-        raise ModelFileError(f"a film needs the model: {error}; name it with --model") from None
+        raise ModelFileError(f"a film needs the model: {error}; name it behind the trace") from None
     if not same:
         complain(
             f"the film shows {file} as it is here; the trace of {trace.header.label} was "

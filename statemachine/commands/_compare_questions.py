@@ -58,7 +58,7 @@ def run_steps(options: argparse.Namespace, request: Any) -> int:
         ),
         (
             options.versions and request.sides,
-            "--versions goes without sides: --model names the file",
+            f"--versions runs one model: {PROGRAM} compare hold FILE --versions {options.versions}",
         ),
     )
     return asked[flag](options, request)
@@ -183,7 +183,7 @@ def explain(options: argparse.Namespace, request: Any, progress: Any) -> Any:
         asked, sides, traces = recorded_sides(request)
     else:
         asked, traces = request.scenario(), ()
-        sides = request.sides or request.on_backends(asked.model)
+        sides = request.both_sides(asked.model)
     left_label, right_label = (side.label for side in sides)
     sides, given = with_options(sides, {**asked.options, **request.options})
     left, right = (side.load() for side in sides)
@@ -235,7 +235,8 @@ def run_models(options: argparse.Namespace) -> int:
         (
             options.what,
             f"--models compares descriptions, and runs nothing: {PROGRAM} compare --models "
-            f"{' '.join(options.what[1:] or ['LEFT', 'RIGHT'])}",
+            f"{' '.join(options.what[1:] or ['LEFT', 'RIGHT'])}; to run something, type "
+            f"{PROGRAM} compare {' '.join([*options.what, *options.models])}",
         ),
         (not 1 <= digits <= 17, f"--digits wants a number from 1 to 17; got {digits}"),
         (options.seed < 0, f"--seed must not be negative; got {options.seed}"),
@@ -324,16 +325,16 @@ def _models(request: Any, traces: Sequence[Any]) -> Any:
 
 def _typed(options: argparse.Namespace, request: Any) -> str:
     """The command as typed, without folders of this machine."""
+    from ..compare.labels import typed_option
     from ..measures.text import command
 
-    words = [PROGRAM, "compare", *(Path(word).name for word in request.what)]
-    words += [side.label for side in request.sides]
+    words = [PROGRAM, "compare", *request.words, *(side.label for side in request.sides)]
+    words += [typed_option(*o) for o in request.options.items() if o[0] != "timestep"]
     if not request.sides and tuple(request.backends) != PAIR:
         words += ["--backends", *request.backends]
     return command(
         words,
         ("--defaults", request.defaults, "model"),
-        ("--model", request.model and Path(request.model).name, None),
         ("--menagerie", request.menagerie and "DIR", None),
         ("--seconds", request.seconds, None),
         ("--timestep", request.options.get("timestep"), None),

@@ -33,7 +33,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_table(
         parser,
         BACKEND,
-        model_of("so101/scene_box"),
+        model_of(default="so101/scene_box"),
         *menagerie(),
         json_of(),
         ("--steps", "N", "of each future (60)", {"default": 60}),

@@ -38,10 +38,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
     parser.description = (
         "Run something on two sides, or open recorded traces, and compare: each quantity\n"
-        "with its tolerance and a verdict. An experiment alone runs on both engines; the\n"
-        "ctrl of one trace is played on the other engine.\n\n"
+        "with its tolerance and a verdict. An experiment alone, or with one FILE, runs on\n"
+        "both engines; the ctrl of one trace is played on the other engine.\n\n"
         "A side is FILE, FILE@ENGINE or FILE@ENGINE:engine (as the engine's own users\n"
         "meet it), and options behind it, such as timestep=0.002 contacts=off:\n"
+        f"  {PROGRAM} compare hold A.xml\n"
         f"  {PROGRAM} compare hold A.xml@mujoco B.urdf@pybullet\n"
         f"  {PROGRAM} compare hold so101 timestep=0.002 so101 timestep=0.001\n"
         f"  {PROGRAM} compare walk.py:policy A.xml B.xml --every 5 --keyframe home\n"
@@ -58,8 +59,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         (
             "what",
             "WHAT",
-            "what is run: an experiment, FILE.py:FUNCTION or a recorded TRACE; then nothing, two "
-            "sides, or a second trace",
+            "what is run: an experiment, FILE.py:FUNCTION or a recorded TRACE; then nothing, a "
+            "model for both engines, two sides, or a second trace",
             {"nargs": "*"},
         ),
         ("--backends", ("A", "B"), "the engines (default mujoco pybullet)", {"nargs": 2}),
@@ -107,7 +108,6 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("comparing descriptions of a robot", questions.OF_MODELS),
     ):
         add_table(parser.add_argument_group(title), *rows)
-    parser.set_defaults(words_in="what")
     add_rules(parser, *RULES)
     shorten_help(
         parser,
@@ -127,7 +127,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 _OF_RUN = (
-    "why quantity html plot film model seconds timestep tolerance uncertainty every keyframe "
+    "why quantity html plot film seconds timestep tolerance uncertainty every keyframe "
     "actuators floor"
 )
 RULES: tuple[Rule, ...] = (
@@ -148,12 +148,12 @@ RULES: tuple[Rule, ...] = (
 
 # As `scenarios.SCENARIOS`, which needs NumPy; a test compares them.
 EXPERIMENTS = {
-    "hold": "go to one pose; a finger meets the floor",
-    "gravity": "servos off: the arm falls onto the floor",
-    "droop": "nobody writes ctrl: the servos hold the arm",
-    "fall": "servos off, nothing can touch",
-    "box": "the jaws hold a box while the arm swings",
-    "waves": "every joint follows waves that a seed draws",
+    "hold": "the servos go to one pose and hold it",
+    "gravity": "actuators off: what can move falls",
+    "droop": "nobody writes ctrl: the servos keep their first targets",
+    "fall": "actuators off, and nothing can touch",
+    "box": "the SO-101 swings with a box in its jaws",
+    "waves": "every actuator follows waves that a seed draws",
 }
 
 
@@ -162,26 +162,10 @@ def experiments() -> str:
     return "\n".join(f"  {name:<9} {says}" for name, says in EXPERIMENTS.items())
 
 
-class _Once(argparse.Action):
-    """An option whose second value would silently replace the first."""
-
-    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
-        """Keep the value, or refuse a second one."""
-        given = getattr(namespace, self.dest)
-        if given is not None:
-            what = (getattr(namespace, "what", None) or ["hold"])[0]
-            parser.error(
-                f"{option_string} is given twice; two models are two sides: "
-                f"{PROGRAM} compare {what} {given} {values}"
-            )
-        setattr(namespace, self.dest, values)
-
-
 def run_options() -> tuple[Row, ...]:
     """Options that change what is run."""
     return (
         DEFAULTS,
-        ("--model", "NAME|FILE", "instead of the experiment's own", {"action": _Once}),
         *menagerie(),
         SECONDS,
         ("--timestep", "S", "length of a step [s]"),
@@ -194,6 +178,10 @@ def request_of(options: argparse.Namespace) -> Any:
     from ..compare import Request, split_words
 
     what, sides = split_words(options.what, options.menagerie)
+    given = {} if options.timestep is None else {"timestep": options.timestep}
+    model = None
+    if len(sides) == 1:  # of both engines
+        model, given, sides = sides[0].file, given | {**sides[0].options}, ()
     _check_sides(options, what, sides)
     names = pairs_of(options.map, "--map")
     if sides:
@@ -205,11 +193,11 @@ def request_of(options: argparse.Namespace) -> Any:
         what=what,
         backends=options.backends or PAIR,
         defaults=options.defaults,
-        model=options.model,
+        model=model,
         menagerie=options.menagerie,
         seconds=options.seconds,
         seed=options.seed,
-        options={} if options.timestep is None else {"timestep": options.timestep},
+        options=given,
         sides=sides,
         names=names,
         every=1 if options.every is None else options.every,
@@ -222,7 +210,6 @@ def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any)
     from ..runs.controllers import is_function
 
     if sides:
-        refuse_given(options, ["model"], "{} goes without sides: each side names its file")
         refuse_given(
             options,
             ["backends"],
@@ -235,9 +222,8 @@ def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any)
             )
         )
     else:
-        map_of = f"{{}} is of two sides: {PROGRAM} compare hold LEFT RIGHT --map NAME=NAME"
-        refuse_given(options, ["map"], map_of)
-        refuse_given(options, PARTS, f"{{}} is of two sides: {PROGRAM} compare hold LEFT RIGHT")
+        example = f"{PROGRAM} compare hold LEFT RIGHT"
+        refuse_given(options, ("map", *PARTS), f"{{}} is of two sides: {example}")
     if not (len(what) == 1 and is_function(what[0])):
         refuse_given(options, ["every"], "{} goes with FILE.py:FUNCTION")
     refuse(
@@ -298,6 +284,7 @@ def _run_compare(
     from ..measures import QUANTITIES, parse_tolerances
     from ..report import compare as report
     from ..report.terminal import progress
+    from ..runs.controllers import is_function
 
     tolerances = parse_tolerances(options.tolerance)
     if request.is_traces and len(request.what) == 2:
@@ -307,6 +294,7 @@ def _run_compare(
     with progress("compare") as bar:
         run = run_sides(request, bar)
     comparison = compare(*run.traces, tolerances=tolerances)
+    with_sides = request.sides or is_function(request.what[0])
     played = (
         compare(run.left, run.played, tolerances=tolerances)
         if run.played is not run.right
@@ -326,7 +314,7 @@ def _run_compare(
     page = report.page(
         comparison,
         said=run.said,
-        run=run if request.sides else None,
+        run=run if with_sides else None,
         played=played,
         **parts,
         **more,
@@ -335,9 +323,9 @@ def _run_compare(
         files.write_page(options, request, run.traces, page)
     files.write_tests(options, [comparison])
     result = {"comparison": comparison, "touches": comparison.touches, **parts}
-    if request.sides:
+    if with_sides:
         result |= {
-            "sides": request.sides,
+            "sides": request.both_sides(""),
             "commands": run.commands,
             "open_loop": comparison if played is None else played,
             "unmatched": run.unmatched,

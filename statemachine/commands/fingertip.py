@@ -22,7 +22,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_table(
         parser,
         BACKEND,
-        model_of("so101"),
+        model_of(default="so101"),
         *menagerie(),
         json_of(),
         ("--poses", "N", "how many (200)", {"default": 200}),

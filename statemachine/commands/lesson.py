@@ -25,7 +25,6 @@ from ._common import (
     complain,
     json_of,
     menagerie,
-    model_of,
     on_each_backend,
     refuse,
     show,
@@ -66,7 +65,8 @@ def _add_lesson(named: Any, lesson: Lesson) -> None:
     rows += lesson.options
     if lesson.plots:
         rows.append(("--plot", "FILE", "write its pictures: .svg, .png or .pdf"))
-    add_table(parser, *rows, model_of(lesson.model))
+    model = f"the model (default {lesson.model})"
+    add_table(parser, *rows, ("--model", "NAME|FILE", model, {"default": lesson.model}))
     parser.set_defaults(run=run, lesson=lesson, plot=None)
 
 

@@ -21,6 +21,7 @@ from ._common import (
     file_name,
     json_of,
     menagerie,
+    model_of,
     refuse,
     resumable,
     shorten_help,
@@ -56,6 +57,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_table(
         parser,
         ("what", "WHAT", "an experiment, or FILE.py:FUNCTION", {"nargs": "?"}),
+        model_of("the model, instead of the experiment's own"),
         ("--vary", "NAME=VALUES", "what changes; see above", REPEATED),
         ("--out", "DIR", "the folder of the dataset; a new one, or to go on"),
         ("--backend", "NAME", "an engine, or all; may be repeated (all)", {"action": "append"}),
@@ -79,7 +81,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     add_table(
         parser.add_argument_group("the run"),
-        ("--model", "NAME|FILE", "instead of the experiment's own"),
         SECONDS,
         ("--keyframe", "NAME", "where a FUNCTION starts"),
         ("--every", "N", "steps for which what a FUNCTION returned holds (1)", {"default": 1}),
@@ -132,8 +133,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_rules(parser, (of_a_report, NEEDS, "report"))
     shorten_help(
         parser,
-        *("what", "vary", "out", "backend", "seeds", "seconds", "samples", "jobs", "report"),
-        *("html", "json"),
+        *("what", "model", "vary", "out", "backend", "seeds", "seconds", "samples", "jobs"),
+        *("report", "html", "json"),
     )
 
 

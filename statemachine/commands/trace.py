@@ -18,6 +18,7 @@ from ._common import (
     complain,
     json_of,
     menagerie,
+    model_of,
     one_line,
     refuse,
     show,
@@ -31,15 +32,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.description = "Everything that a run did, in a file that opens without an engine."
     named = parser.add_subparsers(metavar="action")
     file = ("file", "TRACE", "a file .npz or .parquet")
-    own = ("--model", "NAME|FILE", "instead of the trace's own"), *menagerie()
+    own = model_of("the model, instead of the trace's own"), *menagerie()
     record = (
-        ("what", "EXPERIMENT", "what to do", {"nargs": "?"}),
         (
-            "--controller",
-            "FILE.py[:NAME]",
-            "instead: a function (model, data) -> ctrl, by default named controller",
+            "what",
+            "WHAT",
+            "an experiment, or FILE.py:FUNCTION, called with (model, data) for ctrl",
+            {"nargs": "?"},
         ),
-        ("--keyframe", "NAME", "where a controller starts"),
+        model_of("the model, instead of the experiment's own"),
+        ("--keyframe", "NAME", "where it starts"),
         ENGINE,
         *run_options(),
         _output("WHAT.BACKEND.npz"),
@@ -99,26 +101,18 @@ def run_record(options: argparse.Namespace) -> int:
     """Record, and write."""
     refuse(
         (
-            (options.what is None) == (options.controller is None),
-            f"record what? Either an experiment ({', '.join(EXPERIMENTS)}) or --controller FILE.py",
-        ),
-        (
-            options.what is not None and options.keyframe is not None,
-            f"--keyframe goes with --controller; {options.what} has its own start",
-        ),
+            options.what is None,
+            f"record what? An experiment ({', '.join(EXPERIMENTS)}) or FILE.py:FUNCTION",
+        )
     )
     from ..backends import load
+    from ..compare import Request
     from ..report.terminal import progress
     from ..runs import record_scenario
-    from ..runs.controllers import function_scenario
-    from ..runs.scenarios import scenario
+    from ..runs.controllers import function_file
 
-    asked = (
-        scenario(options.what)
-        if options.what is not None
-        else function_scenario(options.controller, keyframe=options.keyframe)
-    )
-    name = options.what or Path(options.controller.rpartition(":")[0] or options.controller).stem
+    asked = Request((options.what,), keyframe=options.keyframe).scenario()
+    name = function_file(options.what).stem
     target = _target(options.output, f"{name}.{options.backend}.npz")
     model = load(
         options.model or asked.model or "so101/scene",
@@ -132,7 +126,7 @@ def run_record(options: argparse.Namespace) -> int:
             model,
             seconds=options.seconds,
             seed=options.seed,
-            command=_typed(options, "record", *_named(options)),
+            command=_typed(options, "record", options.what),
             defaults=options.defaults,
             options={} if options.timestep is None else {"timestep": options.timestep},
             progress=bar,
@@ -171,7 +165,7 @@ def run_play(options: argparse.Namespace) -> int:
         played = play(
             trace,
             model,
-            command=_typed(options, "play", Path(options.file).name),
+            command=_typed(options, "play", options.file),
             defaults=options.defaults,
             options=trace.header.options,
             progress=bar,
@@ -240,26 +234,18 @@ def _written(trace: Any, target: Path) -> int:
     return 0
 
 
-def _named(options: argparse.Namespace) -> tuple[str, ...]:
-    """What is recorded, as typed, without the folder of a controller."""
-    if options.what:
-        return (options.what,)
-    file, colon, name = options.controller.partition(":")
-    return "--controller", Path(file).name + colon + name
-
-
-def _typed(options: argparse.Namespace, *words: str) -> str:
+def _typed(options: argparse.Namespace, action: str, what: str) -> str:
     """The command that makes this trace again, without paths of this machine."""
+    from ..compare import Request
     from ..measures.text import command
 
-    given = vars(options)
+    given, words = vars(options), Request((what,), model=options.model).words
     return one_line(
         command(
-            [PROGRAM, "trace", *words],
+            [PROGRAM, "trace", action, *words],
             ("--backend", options.backend, DEFAULT if options.picture == "record" else None),
             ("--defaults", options.defaults, "model"),
             ("--keyframe", given.get("keyframe"), None),
-            ("--model", options.model and Path(options.model).name, None),
             ("--seconds", given.get("seconds"), None),
             ("--timestep", given.get("timestep"), None),
             ("--seed", given.get("seed", 0), 0),

@@ -11,17 +11,16 @@ import threading
 from contextlib import suppress
 from typing import Any
 
-from ..errors import BadInputError, TraceError
+from ..errors import TraceError
 from ._common import (
     ENGINE,
-    EXCLUDES,
     PROGRAM,
-    add_rules,
     add_table,
     complain,
     menagerie,
     one_line,
     refuse,
+    refuse_given,
 )
 
 _PORT = 8080
@@ -36,8 +35,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     add_table(
         parser,
-        ("traces", "TRACE", "play this recording; a second one is the ghost", {"nargs": "*"}),
-        ("--model", "NAME|FILE", f"the model (default {_MODEL}; of a recording, its own)"),
+        (
+            "words",
+            "TRACE|FILE",
+            f"the model (default {_MODEL}); or a recording to play, a second one as the ghost, and "
+            "the model if it is not its own",
+            {"nargs": "*"},
+        ),
         ENGINE,
         ("--ghost", "NAME", "another engine, under the same commands, seen through"),
         (
@@ -59,30 +63,41 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("--seconds", "S", "end after so long"),
         *menagerie(),
     )
-    text = "{flag} is for a simulation, and a trace is a recording"
-    add_rules(parser, ("ghost keyframe site", EXCLUDES, "traces", text))
 
 
 def run(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
+    from ..compare.sides import is_trace
     from ..view.server import free_port, require_viser
     from ..view.session import checked_speed
 
     require_viser()
     checked_speed(options.speed)
-    if options.seconds is not None and not 0 < options.seconds < float("inf"):
-        raise BadInputError(f"seconds must be above 0; got {options.seconds:g}")
-    return (_play if options.traces else _simulate)(options, free_port(options.host, options.port))
+    traces = [word for word in options.words if is_trace(word)]
+    models = [word for word in options.words if not is_trace(word)]
+    refuse(
+        (
+            options.seconds is not None and not 0 < options.seconds < float("inf"),
+            f"seconds must be above 0; got {options.seconds}",
+        ),
+        (len(traces) > 2, f"view shows one trace or two; got {len(traces)}"),
+        (len(models) > 1, f"view shows one model; got {' and '.join(models)}"),
+    )
+    port, model = free_port(options.host, options.port), next(iter(models), None)
+    if not traces:
+        return _simulate(options, model or _MODEL, port)
+    of_one = "{} is for a simulation, and a trace is a recording"
+    refuse_given(options, ("ghost", "keyframe", "site"), of_one)
+    return _play(options, traces, model, port)
 
 
-def _simulate(options: argparse.Namespace, port: int) -> int:
+def _simulate(options: argparse.Namespace, name: str, port: int) -> int:
     """A session on one engine or two."""
     from ..backends import load
     from ..drawing import drawing_of
     from ..releases import engine_of
     from ..view.session import LiveSession
 
-    name = options.model or _MODEL
     backends = [name for name in (options.backend, options.ghost) if name]
     models = [load(name, backend=backend, menagerie=options.menagerie) for backend in backends]
     keyframe = _keyframe(options.keyframe, models[0])
@@ -105,25 +120,22 @@ def _interrupts() -> list[int]:
     return noted
 
 
-def _play(options: argparse.Namespace, port: int) -> int:
+def _play(options: argparse.Namespace, traces: list[str], shown: str | None, port: int) -> int:
     """One recording or two."""
     from ..backends import load
     from ..drawing import drawing_of
     from ..runs import model_file, read
     from ..view.session import TraceSession
 
-    refuse((len(options.traces) > 2, f"view shows one trace or two; got {len(options.traces)}"))
-    recording = TraceSession([read(path) for path in options.traces])
+    recording = TraceSession([read(path) for path in traces])
     header = recording.header
-    name = options.model or header.provenance.model_file.removesuffix(".xml")
-    file, same = (
-        (name, True) if options.model else model_file(header, options.menagerie, options.traces[0])
-    )
+    name = shown or header.provenance.model_file.removesuffix(".xml")
+    file, same = (name, True) if shown else model_file(header, options.menagerie, traces[0])
     model = load(file, menagerie=options.menagerie)
     if not same:
         complain(f"shown is {name} as it is here; the trace was recorded with another", 0)
     if model.body_names != header.bodies:
-        raise TraceError(f"the trace is of another model than {name}: say which with --model")
+        raise TraceError(f"the trace is of another model than {name}: name it behind the trace")
     what = f"{header.experiment or 'a run'} of {name}, recorded on {' and '.join(recording.labels)}"
     _serve(options, recording, drawing_of(model), None, port, what)
     return 0

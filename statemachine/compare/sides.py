@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,7 +20,7 @@ from ..engines import room
 from ..errors import BadInputError, StateMachineError, check_name, refuse, shown, unknown_name
 from ..installed import DEFAULT, PAIR
 from ..interface import OPTIONS, Model
-from ..measures.text import listed
+from ..measures.text import command, listed
 from ..models import SUFFIXES as MODELS
 from ..models import resolve
 from ..runs.controllers import function_scenario, is_function
@@ -60,12 +61,16 @@ class Side:
         return resolve(self.file, self.menagerie)
 
     @property
+    def name(self) -> str:
+        """Its file as one types it, without folders."""
+        return Path(self.file).name if Path(self.file).is_file() else self.file
+
+    @property
     def label(self) -> str:
         """As one types it, without folders: "so101@mujoco timestep=0.002"."""
-        file = Path(self.file).name if Path(self.file).is_file() else self.file
         way = ":engine" if self.defaults == "engine" else ""
         options = (typed_option(name, value) for name, value in self.options.items())
-        return " ".join([f"{file}@{self.engine}{way}", *options])
+        return " ".join([f"{self.name}@{self.engine}{way}", *options])
 
     def load(self, **options: Any) -> Model:
         """The Model; `options` are those of an experiment, over which its own win.
@@ -167,7 +172,7 @@ def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side
             name, texts = _split_options(word)
             sides.append(_side(name, menagerie))
         if not sides:
-            raise BadInputError(f"{word} stands before any side: type FILE@ENGINE {word}")
+            raise BadInputError(f"{word} stands before any side: type FILE {word}")
         options = dict(sides[-1].options)
         for text in texts:
             name, value = _option(text)
@@ -257,7 +262,8 @@ class Request:
         what: Name of an experiment, FILE.py:FUNCTION, or one or two files of traces.
         backends: The two engines; of one trace the second that is not its own.
         defaults: What `load` is given.
-        model: Instead of the experiment's own; menagerie: where its name is looked up.
+        model: Instead of the experiment's own, or a trace's; menagerie: where its name is looked
+            up.
         seconds: Instead of the experiment's own time [s].
         seed: Of an experiment that draws something.
         options: For `Model.replace`, on both sides.
@@ -287,6 +293,12 @@ class Request:
         return any(map(is_trace, self.what))
 
     @property
+    def words(self) -> list[str]:
+        """What is run, and the model if one is said, as one types them, without folders."""
+        models = [Side(model).name for model in [self.model] if model]
+        return [*(Path(word).name for word in self.what), *models]
+
+    @property
     def taken(self) -> tuple[str, ...]:
         """A line for each side that has parts of the other's file."""
         others = (("left", "right"), ("right", "left"))
@@ -296,13 +308,13 @@ class Request:
             if side.taken
         )
 
-    def on_backends(self, model: str) -> list[Side]:
-        """The two sides of one model, where only backends were said.
+    def both_sides(self, model: str) -> Sequence[Side]:
+        """The two sides; where none were said, one model on the two backends.
 
         Args:
             model: The experiment's own, where none was said either.
         """
-        return [
+        return self.sides or [
             Side(self.model or model, backend, self.defaults, {}, self.menagerie)
             for backend in self.backends
         ]
@@ -333,50 +345,59 @@ def is_trace(word: str) -> bool:
 def split_words(
     words: Sequence[str], menagerie: str | None = None
 ) -> tuple[tuple[str, ...], tuple[Side, ...]]:
-    """What is to be run, and the two sides; no sides where only the first was said.
+    """What is to be run, and the sides: two, or one of a model without an engine, or none.
 
     Args:
-        words: As typed behind `compare`.
+        words: As typed behind `compare`, at least one.
         menagerie: A menagerie folder to look names up in.
 
     Raises:
-        BadInputError: Sides without an experiment, one side, or more than two.
+        BadInputError: Sides without an experiment, one side of an engine, or more than two.
         StateMachineError: As `parse_sides` does.
     """
-    what, rest = tuple(words[:1]), words[1:]
-    runs = bool(what) and (what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0]))
-    is_side = bool(what) and not runs and _is_side(what[0], menagerie)
-    files = [word for word in rest if _is_file(word)]
-    traces = [word for word in rest if is_trace(word)]
-    if files and traces:
-        raise BadInputError(
-            f"{traces[0]} is a recorded run, not a side; it is played on two sides as in: "
-            f"statemachine compare {traces[0]} {files[0]} {_another([Side(files[0])])}"
-        )
-    if files and not runs and not is_side:
-        raise unknown_name("experiment", what[0] if what else "", SCENARIOS)
-    if traces or any(word in SCENARIOS for word in rest) or not (runs or is_side):
-        return tuple(words), ()  # two traces, or nothing that can be compared
-    if is_side:
-        alone = tuple(parse_sides(words, menagerie))
-        words = [*words, *([_another(alone)] if len(alone) == 1 else [])]
-        typed = " ".join(f"'{word}'" if " " in word else word for word in words)
-        named = " ".join(word for word in words if "=" not in word)
-        raise BadInputError(
-            f"two sides need something to do first: statemachine compare hold {typed} runs an "
-            f"experiment ({', '.join(SCENARIOS)}) or FILE.py:FUNCTION on both; "
-            f"statemachine compare --models {named} lists what the files differ in"
-        )
-    sides = tuple(parse_sides(rest, menagerie))
-    if len(sides) == 2 or not (sides or is_function(what[0])):
-        return what, sides
-    typed = f"statemachine compare {what[0]} {' '.join(rest) or 'so101@mujoco'}"
-    if len(sides) > 2:
-        raise BadInputError(
-            f"{len(sides)} sides, {listed([side.label for side in sides])}: compare takes two"
-        )
-    said = "one side only: name the other" if sides else f"{what[0]} runs on two sides"
-    raise BadInputError(f"{said}, as in: {typed} {_another(sides)}")
+    size = len([*takewhile(is_trace, words)]) or 1
+    what, rest = tuple(words[:size]), words[size:]
+    runs = what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0])
+    is_side = not runs and _is_side(what[0], menagerie)
+    for trace in filter(is_trace, rest):
+        raise BadInputError(f"{trace} is a recorded run: type statemachine compare {trace} FILE")
+    if rest and not (runs or is_side):
+        raise unknown_name("experiment", what[0], SCENARIOS)
+    if any(word in SCENARIOS for word in rest) or not (runs or is_side):
+        return tuple(words), ()  # nothing that can be compared
+    rest = words if is_side else rest
+    sides = parse_sides(rest, menagerie)
+    alone = len(sides) == 1 and sides[0].file == _split_options(rest[0])[0]
+    other = next(name for name in reversed(PAIR) if not sides or name != sides[0].engine)
+    another = [f"{side.file}@{other}" for side in sides if len(sides) == 1]
+    named = command(word for word in (*rest, *another) if "=" not in word)
+    run = ["hold" if is_side else what[0], *rest, *([] if alone else another)]
+    typed = command(["statemachine", "compare", *run])
+    refuse(
+        (
+            is_side,
+            f"compare what? {typed} runs an experiment ({', '.join(SCENARIOS)}) or "
+            f"FILE.py:FUNCTION; statemachine compare --models {named} lists what the files "
+            "differ in",
+        ),
+        (
+            size > 1 and sides and not alone,
+            "two traces have their own sides; a model is one FILE",
+        ),
+        (
+            len(sides) > 2,
+            f"{len(sides)} sides, {listed([side.label for side in sides])}: compare takes two",
+        ),
+        (
+            len(sides) == 1 and not alone,
+            f"one side only: name the other, as in: {typed}",
+        ),
+        (
+            not sides and is_function(what[0]),
+            f"{what[0]} runs on a model, as in: {typed} so101",
+        ),
+    )
+    return what, tuple(sides)
 
 
 def _is_file(word: str) -> bool:
@@ -392,11 +413,3 @@ def _is_side(word: str, menagerie: str | None) -> bool:
         return bool(parse_sides([word], menagerie))
     except StateMachineError:
         return False
-
-
-def _another(sides: Sequence[Side]) -> str:
-    """An example of the side that is missing."""
-    if not sides:
-        return "so101@pybullet"
-    other = next(name for name in reversed(PAIR) if name != sides[0].engine)
-    return f"{sides[0].file}@{other}"

@@ -28,6 +28,7 @@ from ..runs import (
     shipped,
     start_of,
 )
+from ..runs.controllers import is_function
 from ..runs.drive import Progress, check_length, part_of, silent, steps_in
 from ..runs.scenarios import SCENARIOS, Controller, Scenario
 from .alike import (
@@ -41,7 +42,7 @@ from .alike import (
 )
 from .labels import files_apart, labels_of, lacking
 from .matching import Matched, missing_parts
-from .sides import Request, Side, is_trace
+from .sides import Request, Side
 
 Loop = Literal["the same", "its own", "recorded", "more than ctrl"]
 
@@ -108,7 +109,7 @@ def prepare_sides(
     """
     trace = read(request.what[0]) if request.is_traces else None
     scenario = recorded_scenario(trace) if trace else request.scenario()
-    sides = request.sides or request.on_backends(scenario.model)
+    sides = request.both_sides(scenario.model)
     given = {**scenario.options, **request.options}
     left, right = models = [side.load(**given) for side in sides]
     matched = match_sides(sides, left, right, request.names)
@@ -190,7 +191,8 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
             raise BadInputError("compare takes one experiment, or one or two traces")
         if request.is_traces:
             return _opened(request, progress)
-        if request.what[0] not in SCENARIOS and Path(request.what[0]).is_file():
+        is_known = request.what[0] in SCENARIOS or is_function(request.what[0])
+        if not is_known and Path(request.what[0]).is_file():
             raise BadInputError(
                 f"{request.what[0]!r} is not a trace: a trace ends in .npz or .parquet"
             )
@@ -204,14 +206,14 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
         return _with_recorded(request, progress)
     left_run, right_run = (
         rerun.record(
-            command="" if request.sides else _command(request, rerun.model.backend),
+            command=_command(request, rerun.model.backend),
             progress=part_of(progress, 0.35 * k, 0.35),
         )
         for k, rerun in enumerate(reruns)
     )
     left, right = (rerun.model for rerun in reruns)
     rights, commands = [right_run], _loop(request, left_run, right_run, matched)
-    if commands == "its own" and request.sides:
+    if commands == "its own":
         theirs = in_terms_of_right(left_run, right_run, matched)
         in_open_loop = replayed(theirs, right, reruns[1].defaults, reruns[1].options)
         rights.append(in_open_loop.record(progress=part_of(progress, 0.7, 0.3)))
@@ -247,16 +249,12 @@ def _loop(request: Request, left: Trace, right: Trace, matched: Matched | None) 
 
 def _opened(request: Request, progress: Progress) -> SidesRun:
     """Two traces; or one, and what comes of its ctrl on the other engine."""
-    for word in request.what:
-        if not is_trace(word):
-            hint = " (an experiment runs on both engines alone)" if word in SCENARIOS else ""
-            raise BadInputError(f"{word!r} is not a trace{hint}: a trace ends in .npz or .parquet")
     traces = [read(word) for word in request.what]
     both = len(traces) == 2
     _refuse_of_run(
         request,
-        timestep=both and "timestep" in request.options,
         defaults=both and request.defaults != "model",
+        **dict.fromkeys(request.options, both),
     )
     if both:
         return SidesRun(traces[0], traces[1], traces[1])
@@ -276,7 +274,7 @@ def _opened(request: Request, progress: Progress) -> SidesRun:
 def _with_recorded(request: Request, progress: Progress) -> SidesRun:
     """An experiment of which the package has a recorded run of an engine that is not here."""
     scenario, traces, reruns, said = request.scenario(), [], [], []
-    for side in request.on_backends(scenario.model):
+    for side in request.both_sides(scenario.model):
         try:
             rerun = rerun_of(scenario, side.load(), defaults=side.defaults)
             trace = rerun.record(command=_command(request, side.engine), progress=progress)
@@ -295,15 +293,17 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
 
 
 def _command(request: Request, backend: str) -> str:
-    """The command that records one side of an experiment."""
+    """The command that records one side of an experiment; "" where it cannot say that."""
+    if request.sides or request.every > 1 or {*request.options} - {"timestep"}:
+        return ""
     return command(
-        ["statemachine", "trace", "record", *request.what, "--backend", backend],
+        ["statemachine", "trace", "record", *request.words, "--backend", backend],
         ("--defaults", request.defaults, "model"),
-        ("--model", request.model, None),
         ("--menagerie", request.menagerie and "DIR", None),
         ("--seconds", request.seconds, None),
         ("--seed", request.seed, 0),
         ("--timestep", request.options.get("timestep"), None),
+        ("--keyframe", request.keyframe, None),
     )
 
 
@@ -330,12 +330,10 @@ def recorded_sides(
         both are given.
 
     Raises:
-        BadInputError: There are two traces and two sides.
+        BadInputError: An option is of a run.
         ModelFileError: The model of a trace is not here.
     """
     traces = tuple(read(word) for word in request.what)
-    if len(traces) == 2 and request.sides:
-        raise BadInputError("two traces have their own sides")
     _refuse_of_run(request)
     sides = request.sides or tuple(_side_of(request, k, trace) for k, trace in enumerate(traces))
     if len(sides) == 1:
@@ -387,7 +385,7 @@ def _refuse_of_run(request: Request, **given: bool) -> None:
     }
     refuse(
         *(
-            (wrong, f"--{option} is of a run, and a trace is a run that was made")
+            (wrong, f"{option} is of a run, and a trace is a run that was made")
             for option, wrong in refused.items()
         )
     )

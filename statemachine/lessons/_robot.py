@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import BadInputError, check_name
 from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
 from ..measures.quantities import readings
+from ..measures.text import command
 from ..page import Figures
 from ..runs.robot import carried_by, farther, is_servo, load_at_start, scalar_joint, start_keyframe
 
@@ -199,9 +200,9 @@ def check_servos(model: Model, lesson: str, joint: str | None = None) -> None:
     """Raise BadInputError for a model, or a joint, without a position servo."""
     servos = model.actuator_jntid[is_servo(model)]
     if not servos.size or (joint is not None and model.joint_id(joint) not in servos):
-        robot = f"--model {model.path}"
+        words = command([lesson, str(model.path)])
         raise BadInputError(
             f"no position servo drives {joint or model.path.name}, and this lesson is about "
-            f"servos; without one: statemachine compare {lesson} {robot}, or "
-            f"statemachine trace record {lesson} {robot}"
+            f"servos; without one: statemachine compare {words} (on one engine: trace record "
+            "instead of compare)"
         )

@@ -81,7 +81,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "violet, waits.",
         "Two arms in one place. One turns down towards the floor; the other, in violet, stays "
         "stretched out where both began, for nobody advances it.",
-        "statemachine view --model so101/scene",
+        "statemachine view so101/scene",
         _ARM,
         _to_the_goal,
     ),
@@ -96,7 +96,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "What xpos still says, and in violet what was written into qpos.",
         "Two arms: one stretched out as before the write; the other, in violet, bent down at "
         "shoulder_lift by 0.8 rad, where qpos says that it is, part of it below the floor.",
-        "statemachine view --model so101/scene --paused",
+        "statemachine view so101/scene --paused",
         _ARM,
         lambda: (_poses(_ARM, 1), _poses(_ARM, 1, shoulder_lift=0.8)),
     ),
@@ -104,7 +104,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "After the step from 0.250 s: the arm by site_xpos, and in violet by qpos, 9.95 mm on.",
         "The jaws from close by, twice: the outline in violet, where qpos has the arm, is about "
         "a centimetre ahead of the one that site_xpos tells of.",
-        "statemachine view --model so101/scene --speed 0.1",
+        "statemachine view so101/scene --speed 0.1",
         _ARM,
         _lag,
         near="gripper",
@@ -144,7 +144,7 @@ PICTURES: Mapping[str, RobotPicture] = {
     "time": RobotPicture(
         "After 100 steps, and 0.2 s later by the clock: the second is drawn in violet.",
         "One arm, stretched out. No violet is to be seen: while nobody called step, nothing moved.",
-        "statemachine view --model so101/scene --paused",
+        "statemachine view so101/scene --paused",
         _ARM,
         lambda: (_poses(_ARM, 2, every=100)[1:], _poses(_ARM, 2, every=100)[1:]),
     ),

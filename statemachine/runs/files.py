@@ -128,7 +128,7 @@ def model_file(
             return path, True
     if not candidates:
         raise ModelFileError(
-            f"the trace's model {known.model_file} is not here: say which it is with --model"
+            f"the trace's model {known.model_file} is not here: name it behind the trace"
         )
     return candidates[0], False
 

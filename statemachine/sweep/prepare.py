@@ -69,7 +69,7 @@ def prepared(sweep: Sweep) -> PreparedSweep:
         (not function and sweep.keyframe is not None, f"--keyframe {of_a_function}"),
         (
             varied and sweep.model is not None,
-            "--model says one model and --vary model=… several: leave one out",
+            "one model is named, and --vary model=… says several: leave one out",
         ),
     )
     sweep = dataclasses.replace(
