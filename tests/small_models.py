@@ -127,8 +127,8 @@ FALLING_BAR = """<mujoco><option timestep="0.01" integrator="{integrator}">{flag
 # It starts outside of its limits: at 10 ms what pushes it back is stiff.
 BAR_OUTSIDE = """<mujoco><option timestep="0.01"/><worldbody><body>
   <joint axis="0 1 0" range="30 70" damping="{damping}" armature="1"/>
-  <geom type="capsule" size=".08" fromto="0 0 0 .4 .4 0" density="5"/></body>
-  </worldbody></mujoco>"""
+  <geom type="capsule" size=".08" fromto="0 0 0 .4 .4 0" density="5"/></body></worldbody>
+  <keyframe><key name="down" qpos="0"/><key name="up" qpos="0.9"/></keyframe></mujoco>"""
 
 
 ROTOR = """<mujoco><option timestep="{timestep}" integrator="implicitfast"/><worldbody>

@@ -67,8 +67,12 @@ def test_a_line_breaks_no_name_and_parts_no_figure_from_its_unit(
 ) -> None:
     row = ("bias " * 12, "0.123456789", "0.123456789", "shoulder_lift_joint (limit)", "x y " * 20)
     table = Table(("what", "n", "m", "where", "why"), [row], words=frozenset({0, 3, 4}))
-    terminal.show(Page("t", "o", [table, Text("x" * 77 + " 12 mm")]))
-    assert_in(capsys.readouterr().out, "shoulder_lift_joint", "x\n12 mm\n")
+    narrow = Table(
+        ("a", "b"), [("very_long_name_" * 6, "x " * 31 + "3 kg mm²")], words=frozenset({0, 1})
+    )
+    terminal.show(Page("t", "o", [table, narrow, Text("x" * 77 + " 12 mm")]))
+    out = capsys.readouterr().out
+    assert_in(out, "shoulder_lift_joint", "x\n12 mm\n", "  3 kg mm²\n", "name_very_  ")
 
 
 def test_what_follows_a_heading_is_folded_under_its_words() -> None:

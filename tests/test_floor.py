@@ -15,7 +15,7 @@ from statemachine.compare.convergence import convergence, verdict_of
 from statemachine.compare.matching import match_models
 from statemachine.compare.perturbed import ROUNDING, parse_uncertainty
 from statemachine.compare.why.gap import Ruler
-from statemachine.errors import BadInputError, EndedEarlyError
+from statemachine.errors import BadInputError, EndedEarlyError, EngineWarning
 from statemachine.page import Figures
 from statemachine.report import compare as report
 from statemachine.report.steps import convergence as page
@@ -188,6 +188,8 @@ def test_another_order_of_integration_is_discretisation_and_one_side_twice_no_ga
 ) -> None:
     found = found_of(tmp_path, {"integrator": left}, {"integrator": right})
     assert {each.verdict for each in (*found.whole, *found.before)} == {verdict}
+    text = " ".join(shown(page(found, "fall")).split())
+    assert ("2 of 2 quantities have no gap beyond rounding" in text) == (verdict == "rounding")
 
 
 @pytest.mark.parametrize(
@@ -221,12 +223,12 @@ def test_a_verdict_wants_a_steady_order(
     assert verdict_of(gaps, 1e-9) == (verdict, limit and pytest.approx(limit))
 
 
-@pytest.mark.filterwarnings("ignore:the run starts outside")
 def test_a_start_outside_of_limits_is_unclear_until_the_steps_are_small(tmp_path: Path) -> None:
     texts = [BAR_OUTSIDE.format(damping=damping) for damping in ("1", "0.7")]
     for timestep, verdict in ((0.01, "unclear"), (0.000625, "stays")):
         one, two = (sm.load(written(tmp_path / "m.xml", x), timestep=timestep) for x in texts)
-        found = convergence_of(one, two, 1.0)
+        with pytest.warns(EngineWarning, match="by 0.524; inside with --keyframe up$"):
+            found = convergence_of(one, two, 1.0)
         assert found.whole[0].verdict == verdict
         text = shown(page(found, "fall"))
         assert ("add --timestep 0.0025" in " ".join(text.split())) == found.unclear

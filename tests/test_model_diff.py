@@ -286,6 +286,17 @@ def test_other_frames_of_links_are_no_difference_of_the_robot(tmp_path: Path) ->
     assert result.posed.distance < 1e-15
 
 
+def test_a_joint_without_a_name_is_told_as_one_types_it(tmp_path: Path) -> None:
+    """That of a body that floats is told by nothing: it has one."""
+    text = """<mujoco><worldbody><body name="base"><freejoint{}/><geom size=".1"/><body name="arm">
+      <joint{} axis="0 1 0"/><geom size=".1" pos=".3 0 0"/></body></body></worldbody></mujoco>"""
+    one = written(tmp_path / "one.xml", text.format("", ""))
+    two = written(tmp_path / "two.xml", text.format(' name="root"', ' name="elbow"'))
+    notes = [note for note in compare(one, two).notes if "is taken for" in note]
+    assert len(notes) == 1
+    assert "(--map 'the joint of arm=NAME' says otherwise)" in notes[0]
+
+
 def test_joints_of_other_names(pair: Pair, tmp_path: Path) -> None:
     one, two = pair()
     for old, new in (

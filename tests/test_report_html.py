@@ -332,6 +332,9 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     lead = leading(hold[0])
     tied = (replace(lead, max=lead.max * (1 - 1e-9)), *hold[0].agreements)
     assert subject(replace(hold[0], agreements=tied), explanation_of(hold))[3] is lead
+    twin = replace(tied[0], name="twin", settled=lead.settled * (1 + 1e-9))
+    both = replace(hold[0], agreements=(twin, *hold[0].agreements))
+    assert "joint wrist_flex is still" in headline(both, []).end
     # Of another quantity than any that is compared: named as it is.
     other = said(quantity="box relative to gripperframe")
     assert other.lead.startswith("The box relative to gripperframe is up to 2.58° apart")

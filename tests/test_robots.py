@@ -353,7 +353,7 @@ def test_a_page_of_80_columns() -> None:
         shown(page(Survey("mujoco", rows, (), "w"))) for rows in ((long, ROW, ended), (ROW,))
     )
     assert max(map(len, (many + one).splitlines())) <= 80
-    assert_in(many, "…", "4e-4 h", "refused", "own 1e-16")
+    assert_in(many, "…", "4e-4 → 0", "refused", "own 1e-16")
     (row,) = [line for line in many.splitlines() if line.startswith("tendon")]
     assert row.split() == ["tendon", "3", "3", "3"]
     assert_in(one, "pybullet refuses it: it has a tendon", "pybullet warns: RK4")

@@ -92,11 +92,11 @@ def answers_of_file(
         name: Of the function.
         worlds: The first is the course's own.
     """
-    with engine_watched(worlds[0].model.backend):
-        try:
+    try:
+        with engine_watched(worlds[0].model.backend):
             yield from answers_of(find(load_file(path), name, worlds[0].arguments), worlds)
-        except FaultError as fault:
-            yield fault
+    except FaultError as fault:  # nobody is watched while whoever asked has the fault
+        yield fault
 
 
 def answers_of(function: Function, worlds: Sequence[ExerciseWorld]) -> Iterator[Any | FaultError]:

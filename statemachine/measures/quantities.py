@@ -50,17 +50,17 @@ QUANTITIES = {
     for quantity in (
         Quantity("joint", "rad", "joints", True, True, COUNT, _COUNT_SAYS),
         Quantity("slide", "m", "slides", True, True, 1e-4, "a tenth of a millimetre"),
-        Quantity("tip", "m", "fingertip", True),
+        Quantity("tip", "m", "sites", True),
         Quantity(
-            "tip rotation", "rad", "rotation of the fingertip", True, False, COUNT, _COUNT_SAYS
+            "tip rotation", "rad", "rotation of sites", True, False, COUNT, _COUNT_SAYS
         ),
         Quantity(
             "body", "m", "free bodies", True, True, 1e-3,
-            "a millimetre: what a grasp of a box of centimetres forgives",
+            "a millimetre: chosen for bodies of centimetres (--tolerance body=5mm for larger ones)",
         ),
         Quantity(
             "body rotation", "rad", "rotation of free bodies", True, True, np.radians(1.0),
-            "a degree, which moves the rim of a hand's breadth by 1 mm",
+            "a degree: it moves what is 57 mm from the origin by 1 mm",
         ),
         Quantity("energy", "J", "energy"),
         Quantity("contact", "s", "first touches"),

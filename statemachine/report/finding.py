@@ -80,7 +80,7 @@ def headline(
     )
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
     bands = [b for b in floor.bands if agreement and b.name == agreement.name] if floor else []
-    end = _in_the_end(comparison)
+    end = _in_the_end(comparison, agreement)
     if agreement and bands and bands[0].most >= agreement.max:
         end = ENDS["chance"].format(floor=quantity(bands[0].most, agreement.unit))
     return Headline(capital(lead), causes, end, holds=False)
@@ -124,8 +124,11 @@ def window(comparison: Comparison) -> str:
     return f"the last {SETTLED * comparison.until:.3g} s"
 
 
-def _in_the_end(comparison: Comparison) -> str:
-    """What of the motion is still apart, as a mean over the end, and whether it still changes."""
+def _in_the_end(comparison: Comparison, lead: Agreement | None) -> str:
+    """What of the motion is still apart, as a mean over the end, and whether it still changes.
+
+    Of several that are as far apart it is `lead`, which the headline names already.
+    """
     motion = [a for a in comparison.agreements if QUANTITIES[a.kind].moves]
     differ = [a for a in motion if a.verdict == "differs"]
     known = [a for a in differ if a.settled >= 0]  # what is not a number is on neither side
@@ -133,7 +136,9 @@ def _in_the_end(comparison: Comparison) -> str:
     if not known:
         kind = "alike" if all(a.verdict == "agrees" for a in motion) else "within"
         return "" if differ or not motion else ENDS[kind].format(window=over)
-    most = max(known, key=lambda a: a.settled / (a.tolerance or 1e-300))
+    most = max(
+        known, key=lambda a: (float(f"{a.settled / (a.tolerance or 1e-300):.2g}"), a == lead)
+    )
     last = next(_last(curve, most) for curve in comparison.curves if curve.name == most.name)
     return ENDS["settled" if last is None else "changing"].format(
         window=over,

@@ -33,7 +33,7 @@ _APART = {
     _MOMENT: (1e6, " kg mm²"),
 }
 # ... and of the figures themselves.
-_SHOWN = {unit: _APART[unit] for unit in ("m", "m³", _MOMENT)}
+_SHOWN = {"m": _APART["m"], "m³": _APART["m³"], _MOMENT: (1e6, "")}  # three in a row
 _LAST = {
     "places": "effect",
     "armature": "share",
@@ -107,6 +107,7 @@ def page(result: Figures, sides: Sequence[str], everything: bool = False) -> Pag
     able = dict.fromkeys(name for row in rows for name in row.causes if not row.refused)
     refused = {row.causes[0]: row.refused for row in rows if row.refused}
     notes = [f"{name}: {note}" for name, side in named.items() for note in side.notes]
+    experiment = "waves" if result.left._driven else "gravity"  # what runs on any such robot
     return template.page(
         "model_diff",
         **{f"{name}_name": _name(side) for name, side in named.items()},
@@ -125,7 +126,7 @@ def page(result: Figures, sides: Sequence[str], everything: bool = False) -> Pag
         ],
         all_able=if_true(able and not refused),
         able=len(able) if able and refused else None,
-        command=command(["statemachine", "compare", "hold", *sides, "--why"]) if able else None,
+        command=command(["statemachine", "compare", experiment, *sides, "--why"]) if able else None,
         emulated=next((side.reader.split()[0] for side in named.values() if side._emulated), None),
         refused_too=if_true(refused),
         refused=Items([f"{capital(name)}: {why}." for name, why in refused.items()]),

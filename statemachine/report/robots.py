@@ -131,7 +131,7 @@ def _gap(row: ExaminedModel, other: str, without: bool) -> str:
         "stops": gap.ended,
         "rounding": gap.is_rounding,
     }
-    size = figure(gap.largest) + (" h" if gap.first_order else "")
+    size = figure(gap.largest) + (" → 0" if gap.first_order else "")
     return next((word for word, holds in outcomes.items() if holds), size)
 
 

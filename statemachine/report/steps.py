@@ -55,6 +55,8 @@ def convergence(result: Figures, experiment: str) -> Page:
     """
     at = "" if result.touch is None else short_time(result.touch)
     limited = {limit.verdict for limit in result.before} - {"rounding"}  # else one line says so
+    rounding = sorted((max(g.gaps), g.unit) for g in result.whole if g.verdict == "rounding")
+    most = {unit: quantity(gap, unit) for gap, unit in rounding}  # the largest of each unit
     title = f"The gap with finer steps, before the first touch at {at}"
     return template.page(
         "convergence",
@@ -66,28 +68,31 @@ def convergence(result: Figures, experiment: str) -> Page:
         steps=" and ".join(dict.fromkeys(milliseconds(step, 3) for step in result.steps)),
         before=_limits(result.before, title) if at and limited else None,
         whole=_limits(result.whole, "The gap with finer steps, over the whole run"),
+        rounding=len(rounding) or None,
+        total=len(result.whole),
+        most=listed([*most.values()]),
         touch=if_true(at and len(result._engines) > 1),
         quarter=significant(min(result.steps) / 4) if result.unclear and not at else None,
     )
 
 
 def _limits(limits: Sequence[Figures], title: str) -> Table:
+    """A row for each gap that is more than rounding: with the first steps and the finest three."""
     levels = len(limits[0].gaps)
     return Table.of(
-        limits,
+        [limit for limit in limits if limit.verdict != "rounding"],
         {
             "quantity": lambda limit: name_of(limit.name),
             "the gap is": lambda limit: limit.verdict,
             **{
-                head: lambda limit, k=k: quantity(limit.gaps[k], limit.unit)
-                for k, head in enumerate(_FINER[:levels])
+                _FINER[k]: lambda limit, k=k: quantity(limit.gaps[k], limit.unit)
+                for k in sorted({0, *range(levels - 3, levels)})
             },
             "at 0": lambda limit: quantity(limit.limit, limit.unit),
         },
         title,
         words={"the gap is"},
         emphasis=lambda limit: limit.verdict in ("stays", "in part"),
-        wide=_FINER[1 : levels - 3],
     )
 
 

@@ -65,7 +65,8 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 _CODE = re.compile(r"`([^`\n]+)`")
 # A blank between a figure and its unit or sign.
 _INSIDE = re.compile(
-    r"(?<=\d) (?=(?:%|deg|[mµu]?s|m?m|k?N|J|W|V|kg|rad|Hz|[kMG]?B)(?!\w))|(?<=[<>±]) (?=\d)"
+    r"(?<=\d) (?=(?:%|deg|[mµu]?s|[cm]?m[²³]?|k?N|J|W|V|kg|rad|Hz|[kMG]?B)(?!\w))"
+    r"|(?<=\d kg) (?=m)|(?<=[<>±]) (?=\d)"
 )
 _NO_BREAK = "\ue000"  # of no language, and as wide as a blank
 _WIDTH_PIPED = 80
@@ -171,7 +172,8 @@ def _write(tell: Callable[[str], object], blocks: Sequence[Page | Block]) -> Non
 def _shown(text: str, plain: bool) -> str:
     """A text without what a terminal would take for a command, or has no letters for."""
     text = _CONTROL.sub("?", text)
-    return text.translate(ASCII) if plain else text
+    # Rich breaks lines at a no-break space, too.
+    return non_breaking(text.translate(ASCII) if plain else text).replace("\u00a0", _NO_BREAK)
 
 
 def _unfolded(blocks: Sequence[Page | Block]) -> Iterator[Page | Block]:
@@ -226,8 +228,6 @@ def _coded(text: str, style: str = "") -> RichText:
     """A text in which what stands between backticks is shown as code."""
     from rich.text import Text as RichText
 
-    # Rich breaks lines at a no-break space, too.
-    text = non_breaking(text).replace("\u00a0", _NO_BREAK)
     parts = enumerate(_CODE.split(text))  # every second part is code
     return RichText.assemble(*((part, "cyan" if k % 2 else "") for k, part in parts), style=style)
 
@@ -250,14 +250,16 @@ def _grid(block: Table, plain: bool, width: int) -> RenderableType:
         show_edge=False,
     )
     rows = [[_shown(_loud(c), plain) for c in row] for row in (block.headers, *block.rows)]
-    for k, cells in enumerate(_widths(rows, block.words, width)):
+    widths = _widths(rows, block.words, width)
+    headers, *rows = ([*map(_broken, row, widths)] for row in rows)
+    for k, cells in enumerate(widths):
         grid.add_column(
-            rows[0][k],
+            headers[k],
             justify="left" if k in block.words else "right",
             overflow="fold",
             width=cells,
         )
-    for k, row in enumerate(rows[1:]):
+    for k, row in enumerate(rows):
         grid.add_row(*row, style="bold" if k in block.emphasis else None)
     return grid
 
@@ -267,25 +269,30 @@ def _loud(cell: str) -> str:
     return cell.upper() if getattr(cell, "verdict", "") == "differs" else cell
 
 
-def _widths(
-    rows: Sequence[Sequence[str]], words: Container[int], width: int
-) -> Sequence[int | None]:
-    """Widths of columns that break no number, and of the names at most the longest."""
+def _broken(cell: str, width: int) -> str:
+    """A cell in whose names that are too long there are blanks, if possible behind a sign."""
+    much = rf"(?=\S{{{width + 1}}})"
+    return re.sub(rf"{much}(?:\S{{0,{width - 1}}}[_/.@-]|\S{{{width}}})", r"\g<0> ", cell)
+
+
+def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) -> Sequence[int]:
+    """Widths of columns, which break no number, and of names the longest, as far as they can."""
     from rich.cells import cell_len
 
     columns = list(zip(*rows, strict=True))
     # Words of a column may wrap; numbers must not.
     parts = [" ".join(cells).split() if k in words else cells for k, cells in enumerate(columns)]
-    least = [max(map(cell_len, cells), default=0) for cells in parts]
+    least = [max(1, *map(cell_len, cells)) for cells in parts]
     free = width - sum(least) - 3 * (len(least) - 1)
-    longest = max(range(len(least)), key=lambda k: least[k] * (k in words))
-    if free < 0:
-        least[longest], free = least[longest] + free, 0
-    if least[longest] < min(_NARROWEST, len(rows[0][longest])):
-        return [None] * len(least)
+
+    for _ in range(min(-free, sum(least) - len(least))):  # names give way first, to a width
+        name = [k in words and size > _NARROWEST for k, size in enumerate(least)]
+        least[max(range(len(least)), key=lambda k: (name[k], least[k]))] -= 1
+    free = max(free, 0)
     wants = [max(map(cell_len, cells)) - size for cells, size in zip(columns, least, strict=True)]
-    for k in sorted(range(len(least)), key=wants.__getitem__):  # figures before sentences
-        more = min(wants[k], free)
+    ranked = sorted(range(len(least)), key=wants.__getitem__)  # figures before sentences
+    for taken, k in enumerate(ranked):
+        more = min(wants[k], free // (len(ranked) - taken))
         least[k], free = least[k] + more, free - more
     return least
 
@@ -300,7 +307,7 @@ def _hanging(mark: str | RichText, text: str) -> RenderableType:
     return grid
 
 
-_NARROWEST = 8  # characters of a column whose names are broken
+_NARROWEST = 8  # characters of a column whose names are broken before numbers are
 _PATIENCE = 0.5  # seconds without a bar
 _TRIED, _LONG = 5.0, 20.0  # seconds after which an estimate is made, and one that is said
 _PACE = 0.1  # seconds between two pictures of it

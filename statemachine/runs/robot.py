@@ -115,10 +115,8 @@ TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
 _PART = 0.25  # of its range: how far a servo is sent
 _FARTHEST = {JointType.HINGE: 0.5, JointType.SLIDE: 0.1}  # rad, m; of a wide range or none
 _OUTSIDE = 1e-3  # rad, m; less is how a file rounds its numbers
-_START = (
-    "the run starts outside of joint limits [rad or m]: {joints}. A keyframe in the file can start "
-    "it inside (--keyframe NAME)"
-)
+_START = "the run starts outside of joint limits [rad or m]: {joints}{inside}"
+_INSIDE = "; inside with --keyframe {names}"
 _NO_FORCE = 1e-9  # N·m or N; less is rounding
 _DIGITS = 4  # of what is computed, so that it can be typed and is the same on every engine
 
@@ -132,15 +130,20 @@ def warn_of_start(model: Model, qpos: Array) -> None:
     """
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     joints = np.flatnonzero(scalar & model.jnt_limited)
-    at, (low, high) = qpos[model.jnt_qposadr[joints]], model.jnt_range[joints].T
-    beyond = np.maximum(low - at, at - high)
+    starts = np.array([qpos, *(frame.qpos for frame in model.keyframes)])
+    at, (low, high) = starts[:, model.jnt_qposadr[joints]], model.jnt_range[joints].T
+    here, *there = np.maximum(low - at, at - high).round(6)
     outside = [
-        f"{model.joint_names[joints[k]] or f'joint {joints[k]}'} by {beyond[k]:.3g}"
-        for k in np.argsort(-beyond.round(6), kind="stable")
-        if beyond[k] > _OUTSIDE
+        f"{model.joint_names[joints[k]] or f'joint {joints[k]}'} by {here[k]:.3g}"
+        for k in np.argsort(-here, kind="stable")
+        if here[k] > _OUTSIDE
     ]
     if outside:
-        warnings.warn(_START.format(joints=few(outside, 1)), EngineWarning, stacklevel=3)
+        frames = zip(model.keyframes, there, strict=True)
+        names = [f.name for f, beyond in frames if f.name and beyond.max() <= _OUTSIDE]
+        inside = _INSIDE.format(names=few(names, 3, " or ")) * bool(names)
+        text = _START.format(joints=few(outside, 1), inside=inside)
+        warnings.warn(text, EngineWarning, stacklevel=3)
 
 
 def home(model: Model) -> str | None:

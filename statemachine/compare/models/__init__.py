@@ -160,6 +160,7 @@ def compare(
             joints=len(robot.joints),
             shapes=sum(len(link.shapes) for link in robot.links),
             _mass=mass,
+            _driven=bool(robot.actuators),
             _emulated=bool(engine) and room(engine_of(engine)).emulated,
             notes=robot.notes,
         )

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import check_name
 from ...interface import Array
+from ...measures.text import command
 from ...page import Figures
 from ...rotations import HERE, Placement
 from .records import SCALAR, Robot
@@ -59,10 +60,10 @@ class Matching:
         """What was taken for one without a common name, or is of two kinds."""
         for pair in self.pairs:
             a, b = pair.left.joint, pair.right.joint
-            if pair.by == "place" and a and b and a.name != b.name:
+            if pair.by == "place" and a and b and a.name != b.name and a.kind in SCALAR:
                 yield (
                     f"joint {a.name!r} on the left is taken for {b.name!r} on the right: one kind, "
-                    f"one place, one axis (--map {a.name}=NAME says otherwise)"
+                    f"one place, one axis ({command(['--map', f'{a.name}=NAME'])} says otherwise)"
                 )
             elif a and b and a.kind != b.kind:
                 yield f"joint {a.name!r} is a {a.kind} on the left and a {b.kind} on the right"

@@ -24,7 +24,8 @@ class PybulletEngine(RawEngine):
     # Of the servo law, which the backend solves. The engine's own impulses of the step before can
     # be neither read nor written.
     primes = (
-        "the contact and friction forces that its servos work against; the engine takes nothing"
+        "the contact and friction forces that the servos work against, but not the engine's own "
+        "contact impulses, which cannot be set"
     )
     terms = function_of(".pybullet.as_it_comes:terms")
     left_alone = function_of(".pybullet.as_it_comes:left_alone")
