@@ -433,6 +433,8 @@ def test_words_are_sorted_into_what_and_sides() -> None:
         ("a.npz b.npz", ("a.npz", "b.npz"), []),
         ("a.npz so101 timestep=0.001 so101@mujoco:engine", ("a.npz",), [{"timestep": 0.001}, {}]),
         ("x.py:f so101 so101", ("x.py:f",), [{}, {}]),
+        ("x.py:f so101 timestep=0.001", ("x.py:f",), [{"timestep": 0.001}]),
+        ("a.npz b.npz so101", ("a.npz", "b.npz"), [{}]),
     ):
         found, sides = split_words(words.split())
         assert (found, [dict(side.options) for side in sides]) == (what, options)

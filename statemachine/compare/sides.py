@@ -61,16 +61,11 @@ class Side:
         return resolve(self.file, self.menagerie)
 
     @property
-    def name(self) -> str:
-        """Its file as one types it, without folders."""
-        return Path(self.file).name if Path(self.file).is_file() else self.file
-
-    @property
     def label(self) -> str:
         """As one types it, without folders: "so101@mujoco timestep=0.002"."""
         way = ":engine" if self.defaults == "engine" else ""
         options = (typed_option(name, value) for name, value in self.options.items())
-        return " ".join([f"{self.name}@{self.engine}{way}", *options])
+        return " ".join([f"{_typed(self.file)}@{self.engine}{way}", *options])
 
     def load(self, **options: Any) -> Model:
         """The Model; `options` are those of an experiment, over which its own win.
@@ -295,7 +290,7 @@ class Request:
     @property
     def words(self) -> list[str]:
         """What is run, and the model if one is said, as one types them, without folders."""
-        models = [Side(model).name for model in [self.model] if model]
+        models = [_typed(model) for model in [self.model] if model]
         return [*(Path(word).name for word in self.what), *models]
 
     @property
@@ -335,6 +330,11 @@ class Request:
             known = scenario(what)
             return replace(known, keyframe=self.keyframe or known.keyframe)
         return function_scenario(what, self.every, self.keyframe)
+
+
+def _typed(file: str) -> str:
+    """A model as one types it, without folders."""
+    return Path(file).name if Path(file).is_file() else file
 
 
 def is_trace(word: str) -> bool:
