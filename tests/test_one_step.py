@@ -92,6 +92,7 @@ def test_a_contact_shows_from_the_moment_at_which_it_begins(tmp_path: Path) -> N
     # The ball falls 0.15 m.
     assert found.first.first == pytest.approx((2 * 0.15 / 9.81) ** 0.5, abs=0.01)
     assert_has(found.spikes[0], stage="contact force", where="ball on floor")
+    assert len({spike.at for spike in found.spikes}) == len(found.spikes)
 
 
 def test_a_later_stage_leads_where_no_earlier_one_differs(tmp_path: Path) -> None:

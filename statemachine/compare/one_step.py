@@ -243,7 +243,7 @@ def _spikes(
     """The moments at which the accelerations of a step differ far more than they usually do.
 
     Returns:
-        at: When [s from the start].
+        at: When [s from the start]; each moment once.
         size: The difference of accelerations [unit]; joint: whose.
         stage: The first stage beyond its tolerance there; where: its joint, body or pair.
     """
@@ -263,9 +263,12 @@ def _spikes(
                     joint=measure.names[int(np.argmax(measure.apart[row]))],
                     stage=stage,
                     where=where,
+                    _weight=float(most[row]) / measure.scale,
                 )
             )
-    return tuple(sorted(spikes, key=lambda spike: -spike.size)[:_MOST_SPIKES])
+    # Of a moment the one that is largest beside its usual size: rad/s² and m/s² are not compared.
+    largest = {s.at: s for s in sorted(spikes, key=lambda spike: spike._weight)}
+    return tuple(sorted(largest.values(), key=lambda spike: -spike._weight)[:_MOST_SPIKES])
 
 
 def _notes(matched: Matched, failed: bool) -> tuple[str, ...]:
