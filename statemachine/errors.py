@@ -157,6 +157,13 @@ def refuse(*rows: tuple[object, str], error: Callable[[str], Exception] = BadInp
             raise error(text)
 
 
+def no_attribute(owner: object, name: str, raw: object) -> AttributeError:
+    """That a Model or Data has no such attribute, and whether the engine's own object has it."""
+    kind = type(owner).__name__
+    own = f"; the engine's own is .raw.{name}" if hasattr(raw, name) else ""
+    return AttributeError(f"{kind!r} has no attribute {name!r}{own}", name=name, obj=owner)
+
+
 def check_name(kind: str, name: object, known: Iterable[str]) -> None:
     """Raise UnknownNameError for a name that is not known."""
     if not isinstance(name, str) or name not in known:

@@ -210,7 +210,7 @@ BROUGHT_OVER = [
     (
         equality('<weld name="w" body1="lower" body2="ball" anchor="-0.3 0 0.05"/>'),
         equality('<weld name="w" body1="ball" body2="lower" anchor="0.35 0 -0.05"/>'),
-        "what it keeps of w",
+        "parameters of w",
     ),
 ]
 

@@ -47,7 +47,7 @@ from statemachine.report.html.scene import moments_of, rows_at
 from statemachine.report.notebook import markdown
 from statemachine.report.over_time import CHARTS_SHOWN, charts_of
 from statemachine.report.sides import commanded
-from statemachine.report.why import answer, causes, parts
+from statemachine.report.why import answer, causes, parts, steps
 from statemachine.runs import Trace, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
@@ -404,6 +404,13 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         texts = [block.text for block in causes(explanation) if isinstance(block, Text)]
         assert sum(says in text for text in texts) == 1, says
     tiny = [with_figures(row, **dict.fromkeys(("share", "alone", "last"), 2e-4)) for row in rows]
+    # What is not in the list of changes may move what is not explained.
+    several: Any = {"first": {"joints": worse.first["joints"], "box": worse.first["joints"]}}
+    for shares, missing in (((rows[0], *tiny), True), (rows, False)):
+        changes = steps(explanation_of(hold, shares=shares, **several))
+        texts = [block.text for block in changes if isinstance(block, Text)]
+        assert any("of the gap of the joints stays" in text for text in texts)
+        assert any("another quantity may be missing" in text for text in texts) is missing
     for explanation, column, cells in (
         (explanation_of(hold, floor=0.2 * worse.gap), 3, ["60.0 %", "< 20.0 %", "50.0 %*"]),
         (

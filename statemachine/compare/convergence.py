@@ -106,6 +106,7 @@ def _result(runs: list[tuple[Trace, Trace]]) -> Figures:
             left.header.timestep / left.header.substeps,
             right.header.timestep / right.header.substeps,
         ),
+        _periods=(left.timestep, right.timestep),
         _engines={left.header.backend, right.header.backend},
         until=float(time[-1]),
         touch=touch,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 from numpy.typing import ArrayLike
 
-from ..errors import ClosedDataError, DivergedError, ReadOnlyError
+from ..errors import ClosedDataError, DivergedError, ReadOnlyError, no_attribute
 from .model import Model
 from .options import as_scalar, as_vector, check_writable
 from .records import INPUTS, MOCAP, Array, Contacts, State, StateLayout, read_only
@@ -207,6 +207,11 @@ class Data(Closable, ABC):
             raise ReadOnlyError(
                 f"a Data has no attribute {name!r}; its inputs are {', '.join(_WRITABLE)}"
             )
+
+    if not TYPE_CHECKING:  # a type checker reports what is not there itself
+
+        def __getattr__(self, name: str) -> NoReturn:
+            raise no_attribute(self, name, None if name == "_raw" else getattr(self, "_raw", None))
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a Data is a live simulation: copy or pickle get_state(model, data)")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BadInputError, ReadOnlyError, unknown_name
+from ..errors import BadInputError, ReadOnlyError, no_attribute, unknown_name
 from .options import TINY, checked_options, index_of, unsupported, whole_number
 from .records import Array, Capabilities, Ints, JointType, Keyframe, Sizes, StateLayout, read_only
 
@@ -123,6 +123,11 @@ class Model(ABC):
             f"a Model never changes: use model.replace({name}=…) where that is an option, "
             "or the engine's own model.raw"
         )
+
+    if not TYPE_CHECKING:  # a type checker reports what is not there itself
+
+        def __getattr__(self, name: str) -> NoReturn:
+            raise no_attribute(self, name, vars(self).get("raw"))
 
     def __setstate__(self, facts: dict[str, Any]) -> None:
         Model.__init__(self, **facts)  # a pickle forgets which arrays are read-only

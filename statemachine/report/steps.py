@@ -57,6 +57,8 @@ def convergence(result: Figures, experiment: str) -> Page:
     limited = {limit.verdict for limit in result.before} - {"rounding"}  # else one line says so
     rounding = sorted((max(g.gaps), g.unit) for g in result.whole if g.verdict == "rounding")
     most = {unit: quantity(gap, unit) for gap, unit in rounding}  # the largest of each unit
+    asked = [milliseconds(period, 3) for period in result._periods]
+    unlike = len(set(asked)) > 1
     title = f"The gap with finer steps, before the first touch at {at}"
     return template.page(
         "convergence",
@@ -66,6 +68,9 @@ def convergence(result: Figures, experiment: str) -> Page:
         right=result.labels[1],
         until=result.until,
         steps=" and ".join(dict.fromkeys(milliseconds(step, 3) for step in result.steps)),
+        here=asked[0] if unlike else None,
+        there=asked[1],
+        late=significant(max(result._periods)),
         before=_limits(result.before, title) if at and limited else None,
         whole=_limits(result.whole, "The gap with finer steps, over the whole run"),
         rounding=len(rounding) or None,

@@ -196,6 +196,7 @@ def causes(result: Explanation) -> list[Block]:
         worst=quantity(gap.worst, gap.unit),
         rms=quantity(gap.rms, gap.unit),
         end=quantity(gap.end, gap.unit),
+        explained=result.quantity,
         elsewhere="; ".join(others) or None,
         between=if_true(result.between),
         negligible=_amount(result, result.negligible) if result.is_rounding and small else None,
@@ -242,8 +243,9 @@ def steps(result: Explanation) -> list[Block]:
     """What to change, where, and what is left of the gap with everything changed."""
     if result.is_rounding:
         return []
-    lines, least = [], max(_NO_PART, result.floor / result.gap)
-    for row in _at_least(least, [r for r in result.shares if not (r.note or r.chosen)]):
+    lines = []
+    able = [row for row in result.shares if not (row.note or row.chosen)]
+    for row in _at_least(_NO_PART, able):
         left, right = _values(row)
         place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
         change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
@@ -264,6 +266,8 @@ def steps(result: Explanation) -> list[Block]:
         side=side,
         integrator=integrator,
         left=_amount(result, result.brought) if lines and result.brought is not None else None,
+        quantity=result.quantity,
+        others=if_true(0 < len(lines) < len(able) and len(result.first) > 1),
     )
 
 
@@ -330,7 +334,8 @@ def _at_least(part: float, rows: Sequence[Figures]) -> list[Figures]:
 
 def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
     what, figure = capital(row.name), row.values[0][0] if row.values else ""
-    if len({repr(value[1:]) for value in row.values}) > 1:
+    # A servo's kp stands in two figures, once with another sign.
+    if len({repr(value[1:]).replace("-", "") for value in row.values}) > 1:
         what += f" ({len(row.values)} figures)"
     elif "[" in figure and not row.name.startswith(figure):
         what += f" ({figure})"

@@ -49,7 +49,7 @@ _SUBJECTS: dict[str, dict[str, str]] = {
         ),
         "drive",
     ),
-    "equality": dict.fromkeys(("extra equality", "what it keeps"), "structure"),
+    "equality": {"extra equality": "structure"},
 }
 _UNTOLD = ("filter", "adhesion", "moving surface")  # of which a URDF's reading knows nothing
 _UNTOLD_FIGURES = {"dampingpoly", "stiffnesspoly", "springyield", "gap"}

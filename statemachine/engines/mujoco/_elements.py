@@ -140,7 +140,7 @@ def equalities(sides: Sides) -> Iterator[ModelDifference]:
         if off.max() > _NEAR:
             values = differing(("eq_data",), [wanted[:used]], [there[:used]])
             edits = [("eq_data", (b,), wanted)]
-            yield sides.tell("what it keeps", "equality", a, values, "", edits)
+            yield sides.tell("parameters", "equality", a, values, "", edits)
     yield from sides.extras(
         *("equality", pairs),
         lambda raw, k: zeros(("eq_active0",), raw, k) if raw.eq_active0[k] else (),

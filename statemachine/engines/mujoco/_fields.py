@@ -110,7 +110,7 @@ ROWS: dict[str, tuple[FieldRow, ...]] = {
         FieldRow("active", ("eq_active0",)),
         FieldRow("softness", ("eq_solref", "eq_solimp")),
     ),
-    "kept": (FieldRow("what it keeps", ("eq_data",)),),  # by an equality
+    "kept": (FieldRow("parameters", ("eq_data",)),),  # by an equality
     "pair": (
         FieldRow("friction", ("pair_friction", "pair_dim")),
         FieldRow("softness", ("pair_solref", "pair_solimp", "pair_solreffriction")),
