@@ -247,6 +247,15 @@ def ignored(plan: Plan) -> list[str]:
     return sentences
 
 
+def as_targets(plan: Plan) -> list[str]:
+    """Actuators whose ctrl is no position, and is the target of one on the engine as it comes."""
+    raw = plan.raw
+    others = np.flatnonzero(in_force(raw) & (raw.actuator_biasprm[:, 1] == 0))
+    names = few([str(_name(raw, "actuator", int(a))) for a in others], 3)
+    what = f"ctrl of {names} is a target position there, although the file has no position servo"
+    return [what] if names else []
+
+
 def _sticks(raw: mujoco.MjModel) -> Any:
     """(nactuator,) bool: which actuators act on the contacts of a body alone."""
     return raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_BODY)

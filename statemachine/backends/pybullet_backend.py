@@ -35,7 +35,7 @@ from . import _bullet_urdf as urdf
 from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import Act, DrivenWorld
 from ._bullet_plan import Plan
-from ._bullet_scope import check, ignored, softness
+from ._bullet_scope import as_targets, check, ignored, softness
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._edits import edited, step_length
 from ._hidden_data import HiddenModel
@@ -180,13 +180,18 @@ def load(
     (model._open_world() if there else World(plan, model._kind)).close()
     if defaults == "model":
         _tell(plan, ignored(plan), stacklevel=4)
+    elif targets := as_targets(plan):
+        warnings.warn(f"PyBullet: {targets[0]}", EngineWarning, stacklevel=3)
     return model._started_as(model, checked)
 
 
 def _tell(plan: Plan, settings: list[str], stacklevel: int) -> None:
     """Warn of what is not as the model has it: settings, and friction of the first few pairs."""
-    pairs = few(plan.surfaces.differences, 1)
-    rubbing = [f"it has one friction for each body, a model one for each pair: {pairs}"]
+    pairs = plan.surfaces.differences
+    rubbing = [
+        f"it has one friction for each body, a model one for each pair: {len(pairs)} differ, such "
+        f"as {few(pairs[:1])}"
+    ]
     if differences := "; ".join([*settings, *(rubbing if pairs else [])]):
         warnings.warn(f"PyBullet: {differences}", EngineWarning, stacklevel=stacklevel)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from typing import Any
 
 from ..errors import EndedEarlyError
@@ -129,6 +130,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 _OF_RUN = (
     "why quantity html plot film seconds timestep tolerance uncertainty every keyframe "
     "actuators floor"
+)
+NEXT = (
+    "Next: --why --quantity {name} tells which difference causes this gap, --one-step where in a "
+    "step it begins, --converge whether it vanishes with the timestep."
 )
 RULES: tuple[Rule, ...] = (
     ("measure finer budget jobs", NEEDS, "why"),
@@ -265,10 +270,7 @@ def run(options: argparse.Namespace) -> int:
     request, renderer = request_of(options), files.checked(options)
     if options.one_step or options.converge or options.versions is not None:
         return questions.run_steps(options, request)
-    why_not = (
-        "Next: --why tells which difference causes the gap, --one-step where in a step it begins, "
-        "--converge whether it vanishes with the timestep."
-    )
+    why_not = ""
     if why:
         try:
             return questions.run_why(options, request)
@@ -283,6 +285,7 @@ def _run_compare(
     from ..compare import compare, run_sides, witness
     from ..measures import QUANTITIES, parse_tolerances
     from ..report import compare as report
+    from ..report.finding import leading, name_of
     from ..report.terminal import progress
     from ..runs.controllers import is_function
 
@@ -306,6 +309,7 @@ def _run_compare(
     }
     if all(a.verdict == "agrees" for a in comparison.agreements if QUANTITIES[a.kind].moves):
         why_not = "Next: another experiment, such as gravity or waves, may move what this does not."
+    why_not = why_not or NEXT.format(name=shlex.quote(name_of(leading(comparison).name)))
     more: dict[str, Any] = {
         "why_not": "" if comparison.ended or comparison.agrees else why_not  # the page says it
     }

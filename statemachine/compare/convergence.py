@@ -94,10 +94,14 @@ def _result(runs: list[tuple[Trace, Trace]]) -> Figures:
         for trace in pair
         if "contact_row" in trace and len(trace["contact_row"])
     ]
+    own = [
+        {c.name: float(c.difference.max()) for c in series(coarse, fine, tip)}
+        for coarse, fine in zip(runs[0], runs[-1], strict=True)
+    ]
     touch = min((first for first in firsts if first <= time[-1]), default=None)
     early = time < (np.inf if touch is None else touch - 1e-9)
     whole, before = (
-        tuple(_limit(curve, between, chosen) for curve in curves if chosen.any())
+        tuple(_limit(curve, between, chosen, own) for curve in curves if chosen.any())
         for chosen in (np.ones(len(time), dtype=bool), early)
     )
     return Figures(
@@ -121,12 +125,15 @@ def _limit(
     curve: Series,
     between: list[dict[str, Array]],
     chosen: NDArray[np.bool_],
+    own: list[dict[str, float]],
 ) -> Figures:
     """One quantity at some of the moments (n,), with finer and finer steps.
 
     Returns:
         name, kind, unit: As of an Agreement.
         gaps: The largest gap between the sides, with the steps as given, halved, quartered, ….
+        moved: How far each side is, at most, from its own run with the finest steps; NaN where it
+            has no quantity of that name.
         limit: What the gap tends to for steps of no length; None where that is not known.
         verdict: "rounding" where there is no gap; "discretisation" if it tends to nothing;
             "stays" if it tends to three quarters of the first gap or more; "in part" if it tends
@@ -141,6 +148,7 @@ def _limit(
         kind=curve.kind,
         unit=curve.unit,
         gaps=gaps,
+        moved=[side.get(curve.name, np.nan) for side in own],
         limit=limit,
         verdict=verdict,
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 
 from ..compare import Comparison, Request
@@ -59,13 +60,22 @@ def convergence(result: Figures, experiment: str) -> Page:
     most = {unit: quantity(gap, unit) for gap, unit in rounding}  # the largest of each unit
     asked = [milliseconds(period, 3) for period in result._periods]
     unlike = len(set(asked)) > 1
+    by_verdict = grouped((limit.verdict, limit) for limit in result.whole)
+    lead = _leading(by_verdict)
+    # Of the unit of the first, that which is farthest apart with the steps as given.
+    alike = [limit for limit in result.whole if limit.unit == result.whole[0].unit]
+    far = max(alike, key=lambda limit: limit.gaps[0])
     title = f"The gap with finer steps, before the first touch at {at}"
     return template.page(
         "convergence",
-        _of_the_limit(result, at),
+        _of_the_limit(result, by_verdict, lead, at),
         experiment=experiment,
         left=result.labels[0],
         right=result.labels[1],
+        counts=", ".join(f"{verdict} {len(of_it)}" for verdict, of_it in by_verdict.items()),
+        name=name_of(far.name),
+        left_moved=quantity(far.moved[0], far.unit),
+        right_moved=quantity(far.moved[1], far.unit),
         until=result.until,
         steps=" and ".join(dict.fromkeys(milliseconds(step, 3) for step in result.steps)),
         here=asked[0] if unlike else None,
@@ -101,22 +111,26 @@ def _limits(limits: Sequence[Figures], title: str) -> Table:
     )
 
 
-def _of_the_limit(result: Figures, touch: str) -> Headline:
-    if result.vanishes:
-        verdicts = {limit.verdict for limit in result.whole}
-        return Headline(LEADS["vanishes" if verdicts - {"rounding"} else "rounding"])
-    by_verdict = grouped((limit.verdict, limit) for limit in result.whole)
+def _leading(by_verdict: Mapping[str, Sequence[Figures]]) -> Figures:
+    """The gap that the headline is of: what stays, or what is unclear, whichever is more often."""
     unclear = by_verdict.get("unclear", [])
-    stay = by_verdict.get("stays", []) + by_verdict.get("in part", [])
-    said = stay if len(stay) > len(unclear) else unclear
+    stay = [*by_verdict.get("stays", []), *by_verdict.get("in part", [])]
+    said = (stay if len(stay) > len(unclear) else unclear) or [*chain(*by_verdict.values())]
     same = (limit for limit in said if limit.unit == said[0].unit)
-    most = max(same, key=lambda limit: limit.gaps[-1 if said is stay else 0])
+    return max(same, key=lambda limit: limit.gaps[-1 if said is stay else 0])
+
+
+def _of_the_limit(
+    result: Figures, by_verdict: Mapping[str, Sequence[Figures]], most: Figures, touch: str
+) -> Headline:
+    if result.vanishes:
+        return Headline(LEADS["vanishes" if by_verdict.keys() - {"rounding"} else "rounding"])
     coarse, fine = (quantity(most.gaps[k], most.unit) for k in (0, -1))
     lead = LEADS[most.verdict].format(
         name=name_of(most.name),
         coarse=coarse,
         fine=fine,
-        unclear=len(unclear),
+        unclear=len(by_verdict.get("unclear", [])),
         total=len(result.whole),
     )
     before = {limit.verdict for limit in result.before}

@@ -86,7 +86,10 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     only = lacking(result.unmatched, ("the left", "the right"))
     title, *further = [*missing(result.missing), answer(result)]
     lines = [*map(sentence, (*further, *said, *only, *result.notes)), *proofs(result), result.says]
+    from ..compare.why import UNEXPLAINED
+
     stays = not (result.is_rounding or result.is_explained)
+    hint = result.located > _MOST and result.unexplained <= UNEXPLAINED
     refused = [row.name for row in result.shares if row.note]
     engines = {side.backend for side in result.provenance}
     files = {side.model_sha256 for side in result.provenance}
@@ -104,8 +107,8 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         causes=causes(result),
         changes=steps(result),
         refused=", ".join(refused[:4]) if stays and refused else None,
-        engines=if_true(stays and not refused and len(engines) > 1),
-        between=if_true(not stays and result.located > _MOST and len(engines) > 1),
+        engines=if_true(stays and not (refused or hint) and len(engines) > 1),
+        between=if_true(hint and not result.is_rounding and len(engines) > 1),
         files=if_true(stays and not refused and len(engines) == 1),
         both=if_true(min(len(engines), len(files)) > 1),
         parts=three_parts(result)[1:],
@@ -256,7 +259,7 @@ def steps(result: Explanation) -> list[Block]:
     engines = [
         made.backend
         for label, made in sides
-        if label.endswith(("engine", "defaults")) and made.backend != DEFAULT
+        if (":engine" in label or "engine defaults" in label) and made.backend != DEFAULT
     ]
     return template.blocks(
         "why_changes",

@@ -288,15 +288,15 @@ def locate(
         name: What was left out, or chosen.
         without: What a run without it is, in words; of an integrator, the one that was chosen.
         values: The integrators of the two sides as they come; None of what was left out.
-        share: The part of the gap that went; alone: without what was left out before, of an
-            integrator; None if that could not be run, and of what was left out.
+        share: The part of the gap that went; alone: of an integrator, as the sides come; None if
+            that could not be run, and of what was left out.
         gap: What was left of it, in the unit of the gap.
         is_still: Whether nothing moves any more, so that there can be no gap.
         _side: Of a setting of one side, chosen while nothing was left out, that side: "left" or
             "right"; "" of the others.
     """
     rows: list[Figures] = []
-    without, integrator, start = frozenset[str](), "", left
+    without, integrator = frozenset[str](), ""
     enough = max(_NOTHING * gap, bound)
     able = filter(trials.can_be_without, FEATURES)
     # None: an integrator is chosen. A run that was made already is not made again.
@@ -317,7 +317,7 @@ def locate(
         setting = len(trials.selects) == 1 and not more
         if left - rest <= (least if setting else _LEAST) * left:
             continue
-        alone = None if feature else trials.gaps(brought, integrator=best)
+        alone = None if feature else trials.gaps(frozenset(), integrator=best)
         without, integrator = more, best
         rows.append(
             Figures(
@@ -325,7 +325,7 @@ def locate(
                 without=feature.without if feature else best,
                 values=None if feature else (trials.integrator_of(0), trials.integrator_of(1)),
                 share=(left - rest) / gap,
-                alone=(start - getattr(alone[quantity], measure)) / gap if alone else None,
+                alone=1.0 - getattr(alone[quantity], measure) / gap if alone else None,
                 gap=rest,
                 is_still=trials.extent(quantity, without) < _STILL * trials.extent(quantity),
                 _side=("left", "right")[trials.selects[0]] if setting else "",

@@ -47,12 +47,12 @@ class PybulletEngine(RawEngine):
         return PybulletDials(model.replace(**options), emulated)
 
     def ignored(self, model: Model) -> list[str]:
-        from ...backends._bullet_scope import ignored
+        from ...backends._bullet_scope import as_targets, ignored
         from ...backends.pybullet_backend import PybulletModel
 
-        if not isinstance(model, PybulletModel) or model.defaults == "engine":
+        if not isinstance(model, PybulletModel):
             return []
-        return ignored(model.plan)
+        return (as_targets if model.defaults == "engine" else ignored)(model.plan)
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
         """A function of `conventions`."""
