@@ -690,7 +690,8 @@ def test_causes_are_brought_over(name, tmp_path):
     told = shares(found)
     assert sorted(told) == sorted(causes)
     assert len(told) > 1 or told[causes[0]] == pytest.approx(1.0)
-    rounding = 1e-15 * ("keeps" in causes[0])  # a weld is turned round; else the bits are the same
+    # A weld is turned round; else the bits are the same.
+    rounding = 1e-15 * ("parameters" in causes[0])
     assert_has(found, brought=pytest.approx(0.0, abs=rounding), is_explained=True)
     assert found.unit == "rad" or "rotation" not in how.get("quantity", "")
 

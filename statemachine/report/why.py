@@ -231,7 +231,6 @@ def causes(result: Explanation) -> list[Block]:
             method != "nothing" and any(None in (row.alone, row.last) for row in able)
         ),
         beyond=if_true(any(abs(row.share or 0.0) > 1.0 + _NO_PART for row in able)),
-        redundant=", ".join(result.redundant) or None,
         refused_too=if_true(refused),
         refused=Items(refused),
         impossible=len(result.impossible) or None,
@@ -270,6 +269,7 @@ def steps(result: Explanation) -> list[Block]:
         integrator=integrator,
         left=_amount(result, result.brought) if lines and result.brought is not None else None,
         quantity=result.quantity,
+        redundant=", ".join(result.redundant) or None,
         others=if_true(0 < len(lines) < len(able) and len(result.first) > 1),
     )
 
@@ -340,7 +340,7 @@ def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
     # A servo's kp stands in two figures, once with another sign.
     if len({repr(value[1:]).replace("-", "") for value in row.values}) > 1:
         what += f" ({len(row.values)} figures)"
-    elif "[" in figure and not row.name.startswith(figure):
+    elif ("[" in figure or row.kind == "option") and figure not in row.name:
         what += f" ({figure})"
     explains, alone, last = percent(row.share), percent(row.alone), percent(row.last)
     if row.error and math.isfinite(row.error):

@@ -316,10 +316,11 @@ def _scalings(
     """Attributes that are multiplied so in the right's file: both values, and the place."""
     known = {("density", _DENSITY), *(row[:2] for row in _weights(ours))}
     return [
-        (word, value / scale, value, place)
+        (word, ours, value, place)
         for word, value, place in _weights(theirs)
         if (word, value) not in known
-        and any(word == w and np.isclose(scale * v, value, 1e-6) for w, v in known)
+        for w, ours in known
+        if word == w and np.isclose(scale * ours, value, 1e-6)
     ]
 
 

@@ -11,6 +11,7 @@ from ...engines import room
 from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import JointType, Model
 from ...measures import Deviation
+from ...measures.text import milliseconds
 from ...page import Figures
 from ...releases import engine_of
 from ...runs import Trace
@@ -30,10 +31,15 @@ from .trials import Measure, Trials
 # 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
 ROUNDING = {"rad": 1e-8, "m": 1e-9}
 UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
+_REDUNDANT = 0.1  # of the gap: so much a cause may leave that makes others needless
 _MASKED = 2.0  # of the gap: a cause with more has others against it
 _STILL = 1e-3  # [rad or m] over a whole run
 NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
 _LEFT_OUT = "{engine}: {what}, which the table does not show"
+_PERIODS = (
+    "commands are asked for every {left} on the left and every {right} on the right: what comes of "
+    "that counts as timestep"
+)
 _NOT_RUN = "no set of causes with it could be run"
 
 
@@ -59,7 +65,8 @@ class Explanation(Figures):
         negligible: Gaps below this are taken for rounding, in `unit`.
         floor: The chaos floor, in `unit`: how far the left side is from itself, started and
             commanded anew with rounding, and with what is not known of the start.
-        redundant: Causes of which either one alone closes the gap, and the last of them nothing.
+        redundant: Causes of which each one alone takes away nine tenths of the gap or more, and the
+            last of them less than a tenth.
         impossible: Sets of causes that could not be run.
         unmatched: What only one side has: joints, actuators, by side.
         missing: What one side has nothing of, and the other has: see `missing_parts`.
@@ -237,14 +244,18 @@ def explain(
         for what in room(engine_of(model.backend)).ignored(model)
         if "integrator" not in what  # which is a cause
     ]
+    # What a function of the user's may stumble over.
+    orders = order_of_joints(matched) if scenario.own else ()
+    periods = [milliseconds(model.timestep, 3) for model in (left, right)]
+    asked = [_PERIODS.format(left=periods[0], right=periods[1])] if len(set(periods)) > 1 else []
     explained, located, unexplained = _parts(gap, brought, rest, nothing)
     # Each of them explains nearly all alone, and next to nothing after the others.
     redundant = [
         row.name
         for row in shares
         if row.last is not None
-        and (row.alone or 0.0) > 1.0 - UNEXPLAINED
-        and abs(row.last) < UNEXPLAINED
+        and (row.alone or 0.0) > 1.0 - _REDUNDANT
+        and abs(row.last) < _REDUNDANT
     ]
     progress(1.0)
     return Explanation(
@@ -271,12 +282,7 @@ def explain(
         impossible=divided.impossible,
         unmatched=matched.only,
         missing=missing_parts(left, right),
-        # What a function of the user's may stumble over.
-        notes=tuple(
-            dict.fromkeys(
-                (*matched.notes, *(order_of_joints(matched) if scenario.own else ()), *left_out)
-            )
-        ),
+        notes=tuple(dict.fromkeys((*matched.notes, *orders, *left_out, *asked))),
         still=_still(listed, left, trials.traces[0]),
         touch=None if nothing else trials.touch(quantity),
         moments=len(trials.ruler.time),
