@@ -252,7 +252,7 @@ def as_targets(plan: Plan) -> list[str]:
     raw = plan.raw
     others = np.flatnonzero(in_force(raw) & (raw.actuator_biasprm[:, 1] == 0))
     names = few([str(_name(raw, "actuator", int(a))) for a in others], 3)
-    what = f"ctrl of {names} is a target position there, although the file has no position servo"
+    what = f"ctrl of {names} is a target position there, and no force or speed"
     return [what] if names else []
 
 

@@ -32,7 +32,6 @@ _SHOWN = 12  # rows; the rest is folded away
 _WIDE = 24  # characters of a value
 _SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 _NO_PART = 1e-3  # of the gap: causes below that are one row
-_MOST = 0.5  # of the gap: where more is localised between engines, what to do next is said
 _INTERACTS = 0.5  # of the gap, between alone and last: it is said with the cause
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts the sides
 _OFF = ("place", "anchor", "com", "axis")
@@ -88,10 +87,11 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     lines = [*map(sentence, (*further, *said, *only, *result.notes)), *proofs(result), result.says]
     from ..compare.why import UNEXPLAINED
 
-    stays = not (result.is_rounding or result.is_explained)
-    hint = result.located > _MOST and result.unexplained <= UNEXPLAINED
-    refused = [row.name for row in result.shares if row.note]
     engines = {side.backend for side in result.provenance}
+    stays = not (result.is_rounding or result.is_explained)
+    hint = result.located > UNEXPLAINED >= result.unexplained
+    between = hint and not result.is_rounding and len(engines) > 1
+    refused = [row.name for row in result.shares if row.note]
     files = {side.model_sha256 for side in result.provenance}
     return template.page(
         "why",
@@ -108,7 +108,8 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         changes=steps(result),
         refused=", ".join(refused[:4]) if stays and refused else None,
         engines=if_true(stays and not (refused or hint) and len(engines) > 1),
-        between=if_true(hint and not result.is_rounding and len(engines) > 1),
+        between=if_true(between),
+        soft=if_true(between and DEFAULT in engines),
         files=if_true(stays and not refused and len(engines) == 1),
         both=if_true(min(len(engines), len(files)) > 1),
         parts=three_parts(result)[1:],

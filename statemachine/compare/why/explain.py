@@ -35,7 +35,7 @@ _REDUNDANT = 0.1  # of the gap: so much a cause may leave that makes others need
 _MASKED = 2.0  # of the gap: a cause with more has others against it
 _STILL = 1e-3  # [rad or m] over a whole run
 NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
-_LEFT_OUT = "{engine}: {what}, which the table does not show"
+_LEFT_OUT = "{engine}: {what}"
 _PERIODS = (
     "commands are asked for every {left} on the left and every {right} on the right: what comes of "
     "that counts as timestep"
@@ -312,9 +312,9 @@ def _quantity(
 ) -> str:
     """The quantity that a gap is explained in.
 
-    It is the one that the experiment is about where that is beyond its tolerance, or where none is.
-    Else it is the one that is farthest beyond, among those that are more than rounding and chaos
-    make of a run.
+    It is a body that is held, relative to the tip, where that is beyond its tolerance. Else it is
+    the one that is farthest beyond, among those that are more than rounding and chaos make of a
+    run: a coordinate, as `compare` names it, if one is. Where none is beyond, it is the first.
     """
     ruler = trials.ruler
     robot = frozenset(model.body_names[body] for body in moved_by_actuators(model))
@@ -324,10 +324,11 @@ def _quantity(
         for name, gap in first.items()
         if getattr(gap, measure) > max(ROUNDING[ruler.units[name]], floors.get(name, 0.0))
     }
-    most = max(beyond, key=beyond.__getitem__, default=preferred)
-    if preferred in beyond and (beyond[preferred] > 1 or beyond[most] <= 1):
+    if preferred not in ruler.coordinates and beyond.get(preferred, 0.0) > 1:
         return preferred
-    return most
+    own = {name: beyond[name] for name in ruler.coordinates if beyond.get(name, 0.0) > 1}
+    most = max(own or beyond, key=beyond.__getitem__, default=preferred)
+    return preferred if preferred in beyond and beyond[most] <= 1 else most
 
 
 def _shares(

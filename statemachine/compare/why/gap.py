@@ -166,6 +166,12 @@ class Ruler:
         ]
         return next(iter([*names, *self.units]))
 
+    @property
+    def coordinates(self) -> list[str]:
+        """The quantities that follow from no others, as those that `compare` names first."""
+        places = {self._tip, *map(self._relative_to_tip, self._names)}
+        return [name for name in self.units if name not in places]
+
     def tolerance(self, quantity: str) -> float:
         """What a gap has to be above to matter; of a place, that of a body."""
         return QUANTITIES[self._kinds[quantity]].tolerance or 0.0

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...engines.records import Dials, ModelDifference, Setting
-from ...interface import Model
+from ...interface import JointType, Model
 from ...measures.text import milliseconds, rounded, significant
 from ...page import Figures
 
@@ -131,7 +131,8 @@ class OwnSettings:
             case "gravity" | "timestep":
                 return _word(name, self._dials.model)
             case "servo":
-                return "its motors" if self._actuated else "motors hold"
+                own = "its motors" if _is_driven(self._dials.model) else "motors in all joints"
+                return own if self._actuated else "motors hold"
             case "surfaces":
                 return f"friction {_span(self._dials.frictions)}, hard"
         return self._dials.words[name]
@@ -158,12 +159,19 @@ def _word(name: str, model: Model) -> str:
             return _span(getattr(model, f"dof_{name}"))
         case "servo":
             gains = model.actuator_kp[np.isfinite(model.actuator_kp)]
-            return f"kp {_span(gains)}" if gains.size else "no servos"
+            idle = "" if _is_driven(model) else ", else none"
+            return f"kp {_span(gains)}{idle}" if gains.size else "no servos"
         case "limits":
             return f"soft, {int(model.jnt_limited.sum())} joints"
         case "surfaces" if model.compiled is not None:
             return f"friction {_span(model.compiled.geom_friction[:, 0])}"
     return "of the file"
+
+
+def _is_driven(model: Model) -> bool:
+    """Whether each hinge and slide has an actuator of its own."""
+    kinds = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
+    return set(np.flatnonzero(kinds)) <= set(model.actuator_jntid)
 
 
 def _span(values: Any) -> str:
