@@ -263,8 +263,9 @@ def test_a_tool_frame_that_the_right_calls_otherwise(files: Path, here: Cli) -> 
         tip = {each["name"]: each["max"] for each in found["comparison"]["agreements"]}
         assert tip["gripperframe, position"] < 1e-9
         assert found["only"][1] == {"joint": [], "actuator": [], "site": []}  # found by its place
-        said = "site 'gripperframe' on the left is taken for 'tcp'"
-        assert (said in " ".join(found["unmatched"])) == (not more)
+        said = " ".join(found["unmatched"])
+        assert ("site 'gripperframe' on the left is taken for 'tcp'" in said) == (not more)
+        assert "actuator 'elbow' on the left is taken for 'Gelenk_2' on the right: one joint" in said
 
 
 def test_what_cannot_be_matched_is_said(files: Path) -> None:

@@ -183,7 +183,7 @@ def match_models(left: Model, right: Model, names: Mapping[str, str] | None = No
         actuators=actuators,
         solids=solids,
         only=(only[0], only[1]),
-        notes=(*matching.notes(), *_site_notes(left, right, sites, given)),
+        notes=(*matching.notes(), *_by_place(left, right, sites, actuators, given)),
     )
 
 
@@ -300,14 +300,19 @@ def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
     return tuple(name or f"number {k}" for k, name in enumerate(names) if k not in taken)
 
 
-def _site_notes(left: Model, right: Model, sites: Pairs, given: Mapping[str, str]) -> Iterator[str]:
-    for a, b in sites:
-        name, other = left.site_names[a], right.site_names[b]
-        if name and name != other and given.get(name) != other:
-            yield (
-                f"site {name!r} on the left is taken for {other!r} on the right: one place "
-                f"(--map {name}=NAME says otherwise)"
-            )
+def _by_place(
+    left: Model, right: Model, sites: Pairs, actuators: Pairs, given: Mapping[str, str]
+) -> Iterator[str]:
+    """Sites and actuators that are matched although they go by two names."""
+    for kind, pairs, place in (("site", sites, "place"), ("actuator", actuators, "joint")):
+        names = [getattr(model, f"{kind}_names") for model in (left, right)]
+        for a, b in pairs:
+            name, other = names[0][a], names[1][b]
+            if name and other and name != other and given.get(name) != other:
+                yield (
+                    f"{kind} {name!r} on the left is taken for {other!r} on the right: one {place} "
+                    f"(--map {name}=NAME says otherwise)"
+                )
 
 
 def _moved(values: Array, start: Array, here: Sequence[int], there: Sequence[int]) -> Array:
