@@ -265,7 +265,7 @@ def test_a_tool_frame_that_the_right_calls_otherwise(files: Path, here: Cli) -> 
         assert found["only"][1] == {"joint": [], "actuator": [], "site": []}  # found by its place
         said = " ".join(found["unmatched"])
         assert ("site 'gripperframe' on the left is taken for 'tcp'" in said) == (not more)
-        assert "actuator 'elbow' on the left is taken for 'Gelenk_2' on the right: one joint" in said
+        assert "actuator 'elbow' on the left is taken for 'Gelenk_2' on the right" in said
 
 
 def test_what_cannot_be_matched_is_said(files: Path) -> None:
