@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -139,6 +140,9 @@ def test_the_command_line_shows_the_floor(here: Cli) -> None:
     asked = ("compare", "hold", "--seconds", "0.4")
     assert json.loads(here(*asked, "--json").stdout)["floor"]["runs"] == 4
     assert "chaos" not in here(*asked, "--no-chaos").stdout
+    # Where it is above a tolerance it stands in the table, quantity by quantity.
+    assert re.search("RMS +settled +from, s\n", here(*asked).stdout)
+    assert re.search("settled +from, s +floor\n", here(*asked, "--uncertainty", "5deg").stdout)
 
 
 def test_a_trace_has_a_floor_where_it_is_played_on_two_sides(here: Cli, tmp_path: Path) -> None:

@@ -192,6 +192,10 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
         **(_floor_columns(floor) if floor else {}),
     }
 
+    # Where chance makes more than a tolerance, what it makes of each quantity is seen first.
+    levels = {band.name: band.most for band in floor.bands} if floor else {}
+    noisy = any(levels.get(a.name, 0.0) > a.tolerance for a in agreements if a.kind != "contact")
+
     def table(rows: Sequence[Agreement], title: str, *wide: str) -> Table:
         return Table.of(
             rows,
@@ -199,7 +203,7 @@ def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | N
             title,
             words={"verdict"},
             emphasis=lambda agreement: agreement.verdict == "differs",
-            wide={"tolerance", "floor", "inside from, s", *wide},
+            wide={"tolerance", "RMS" if noisy else "floor", "inside from, s", *wide},
         )
 
     motion, contacts = (
