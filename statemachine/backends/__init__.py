@@ -169,7 +169,7 @@ def load(
     if options and not takes_options:
         loaded = loaded.replace(**options)
     if options.get("contacts", True) and (pairs := few(overlaps_at_start(loaded))):
-        text = f"{path.name}: shapes are inside each other at the start: {pairs}"
+        text = f"{path.name}: shapes are inside each other in the default state: {pairs}"
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded
 

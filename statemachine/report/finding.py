@@ -81,7 +81,7 @@ def headline(
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
     bands = [b for b in floor.bands if agreement and b.name == agreement.name] if floor else []
     end = _in_the_end(comparison, agreement)
-    if agreement and bands and bands[0].most >= agreement.max:
+    if agreement and bands and bands[0].most >= agreement.max and not bands[0].beyond:
         end = ENDS["chance"].format(floor=quantity(bands[0].most, agreement.unit))
     return Headline(capital(lead), causes, end, holds=False)
 

@@ -90,6 +90,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     engines = {side.backend for side in result.provenance}
     stays = not (result.is_rounding or result.is_explained)
     hint = result.located > UNEXPLAINED >= result.unexplained
+    located = {place.name for place in result.found_in}
     between = hint and not result.is_rounding and len(engines) > 1
     refused = [row.name for row in result.shares if row.note]
     files = {side.model_sha256 for side in result.provenance}
@@ -109,7 +110,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         refused=", ".join(refused[:4]) if stays and refused else None,
         engines=if_true(stays and not (refused or hint) and len(engines) > 1),
         between=if_true(between),
-        soft=if_true(between and DEFAULT in engines),
+        soft=if_true(between and DEFAULT in engines and "contact" in located),
         files=if_true(stays and not refused and len(engines) == 1),
         both=if_true(min(len(engines), len(files)) > 1),
         parts=three_parts(result)[1:],
@@ -249,10 +250,14 @@ def steps(result: Explanation) -> list[Block]:
     lines = []
     able = [row for row in result.shares if not (row.note or row.chosen)]
     for row in _at_least(_NO_PART, able):
-        left, right = _values(row)
         place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
-        change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
-        lines.append(f"{place}{row.name}: {change.format(left=left, right=right)}")
+        several = len(row.values) > 1 and "figures" in _figure(row)
+        for value in row.values if several else [("", "", "")]:
+            one = Figures(**{**vars(row), "values": (value,) if several else row.values})
+            left, right = _values(one)
+            change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
+            what = f"{row.name}, {value[0]}" if several else f"{row.name}{_figure(row)}"
+            lines.append(f"{place}{what}: {change.format(left=left, right=right)}")
     side, integrator = next((row.chosen for row in result.shares if row.chosen), (None, None))
     own = lines and any(row.kind == "engine" for row in result.shares)
     sides = zip(result.labels, result.provenance, strict=True)
@@ -336,13 +341,18 @@ def _at_least(part: float, rows: Sequence[Figures]) -> list[Figures]:
     return [r for r in rows if max(abs(p or 0.0) for p in (r.share, r.alone, r.last)) >= part]
 
 
-def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
-    what, figure = capital(row.name), row.values[0][0] if row.values else ""
+def _figure(row: Figures) -> str:
+    """Which figure of a cause it is, where its name does not say so."""
+    figure = row.values[0][0] if row.values else ""
     # A servo's kp stands in two figures, once with another sign.
     if len({repr(value[1:]).replace("-", "") for value in row.values}) > 1:
-        what += f" ({len(row.values)} figures)"
-    elif ("[" in figure or row.kind == "option") and figure not in row.name:
-        what += f" ({figure})"
+        return f" ({len(row.values)} figures)"
+    shown = ("[" in figure or row.kind == "option") and figure not in row.name
+    return f" ({figure})" if shown else ""
+
+
+def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
+    what = capital(row.name) + _figure(row)
     explains, alone, last = percent(row.share), percent(row.alone), percent(row.last)
     if row.error and math.isfinite(row.error):
         explains += f" ± {percent(row.error)}"

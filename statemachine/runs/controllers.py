@@ -137,7 +137,8 @@ def function_scenario(
 
     called = Path(spec).name
     steps = "every step" if every == 1 else f"every {count(every, 'step')}"
-    says = f"{called} is asked for ctrl at {steps}."
+    begins = "the default state" if keyframe is None else f"the keyframe {keyframe!r}"
+    says = f"{called} is asked for ctrl at {steps}. It starts in {begins}."
     return Scenario(
         *(called, says, "", 2.0, controller_of, says, lambda _model: None),
         keyframe=keyframe,

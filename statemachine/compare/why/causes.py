@@ -16,7 +16,6 @@ from ...engines import room
 from ...engines.records import Edit, ModelDifference
 from ...installed import DEFAULT
 from ...interface import Model
-from ...measures import farthest
 from ...measures.text import listed
 from ...page import Figures
 from ...runs import SideStart
@@ -193,12 +192,21 @@ def of_the_run(
         keyframe: The keyframe of both; None where one has another, or none.
     """
     left, right = starts
-    off = max(
-        farthest(matched.moved("qpos", left.qpos, right.qpos), right.qpos),
-        farthest(matched.moved("qvel", left.qvel, right.qvel), right.qvel),
-    )
-    if off > _SAME:
-        yield ModelDifference(START, "run", "", (("farthest coordinate", 0.0, float(off)),))
+    rows = [
+        (f"{name}[{k}]", ours, theirs)
+        for name in ("qpos", "qvel")
+        for k, (ours, theirs) in enumerate(
+            zip(
+                matched.moved(name, getattr(left, name), getattr(right, name)).tolist(),
+                getattr(right, name).tolist(),
+                strict=True,
+            )
+        )
+        if abs(ours - theirs) > _SAME
+    ]
+    if rows:  # the coordinate that is farthest off, as the right numbers it
+        most = max(rows, key=lambda row: abs(row[1] - row[2]))
+        yield ModelDifference(START, "run", "", (most,))
     if keyframe is not None:
         yield from _of_keyframe(matched, str(keyframe))
 

@@ -319,11 +319,17 @@ def _quantity(
     ruler = trials.ruler
     robot = frozenset(model.body_names[body] for body in moved_by_actuators(model))
     preferred = ruler.default_quantity(touched_at_start(trials.traces[0], robot))
-    beyond = {
+    above = {
         name: getattr(gap, measure) / ruler.tolerance(name)
         for name, gap in first.items()
-        if getattr(gap, measure) > max(ROUNDING[ruler.units[name]], floors.get(name, 0.0))
+        if getattr(gap, measure) > ROUNDING[ruler.units[name]]
     }
+    clear = {
+        name: off
+        for name, off in above.items()
+        if getattr(first[name], measure) > floors.get(name, 0.0)
+    }
+    beyond = clear or above
     if preferred not in ruler.coordinates and beyond.get(preferred, 0.0) > 1:
         return preferred
     own = {name: beyond[name] for name in ruler.coordinates if beyond.get(name, 0.0) > 1}
