@@ -297,6 +297,17 @@ def test_what_cannot_be_brought_over_stays_unexplained(tmp_path):
     assert found.unexplained > 0.9
     assert not found.is_explained
     assert found.unmatched[1]["joint"] == ("more",)
+    # A joint more on a body that is there does not hang it on another part.
+    assert {"joints of lower", "extra joint of tilt"} == {
+        each.name
+        for each in explained(
+            tmp_path,
+            ARM,
+            ARM.replace('<site name="tip"', '<joint name="tilt" axis="1 0 0"/><site name="tip"'),
+            scenario=SWING,
+        ).shares
+        if each.note
+    }
 
 
 LINKS = """<mujoco><default><geom type="capsule" {geom}/></default><worldbody>

@@ -178,7 +178,7 @@ def test_another_sensor_counts_where_a_function_may_read_it(folder: Path, capsys
     # By themselves sensors move nothing.
     code, found = asked(capsys, "f.py:none", "l.xml", "v.xml", "--why", "--no-chaos")
     assert (code, found["shares"]) == (0, [])
-    assert main(["compare", "--models", "l.xml", "v.xml"]) == 0
+    assert main(["compare", "l.xml", "v.xml", "--models"]) == 0
     assert "sensor p type" in capsys.readouterr().out
 
 

@@ -372,6 +372,10 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
         (explanation_of(hold, shares=apart), "5.0 % alone and 110.0 % last"),
         (still, "a weak hint$"),
         (
+            with_figures(located, shares=[Figures(name="extra joint of a", note="no", share=None)]),
+            "goes without contact on both sides; it may come from extra joint of a, which cannot",
+        ),
+        (
             explanation_of(hold, shares=(switch,)),
             r"^50.0 % of the 2.58° comes from contact \(left: on, right: off\)$",
         ),

@@ -226,14 +226,16 @@ def run_models(options: argparse.Namespace) -> int:
     """Compare, and show."""
     from ..backends import backend_engine
     from ..compare.models import compare
-    from ..compare.sides import parse_sides
+    from ..compare.sides import is_trace, parse_sides
     from ..report import model_diff
     from ..report.terminal import progress
+    from ..runs.controllers import is_function
+    from ..runs.scenarios import SCENARIOS
 
     digits = 6 if options.digits is None else options.digits
     refuse(
         (
-            options.what,
+            any(word in SCENARIOS or is_trace(word) or is_function(word) for word in options.what),
             f"--models compares descriptions, and runs nothing: {PROGRAM} compare --models "
             f"{' '.join(options.what[1:] or ['LEFT', 'RIGHT'])}; to run something, type "
             f"{PROGRAM} compare {' '.join([*options.what, *options.models])}",
@@ -241,7 +243,7 @@ def run_models(options: argparse.Namespace) -> int:
         (not 1 <= digits <= 17, f"--digits wants a number from 1 to 17; got {digits}"),
         (options.seed < 0, f"--seed must not be negative; got {options.seed}"),
     )
-    words = options.models
+    words = [*options.what, *options.models]
     sides = [side for word in words for side in parse_sides([word], options.menagerie)]
     # The file itself, unless an engine is named.
     engines = [None if s.file == word else s.engine for s, word in zip(sides, words, strict=True)]

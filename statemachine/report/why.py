@@ -61,6 +61,10 @@ ANSWERS = {
     "located": (
         "{part} of the {gap} comes from {cause}, which no setting that both read makes the same"
     ),
+    "refused": (
+        "{part} of the {gap} goes without {cause} on both sides; it may come from {refused}, which "
+        "cannot be made the same"
+    ),
     "still": "{part} of the {gap} goes without {cause}, but so does the motion: a weak hint",
     "switched": "{part} of the {gap} comes from {cause} (left: {left}, right: {right})",
     "unexplained": "The cause was not found: {part} of the {gap} is unexplained",
@@ -136,6 +140,7 @@ def answer(result: Explanation) -> str:
             gap = f"{gap} is rounding" if result.gap else "the gap is 0"
         return ANSWERS[kind].format(gap=gap, floor=floor)
     causes = [row for row in result.shares if row.share]
+    refused = [row.name for row in result.shares if row.note]
     places = sorted(result.found_in, key=lambda place: -place.share)
     parts = {
         "cause": abs(causes[0].share) if causes else 0.0,
@@ -150,6 +155,7 @@ def answer(result: Explanation) -> str:
         cause = f"the {places[0].name}" if places[0].values else places[0].name
         # What only one side has is a setting, and closes the gap only where both are without it.
         switches = [_values(row) for row in result.shares if row.name == places[0].name]
+        kind = "refused" if refused else kind
         kind = "still" if places[0].is_still else kind
         kind, (left, right) = ("switched", switches[0]) if switches else (kind, (left, right))
     elif kind == "cause":
@@ -157,7 +163,13 @@ def answer(result: Explanation) -> str:
         kind = "bare" if NONE in (left, right) else "cause"
     brought = _amount(result, result.brought or 0.0)
     said = ANSWERS[kind].format(
-        cause=cause, left=left, right=right, part=part, gap=gap, brought=brought
+        cause=cause,
+        left=left,
+        right=right,
+        part=part,
+        gap=gap,
+        brought=brought,
+        refused=", ".join(refused[:2]),
     )
     if kind in ("cause", "bare"):
         alone, last = causes[0].alone, causes[0].last

@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import BadInputError, did_you_mean, refuse
 from ..interface import Data, Model
 from ..interface.options import as_vector
-from ..measures.text import count
+from ..measures.text import count, few
 from .drive import Controller
 from .scenarios import Scenario
 
@@ -198,7 +198,7 @@ def _function(path: Path, name: str) -> Function:
     function = getattr(module, name, None)
     if not callable(function):
         functions = [key for key, value in vars(module).items() if inspect.isfunction(value)]
-        hint = did_you_mean(name, functions)
+        hint = did_you_mean(name, functions) or f"; it has {few(functions)}" * bool(functions)
         raise BadInputError(f"{path.name} has no function {name}({', '.join(_TAKES)}){hint}")
     return function
 

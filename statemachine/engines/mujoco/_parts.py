@@ -150,14 +150,14 @@ def _hangs(sides: Sides, pair: BodyPair) -> Iterator[ModelDifference]:
     joints = [(a, b) for a, b in sides.pairs.joints if left.jnt_bodyid[a] == pair.left]
     if any(left.jnt_type[a] == _FREE for a, _ in joints):
         return  # where it starts is a matter of the state
-    parent = sides.part(int(left.body_parentid[pair.left]))
-    if pair.moved or parent is None:
-        yield sides.tell("parent", "body", pair.left, refused="it hangs on another part")
-        return
     numbers = int(left.body_jntnum[pair.left]), int(right.body_jntnum[pair.right])
+    parent = sides.part(int(left.body_parentid[pair.left]))
     if numbers != (len(joints), len(joints)):
         values = (("joints", *numbers),)
         yield sides.tell("joints", "body", pair.left, values, refused="it has other joints")
+        return
+    if pair.moved or parent is None:
+        yield sides.tell("parent", "body", pair.left, refused="it hangs on another part")
         return
     for a, b in joints:
         yield from _axis(sides, pair, a, b)
