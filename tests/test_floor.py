@@ -234,7 +234,7 @@ def test_a_start_outside_of_limits_is_unclear_until_the_steps_are_small(tmp_path
         with pytest.warns(EngineWarning, match="by 0.524; inside with --keyframe up$"):
             found = convergence_of(one, two, 1.0)
         assert found.whole[0].verdict == verdict
-        assert "Commands are asked for" not in shown(page(found, "fall"))
+        assert "Commands come by the step" not in shown(page(found, "fall"))
         text = shown(page(found, "fall"))
         assert ("add --timestep 0.0025" in " ".join(text.split())) == found.unclear
         assert not found.vanishes
@@ -243,7 +243,7 @@ def test_a_start_outside_of_limits_is_unclear_until_the_steps_are_small(tmp_path
 def test_unlike_timesteps_ask_for_commands_at_unlike_moments() -> None:
     one, two = (sm.load("so101", timestep=timestep) for timestep in (0.002, 0.004))
     text = " ".join(shown(page(convergence_of(one, two, 0.1), "hold")).split())
-    assert "asked for every 2 ms on the left and every 4 ms on the right" in text
+    assert "by the step as given, which is 2 ms on the left and 4 ms on the right" in text
     assert "timestep=0.004 behind both" in text
 
 

@@ -37,8 +37,8 @@ _STILL = 1e-3  # [rad or m] over a whole run
 NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
 _LEFT_OUT = "{engine}: {what}"
 _PERIODS = (
-    "commands are asked for every {left} on the left and every {right} on the right: what comes of "
-    "that counts as timestep"
+    "commands come by the step, which is {left} on the left and {right} on the right: what comes "
+    "of that counts as timestep"
 )
 _NOT_RUN = "no set of causes with it could be run"
 
