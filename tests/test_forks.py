@@ -56,7 +56,9 @@ def test_forks_give_the_figures_of_one_process(tmp_path: Path, jobs: int) -> Non
     closed = replace(SWING, controller=_feedback)
     # Six that interact: orders are drawn.
     names = ("mass", "gravity", "gains", "axis", "armature", "medium")
-    run = partial(explained, tmp_path, ARM, _apart(ARM, names), seconds=0.2, budget=20)
+    run = partial(
+        explained, tmp_path, ARM, _apart(ARM, names), seconds=0.2, budget=20, quantity="joints"
+    )
     for scenario in (SWING, closed):
         one = run(scenario=scenario, jobs=1)
         assert one.runs > 15
