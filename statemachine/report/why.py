@@ -86,11 +86,11 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         result: The explanation.
         said: Lines to say before anything else.
     """
+    from ..compare.why import UNEXPLAINED
+
     only = lacking(result.unmatched, ("the left", "the right"))
     title, *further = [*missing(result.missing), answer(result)]
     lines = [*map(sentence, (*further, *said, *only, *result.notes)), *proofs(result), result.says]
-    from ..compare.why import UNEXPLAINED
-
     engines = {side.backend for side in result.provenance}
     stays = not (result.is_rounding or result.is_explained)
     hint = result.located > UNEXPLAINED >= result.unexplained
@@ -263,13 +263,13 @@ def steps(result: Explanation) -> list[Block]:
     able = [row for row in result.shares if not (row.note or row.chosen)]
     for row in _at_least(_NO_PART, able):
         place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
-        several = len(row.values) > 1 and "figures" in _figure(row)
-        for value in row.values if several else [("", "", "")]:
-            one = Figures(**{**vars(row), "values": (value,) if several else row.values})
+        singles = [
+            (f", {value[0]}", Figures(**{**vars(row), "values": (value,)})) for value in row.values
+        ]
+        for figure, one in singles if _is_several(row) else [(_figure(row), row)]:
             left, right = _values(one)
             change = ADD if (left, right) == ("there", NONE) else "{right} → {left}"
-            what = f"{row.name}, {value[0]}" if several else f"{row.name}{_figure(row)}"
-            lines.append(f"{place}{what}: {change.format(left=left, right=right)}")
+            lines.append(f"{place}{row.name}{figure}: {change.format(left=left, right=right)}")
     side, integrator = next((row.chosen for row in result.shares if row.chosen), (None, None))
     own = lines and any(row.kind == "engine" for row in result.shares)
     sides = zip(result.labels, result.provenance, strict=True)
@@ -353,11 +353,15 @@ def _at_least(part: float, rows: Sequence[Figures]) -> list[Figures]:
     return [r for r in rows if max(abs(p or 0.0) for p in (r.share, r.alone, r.last)) >= part]
 
 
+def _is_several(row: Figures) -> bool:
+    """Whether its figures differ; a servo's kp stands in two, once with another sign."""
+    return len({repr(value[1:]).replace("-", "") for value in row.values}) > 1
+
+
 def _figure(row: Figures) -> str:
     """Which figure of a cause it is, where its name does not say so."""
     figure = row.values[0][0] if row.values else ""
-    # A servo's kp stands in two figures, once with another sign.
-    if len({repr(value[1:]).replace("-", "") for value in row.values}) > 1:
+    if _is_several(row):
         return f" ({len(row.values)} figures)"
     shown = ("[" in figure or row.kind == "option") and figure not in row.name
     return f" ({figure})" if shown else ""

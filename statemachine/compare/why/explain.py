@@ -35,7 +35,6 @@ _REDUNDANT = 0.1  # of the gap: so much a cause may leave that makes others need
 _MASKED = 2.0  # of the gap: a cause with more has others against it
 _STILL = 1e-3  # [rad or m] over a whole run
 NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
-_LEFT_OUT = "{engine}: {what}"
 _PERIODS = (
     "commands come by the step, which is {left} on the left and {right} on the right: what comes "
     "of that counts as timestep"
@@ -239,7 +238,7 @@ def explain(
     )
     shares = _shares(listed, divided, rest, left, right)
     left_out = [
-        _LEFT_OUT.format(engine=model.backend, what=what)
+        f"{model.backend}: {what}"
         for model in (left, right)
         for what in room(engine_of(model.backend)).ignored(model)
         if "integrator" not in what  # which is a cause
