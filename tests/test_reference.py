@@ -13,7 +13,6 @@ from benchmarks import __main__ as bench
 from benchmarks.interleave import NULL, Ratio
 from reference.figures import differences, flatten
 from reference.groups import GROUPS, QUICK, absent, kept
-from reference.size import beyond, counts, lowered
 
 from .conftest import REQUIRED, ROOT, of_python, refused
 
@@ -65,17 +64,6 @@ def test_a_field_without_a_word_is_an_error() -> None:
     agreements = [{"name": "a", "max": 1.0}, {"name": "b", "max": 2.0}]
     output = {"comparison": {"agreements": agreements}, "sides": [1], "notes": ["words"]}
     assert dict(flatten(output, "compare")) == {"a | largest": 1.0, "b | largest": 2.0}
-
-
-def test_the_project_is_within_its_limits_and_more_is_noticed() -> None:
-    text = (ROOT / "size.toml").read_text("utf-8")
-    found = counts()
-    limits = {"package": {"statements": {"limit": found["package.statements"] - 1}}}
-    only = {"package.statements": found["package.statements"], "a room.nodes": 1}
-    assert len(beyond(only, limits)) == 2
-    assert lowered(text, found) == lowered(lowered(text, found), found)
-    less = lowered(text, {**found, "package.statements": 7})
-    assert "statements = { limit = 7, target = 22000 }" in less
 
 
 # The benchmarks
