@@ -305,11 +305,12 @@ def _run_compare(
     )
     parts = {
         "witness": witness(*run.traces, run.file),
-        "floor": _floor(options, comparison, run.reruns[0], uncertain),
+        "floor": _floor(options, comparison, run.reruns, uncertain),
     }
     if all(a.verdict == "agrees" for a in comparison.agreements if QUANTITIES[a.kind].moves):
         why_not = "Next: another experiment, such as gravity or waves, may move what this does not."
-    why_not = why_not or NEXT.format(name=shlex.quote(name_of(leading(comparison).name)))
+    lead = leading(comparison, parts["floor"])
+    why_not = why_not or NEXT.format(name=shlex.quote(name_of(lead.name)))
     more: dict[str, Any] = {
         "why_not": "" if comparison.ended or comparison.agrees else why_not  # the page says it
     }
@@ -343,19 +344,19 @@ def _run_compare(
     return code
 
 
-def _floor(options: argparse.Namespace, comparison: Any, rerun: Any, uncertain: Any) -> Any:
-    """The chaos floor of a comparison; None where the left side was not run here.
+def _floor(options: argparse.Namespace, comparison: Any, reruns: Any, uncertain: Any) -> Any:
+    """Compute the chaos floor of a comparison; None where neither side was run here.
 
     Raises:
-        BadInputError: An uncertainty was given, and the left side was not run here.
+        BadInputError: An uncertainty was given, and neither side was run here.
     """
     if options.no_chaos:
         return None
-    if rerun is None:
+    if reruns == (None, None):
         refuse(
             (
                 options.uncertainty,
-                "--uncertainty runs the left side again, and it is a recorded run",
+                "--uncertainty runs both sides again, and both are recorded runs",
             )
         )
         return None
@@ -363,4 +364,4 @@ def _floor(options: argparse.Namespace, comparison: Any, rerun: Any, uncertain: 
     from ..report.terminal import progress
 
     with progress("chaos floor") as bar:
-        return chaos_floor(comparison, rerun, seed=options.seed, uncertain=uncertain, progress=bar)
+        return chaos_floor(comparison, reruns, seed=options.seed, uncertain=uncertain, progress=bar)

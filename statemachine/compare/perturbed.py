@@ -1,31 +1,56 @@
-"""The same side run again, changed by next to nothing; and the chaos floor that this makes.
+"""Both sides run again, changed by next to nothing; and the chaos floor that this makes.
 
-After a grazing contact two runs that differ by rounding part exponentially. So one side is run
-again with its start and commands perturbed, and what that makes of each quantity is its floor: the
-band of a gap in which nothing can be concluded.
+After a grazing contact two runs that differ by rounding diverge exponentially. So each side is run
+again with its start and commands perturbed, and the largest distance that this makes of a quantity,
+between a perturbed run and the run of the same side, is its floor. A gap below the floor may be
+chance; a gap above three times the floor is more than that; between the two nobody can tell.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import BadInputError, TraceError, refuse
+from ..errors import BadInputError, EngineError, TraceError, refuse
 from ..interface import Array, Data, Ints, JointType, Model
-from ..measures import amount, common_moments
-from ..page import Figures
+from ..measures import amount, common_moments, same_pairs
+from ..processes.parallel import forks_for, in_forks
 from ..rotations import times
 from ..runs import Rerun, Trace, beginning_with
 from ..runs.drive import Progress, part_of, silent
 from ..runs.scenarios import Controller
 from .agreement import Agreement, Comparison
-from .series import series, touches
+from .series import NORMAL, series, touches
 
-RUNS = 4
+RUNS = 8  # of each side
+CLEAR = 3.0  # times the floor: a larger gap is more than chance
 ROUNDING = 1e-12  # of a value, or of 1 where it is less; some thousand times that of a float64
+
+Chance = Literal["inside", "cannot be told", "beyond"]
+
+
+def against_floor(gap: float, floor: float) -> Chance:
+    """Tell whether rounding alone can make a gap.
+
+    Args:
+        gap: How far apart the two sides are, above zero.
+        floor: The chaos floor of both sides, in the unit of the gap; infinite where a perturbed run
+            ended early.
+
+    Returns:
+        "inside" for a gap below the floor, of which nothing can be concluded; "beyond" for one
+        above three times the floor, or one that is not a number; "cannot be told" between.
+    """
+    if gap < floor:
+        return "inside"
+    if gap <= CLEAR * floor:
+        return "cannot be told"
+    return "beyond"
 
 
 @dataclass(frozen=True)
@@ -210,72 +235,138 @@ def nudged_controller(controller: Controller | None, draw: np.random.Generator) 
 
 
 _WINDOW = 0.025  # of the common time, to either side
+_FIRST_TOUCH = ", first touch"
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The chaos floor of one quantity of a comparison.
+
+    Attributes:
+        name, kind, unit: Of the Agreement of the two sides.
+        most: The largest width of the band, in the unit.
+        end: The width at the last moment.
+        inside_from: The time from which on the gap between the two sides lies inside [s]; None if
+            it does not at the end. Of a first touch 0 or None.
+        chance: Where the gap leaves its tolerance, whether rounding alone can make it: "beyond" if
+            at any such moment the gap is more than three times the width there; "inside" if at none
+            it reaches the width; "cannot be told" else. None of a quantity that agrees.
+        width: (n,) at each moment that the sides have in common; (1,) of a first touch.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    most: float
+    end: float
+    inside_from: float | None
+    chance: Chance | None
+    width: Array = field(metadata={"json": False})
+
+
+@dataclass(frozen=True, eq=False)
+class ChaosFloor:
+    """The chaos floor of every quantity of a comparison.
+
+    Attributes:
+        runs: How many perturbed runs were made of each side.
+        sides: The sides that were run again: 0 the left, 1 the right. A recorded run cannot be.
+        seed: Of what was drawn.
+        rounding: What starts and commands were changed by, relative.
+        uncertain: What the start is uncertain by besides.
+        ended: How many of the runs ended early; from then on the band has no bound.
+        bands: One for each quantity that is compared.
+    """
+
+    runs: int
+    sides: tuple[int, ...]
+    seed: int
+    rounding: float
+    uncertain: Uncertainty
+    ended: int
+    bands: tuple[Band, ...]
+
+    def chance(self, name: str) -> Chance | None:
+        """Return whether rounding alone can make the gap of a quantity; None where it agrees."""
+        for band in self.bands:
+            if band.name == name:
+                return band.chance
+        return None
 
 
 def chaos_floor(
     comparison: Comparison,
-    rerun: Rerun,
+    reruns: Sequence[Rerun | None],
     *,
     runs: int = RUNS,
     seed: int = 0,
     uncertain: Uncertainty = EXACT,
+    jobs: int | None = None,
     progress: Progress = silent,
-) -> Figures:
-    """The chaos floor of each quantity of a comparison.
+) -> ChaosFloor:
+    """Compute the chaos floor of each quantity of a comparison.
 
-    The band at a moment is the largest distance of a perturbed run from the left one, within 2.5 %
-    of the common time before and after it. It is not a running maximum: a robot whose servos pull
-    it back forgets where it started, and a gap that remains then is a difference although an
-    impact in between was chaotic. And it is not of the moment alone: all perturbed runs part along
-    the one direction that grows fastest, so that they cross the left one at the same time, and an
-    impact that comes a step later is a spike in each of two places.
+    The band at a moment is the largest distance of a perturbed run from the run of the same side,
+    within 2.5 % of the common time before and after it. It is not a running maximum: a robot whose
+    servos pull it back forgets where it started, and a gap that remains then is a difference
+    although an impact in between was chaotic. And it is not of the moment alone: all perturbed runs
+    diverge along the one direction that grows fastest, so that they cross the first run at the
+    same time, and an impact that comes a step later is a spike in each of two places.
+
+    Both sides are given the same draws, so that swapping the sides changes no figure.
 
     Args:
-        comparison: Of two traces, of which `rerun` makes the left one.
-        rerun: How the left side is run.
-        runs: How many perturbed runs.
+        comparison: Of two traces.
+        reruns: How the left and the right were run; None for a side that was not run here.
+        runs: How many perturbed runs of each side.
         seed: Of what is drawn.
         uncertain: What the start of a real robot is uncertain by.
+        jobs: How many processes make the runs; None for one a processor where that pays, and for
+            one where a function commands, which may keep something from run to run.
         progress: Told the fraction that is done.
 
-    Returns:
-        What was found, by name.
-
-        - runs: How many perturbed runs of the left side it is made of; seed: of what was drawn.
-        - rounding: What starts and commands were changed by, relative.
-        - uncertain: What the start is uncertain by besides.
-        - ended: How many of the runs ended early; from then on the band has no bound.
-        - bands: One for each quantity that is compared; see `_band`.
-
     Raises:
-        BadInputError: As `perturbed_runs`.
+        BadInputError: `runs` is less than 1, the seed is negative, or neither side was run here.
+        EngineError: A process ended before its run was done, twice.
     """
-    left, right = comparison.left.trace, comparison.right.trace
-    common = common_moments(left.time, right.time, (left.timestep, right.timestep))
+    if runs < 1:
+        raise BadInputError(f"the chaos floor wants at least one run; got {runs}")
+    traces = comparison.left.trace, comparison.right.trace
+    common = common_moments(
+        traces[0].time, traces[1].time, (traces[0].timestep, traces[1].timestep)
+    )
+    sides = tuple(side for side, rerun in enumerate(reruns) if rerun is not None)
+    if not sides:
+        raise BadInputError("the chaos floor runs a side again, and both are recorded runs")
     gaps = {curve.name: curve.difference for curve in comparison.curves}
     gaps |= {a.name: np.array([a.max]) for a in comparison.agreements if a.kind == "contact"}
+    work: list[Callable[[], _Departure]] = []
+    for side in sides:
+        rerun, rows = reruns[side], (common.left, common.right)[side]
+        assert rerun is not None
+        for k in range(runs):
+            draw = partial(perturbed_run, rerun, k, seed=seed, uncertain=uncertain)
+            work.append(partial(_departure, draw, traces[side], comparison, rows))
     widths = {name: np.zeros(len(gap)) for name, gap in gaps.items()}
     ended = 0
-    for trace in perturbed_runs(
-        rerun, runs=runs, seed=seed, uncertain=uncertain, progress=progress
-    ):
-        ended += bool(trace.header.ended)
-        far_apart = _distances(left, trace, comparison.tip, comparison.until, common.left)
-        for name, far in far_apart.items():
+    for departure in _departures(work, reruns, jobs, progress):
+        ended += departure.ended
+        for name, distance in _named_as(gaps, departure.distances).items():
             if name in widths:
-                widths[name] = np.maximum(widths[name], far)
+                widths[name] = np.maximum(widths[name], distance)
     reach = round(_WINDOW * (len(common.time) - 1))
     bands = []
     for agreement in comparison.agreements:
-        width, time = widths[agreement.name], common.time
+        width, moments = widths[agreement.name], common.time
         if agreement.kind == "contact":
-            time = np.zeros(1)
+            moments = np.zeros(1)
         else:  # the largest within some rows to either side
             padded = np.pad(width, reach, mode="edge")
             width = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
-        bands.append(_band(agreement, gaps[agreement.name], width, time))
-    return Figures(
+        bands.append(_band(agreement, gaps[agreement.name], width, moments))
+    return ChaosFloor(
         runs=runs,
+        sides=sides,
         seed=seed,
         rounding=ROUNDING,
         uncertain=uncertain,
@@ -284,50 +375,125 @@ def chaos_floor(
     )
 
 
-def _distances(
-    left: Trace, perturbed: Trace, tip: str, until: float, rows: Ints
-) -> dict[str, Array]:
-    """How far a run is from `left` in some of its rows; infinite where it has ended.
+@dataclass(frozen=True)
+class _Departure:
+    """How far a perturbed run gets from the run of the same side.
 
-    Of a first touch it is one number [s]: a touch that does not come has no time.
+    Attributes:
+        distances: By quantity (n,) at the common moments, infinite where the run has ended; of a
+            first touch (1,) [s].
+        ended: Whether the run ended early.
     """
+
+    distances: dict[str, Array]
+    ended: bool
+
+
+def _departures(
+    work: Sequence[Callable[[], _Departure]],
+    reruns: Sequence[Rerun | None],
+    jobs: int | None,
+    progress: Progress,
+) -> Iterator[_Departure]:
+    """Make the perturbed runs, in this process or in forks of it, in the order of `work`."""
+    began = time.perf_counter()
+    first = work[0]()
+    took, done = time.perf_counter() - began, 1
+    progress(done / len(work))
+    yield first
+
+    def ran() -> None:
+        nonlocal done
+        done += 1
+        progress(done / len(work))
+
+    rest = work[1:]
+    # A function of the user's may keep something from one run to the next.
+    if jobs is None and any(rerun is not None and rerun.writes_state for rerun in reruns):
+        jobs = 1
+    forks = forks_for(len(rest), took, jobs)
+    if forks > 1:
+        for departure in in_forks(rest, forks, ran, took):
+            if departure is None:
+                raise EngineError("a run for the chaos floor ended its process twice")
+            yield departure
+        return
+    for call in rest:
+        yield call()
+        ran()
+
+
+def _departure(
+    draw: Callable[[], Trace], own: Trace, comparison: Comparison, rows: Ints
+) -> _Departure:
+    """Make a perturbed run, and measure how far it gets from the run of its side.
+
+    Args:
+        draw: Makes the run.
+        own: The run of the side as it comes, by the names of the comparison.
+        comparison: Of both sides.
+        rows: (n,) of `own`, at the common moments.
+    """
+    run = draw()
+    known = {name: run.columns[name] for name in own.columns if name in run.columns}
+    perturbed = Trace(replace(own.header, ended=run.header.ended), known)
     distances: dict[str, Array] = {}
     try:
-        curves, count = series(left, perturbed, tip), len(perturbed)
-        for touch in touches(left, perturbed):
+        curves, count = series(own, perturbed, comparison.tip), len(perturbed)
+        for touch in touches(own, perturbed):
             first, other = touch.left.first, touch.right.first
-            gap = until if first is None or other is None else abs(first - other)
-            distances[f"{touch.pair}, first touch"] = np.array([gap])
+            apart = comparison.until if first is None or other is None else abs(first - other)
+            distances[f"{touch.pair}{_FIRST_TOUCH}"] = np.array([apart])
     except TraceError:  # it ended at once
-        curves, count = series(left, left, tip), 0
+        curves, count = series(own, own, comparison.tip), 0
     for curve in curves:
-        far = np.full(len(left), np.inf)
+        far = np.full(len(own), np.inf)
         far[:count] = np.nan_to_num(curve.difference[:count], nan=np.inf)
         distances[curve.name] = far[rows]
-    return distances
+    return _Departure(distances, bool(run.header.ended))
 
 
-def _band(agreement: Agreement, gap: Array, width: Array, time: Array) -> Figures:
-    """The chaos floor of one quantity.
+def _named_as(known: Mapping[str, Array], distances: dict[str, Array]) -> dict[str, Array]:
+    """Return distances by the names of the comparison: "a on b" may be "b on a" on one side."""
+    named = dict(distances)
+    for ending in (NORMAL, _FIRST_TOUCH):
+        pairs = {name.removesuffix(ending): name for name in known if name.endswith(ending)}
+        own = {name.removesuffix(ending): name for name in distances if name.endswith(ending)}
+        for pair, name in same_pairs(pairs, own).items():
+            named[f"{pair}{ending}"] = named.pop(name)
+    return named
 
-    Returns:
-        name, kind, unit: Of the Agreement of the two sides.
-        most: The largest width of the band; end: the width at the last moment.
-        inside_from: The time from which on the gap between the two sides lies inside [s];
-            None if it does not at the end. Of a first touch 0 or None.
-        beyond: Whether the gap is, at any moment, larger than both the band and the tolerance:
-            only then it is more than chaos.
-        _width: (n,) at each moment that the sides have in common; (1,) of a first touch.
+
+def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Band:
+    """Return the chaos floor of one quantity.
+
+    Args:
+        agreement: Of the two sides.
+        gap: (n,) how far apart they are.
+        width: (n,) of the band.
+        moments: (n,) since the start [s].
     """
     outside = np.flatnonzero(~(gap <= width))
     last = int(outside[-1]) + 1 if len(outside) else 0
-    return Figures(
+    chance: Chance | None = None
+    if agreement.verdict != "agrees":
+        beyond = ~(gap <= agreement.tolerance)  # what is not a number never agrees
+        found = {
+            against_floor(*pair)
+            for pair in zip(gap[beyond].tolist(), width[beyond].tolist(), strict=True)
+        }
+        chance = "inside"
+        if "beyond" in found:
+            chance = "beyond"
+        elif "cannot be told" in found:
+            chance = "cannot be told"
+    return Band(
         name=agreement.name,
         kind=agreement.kind,
         unit=agreement.unit,
         most=float(width.max()),
         end=float(width[-1]),
-        inside_from=float(time[last]) if last < len(time) else None,
-        beyond=bool((~(gap <= np.maximum(width, agreement.tolerance))).any()),
-        _width=width,
+        inside_from=float(moments[last]) if last < len(moments) else None,
+        chance=chance,
+        width=width,
     )

@@ -11,6 +11,7 @@ from ..compare import (
     Comparison,
     SidesRun,
 )
+from ..compare.perturbed import ChaosFloor
 from ..measures import QUANTITIES
 from ..measures.text import NONE, grouped, milliseconds, quantity, sentence
 from ..page import Block, Code, Figures, Items, Page, Section, Table, TableCell, Text, Verdict
@@ -63,7 +64,7 @@ def page(
     command: str = "",
     run: SidesRun | None = None,
     played: Comparison | None = None,
-    floor: Figures | None = None,
+    floor: ChaosFloor | None = None,
 ) -> Page:
     """What was found in comparing two runs.
 
@@ -123,12 +124,12 @@ def _over_time(
     comparison: Comparison,
     events: Sequence[Figures],
     explanation: Explanation | None,
-    floor: Figures | None,
+    floor: ChaosFloor | None,
 ) -> BothRuns:
     """The scene and a chart for each quantity that is a number throughout."""
     charts = charts_of(comparison, floor)
-    _, _, at, _ = subject(comparison, explanation)
-    lead = [k for k, c in enumerate(charts) if c.curve.name == leading(comparison).name]
+    _, _, at, _ = subject(comparison, explanation, floor)
+    lead = [k for k, c in enumerate(charts) if c.curve.name == leading(comparison, floor).name]
     lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
     return BothRuns(
         comparison.left.trace.header.experiment,
@@ -157,7 +158,9 @@ def _sorted(runs: BothRuns) -> list[Block]:
     return [*beyond, *within, *([Text(text)] if more else [])]
 
 
-def _figures(comparison: Comparison, witness: Figures | None, floor: Figures | None) -> list[Block]:
+def _figures(
+    comparison: Comparison, witness: Figures | None, floor: ChaosFloor | None
+) -> list[Block]:
     """Figures and verdicts, the floor, the reasons of tolerances, what a third party says."""
     left, right = short_labels(comparison)
     agreements, checked = comparison.agreements, list[Block]()
@@ -252,7 +255,7 @@ def _span(values: Sequence[float], unit: str) -> str:
     return " to ".join(dict.fromkeys(quantity(end(values), unit) for end in (min, max)))
 
 
-def _floor_columns(floor: Figures) -> dict[str, Callable[[Agreement], str]]:
+def _floor_columns(floor: ChaosFloor) -> dict[str, Callable[[Agreement], str]]:
     """How high the chaos floor is, and from when on the gap is inside."""
     bands = {band.name: band for band in floor.bands}
     return {

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compare import Agreement, Comparison, Series
+from ..compare.perturbed import CLEAR, Chance, ChaosFloor
 from ..compare.series import SETTLED, at_the_end
 from ..measures import QUANTITIES
-from ..measures.text import capital, grouped, listed, quantity, rounded, short_time
+from ..measures.text import capital, few, grouped, listed, quantity, rounded, short_time
 from ..page import Block, Figures, Headline, Table, TableCell
 from ..runs import Trace
 from . import template
@@ -21,6 +22,7 @@ from .why import answer, proofs
 if TYPE_CHECKING:
     from ..compare.why import Explanation
 
+_NAMED = 6  # quantities in a sentence
 _STEADY = 0.1  # share by which a difference may change in the end and be called settled
 
 LEADS = {
@@ -38,7 +40,10 @@ PARTING = {
     "coarse": "; they are apart from the common moment {time} on",
 }
 ENDS = {
-    "chance": "The chaos floor of it is {floor}: so large a gap may be chance.",
+    "inside": "Nothing can be concluded: rounding alone makes up to {floor} of it (the chaos "
+    "floor, from {runs} perturbed runs of {sides}).",
+    "cannot be told": "Whether that is more than chance cannot be told: rounding alone makes up to "
+    "{floor} of it (the chaos floor, from {runs} perturbed runs of {sides}).",
     "alike": "All of the motion is within its tolerance at all moments.",
     "within": "On average over {window}, all of the motion is within its tolerance.",
     "settled": "On average over {window} {what} is still {far} apart.",
@@ -51,7 +56,7 @@ def headline(
     comparison: Comparison,
     events: Sequence[Figures],
     explanation: Explanation | None = None,
-    floor: Figures | None = None,
+    floor: ChaosFloor | None = None,
 ) -> Headline:
     """The largest difference, what explains it, and what is left of it in the end."""
     agreements, until = comparison.agreements, comparison.until
@@ -67,7 +72,7 @@ def headline(
             total=len(agreements),
         )
         return Headline(lead, holds=False)
-    what, far, at, agreement = subject(comparison, explanation)
+    what, far, at, agreement = subject(comparison, explanation, floor)
     contact = agreement if agreement and agreement.kind == "contact" else None
     left, right = short_labels(comparison)
     lead = LEADS["contact" if contact else "apart"].format(
@@ -79,11 +84,32 @@ def headline(
         parting=_parting(comparison, events),
     )
     causes = () if explanation is None else (*proofs(explanation), f"{answer(explanation)}.")
-    bands = [b for b in floor.bands if agreement and b.name == agreement.name] if floor else []
-    end = _in_the_end(comparison, agreement)
-    if agreement and bands and bands[0].most >= agreement.max and not bands[0].beyond:
-        end = ENDS["chance"].format(floor=quantity(bands[0].most, agreement.unit))
+    end = _by_chance(comparison, floor, agreement) or _in_the_end(comparison, agreement)
     return Headline(capital(lead), causes, end, holds=False)
+
+
+def _by_chance(
+    comparison: Comparison, floor: ChaosFloor | None, agreement: Agreement | None
+) -> str:
+    """Say that rounding alone may make the gap of a quantity; "" where the gap is beyond that."""
+    if floor is None or agreement is None:
+        return ""
+    for band in floor.bands:
+        if band.name == agreement.name and band.chance in ("inside", "cannot be told"):
+            return ENDS[band.chance].format(
+                floor=quantity(band.most, band.unit),
+                runs=floor.runs,
+                sides=floor_sides(comparison, floor),
+            )
+    return ""
+
+
+def floor_sides(comparison: Comparison, floor: ChaosFloor) -> str:
+    """The sides that were run again for the chaos floor: both, or the one that is not recorded."""
+    left, right = short_labels(comparison)
+    if len(floor.sides) > 1:
+        return "each side"
+    return left if floor.sides == (0,) else right
 
 
 def _parting(comparison: Comparison, events: Sequence[Figures]) -> str:
@@ -174,7 +200,9 @@ def named(agreement: Agreement) -> str:
 
 
 def subject(
-    comparison: Comparison, explanation: Explanation | None = None
+    comparison: Comparison,
+    explanation: Explanation | None = None,
+    floor: ChaosFloor | None = None,
 ) -> tuple[str, str, float, Agreement | None]:
     """The largest difference: that whose causes were looked for, else the leading one.
 
@@ -182,8 +210,8 @@ def subject(
         Its name, the largest value as text, when that is [s], and the figures of the comparison;
         None where they have no such quantity.
     """
-    if explanation is None or explanation.is_rounding:
-        lead = leading(comparison)
+    if explanation is None or not explanation.verdict.divides:
+        lead = leading(comparison, floor)
         return named(lead), quantity(lead.max, lead.unit), lead.at, lead
     gap, quantities = explanation.first[explanation.quantity], explanation.quantity
     kind = {"joints": "joint", "slides": "slide"}.get(quantities)
@@ -199,12 +227,19 @@ def subject(
     return named(first) if first else who, far, gap.at, first
 
 
-def leading(comparison: Comparison) -> Agreement:
+def leading(comparison: Comparison, floor: ChaosFloor | None = None) -> Agreement:
     """The quantity farthest beyond its tolerance: a coordinate, of which --why speaks, if any is.
 
-    Else one of the motion, as the fingertip; else any. What is not a number comes last.
+    Else one of the motion, as the fingertip; else any. What is not a number comes last. Where some
+    gaps may be chance, it is one of those that are beyond the chaos floor.
     """
     beyond = [a for a in comparison.agreements if a.verdict != "agrees"]
+    chances: tuple[Chance, ...] = ("beyond", "cannot be told") if floor else ()
+    for chance in chances:
+        clear = [a for a in beyond if floor is not None and floor.chance(a.name) == chance]
+        if clear:
+            beyond = clear
+            break
     own = [a for a in beyond if QUANTITIES[a.kind].own]
     motion = [a for a in beyond if QUANTITIES[a.kind].moves]
     return max(
@@ -243,45 +278,48 @@ def in_words(comparison: Comparison) -> list[Block]:
     )
 
 
-def floor_words(comparison: Comparison, floor: Figures) -> list[Block]:
-    """How the floor was made, how high it is, and what lies inside it."""
-    largest = [
-        max((band for band in floor.bands if band.unit == unit), key=lambda b: b.most, default=None)
-        for unit in ("rad", "m")
-    ]
-    sizes = [f"{quantity(b.most, b.unit)} ({name_of(b.name)})" for b in largest if b]
-    verdicts = {agreement.name: agreement.verdict for agreement in comparison.agreements}
+def floor_words(comparison: Comparison, floor: ChaosFloor) -> list[Block]:
+    """How the floor was made, how high it is, and which gaps may be chance."""
+    sizes = []
+    for unit in ("rad", "m"):
+        bands = [band for band in floor.bands if band.unit == unit]
+        if bands:
+            highest = max(bands, key=lambda band: band.most)
+            sizes.append(f"{quantity(highest.most, unit)} ({name_of(highest.name)})")
     motion = [band for band in floor.bands if band.kind != "contact"]
+    everywhere = all(band.inside_from == 0 for band in motion)
     moving = [
         f"{name_of(band.name)} from {short_time(band.inside_from)} on"
         for band in motion
-        if band.inside_from is not None and band.most > 0 and verdicts[band.name] != "agrees"
+        if band.inside_from is not None and band.most > 0 and band.chance == "beyond"
     ]
-    everywhere = all(band.inside_from == 0 for band in motion)
-    inside = bool(moving) and not everywhere
-    chance = [
-        name_of(band.name)
-        for band in floor.bands
-        if inside and not band.beyond and verdicts[band.name] != "agrees"
-    ]
+
+    def named(chance: Chance) -> str | None:
+        names = [name_of(band.name) for band in floor.bands if band.chance == chance]
+        return few(names, _NAMED) if names else None
+
+    recorded = {0, 1} - set(floor.sides)
     return template.blocks(
         "floor",
-        side=short_labels(comparison)[0],
+        sides=floor_sides(comparison, floor),
+        recorded=short_labels(comparison)[recorded.pop()] if recorded else None,
         runs=floor.runs,
         changed=changed_by(floor),
         ended=floor.ended or None,
         most=listed(sizes) if sizes and not floor.ended else None,
+        clear=f"{CLEAR:g}",
         every_gap=if_true(everywhere and any(band.most > 0 for band in motion)),
-        inside=", ".join(moving) if inside else None,
-        chance=listed(chance) if chance else None,
+        later=few(moving, _NAMED) if moving else None,
+        inside=named("inside"),
+        between=named("cannot be told"),
     )
 
 
-def changed_by(floor: Figures) -> str:
+def changed_by(floor: ChaosFloor) -> str:
     """What was changed in the runs that it is made of."""
     size = floor.uncertain
     sizes = [rounded(v, unit) for v, unit in ((size.length, "m"), (size.angle, "rad")) if v > 0]
-    start = f", and its start by {listed(sizes)}" if sizes else ""
+    start = f", and the start by {listed(sizes)}" if sizes else ""
     return f"start and commands changed by rounding ({floor.rounding:g}){start}"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compare import Agreement, Comparison, Series
+from ..compare.perturbed import ChaosFloor
 from ..compare.series import NORMAL, normal_forces, total_forces
 from ..interface import Array
 from ..measures import same_pairs
@@ -112,10 +113,10 @@ class BothRuns(Interactive):
     lead: tuple[int, ...]
 
 
-def charts_of(comparison: Comparison, floor: Figures | None = None) -> tuple[QuantityChart, ...]:
+def charts_of(comparison: Comparison, floor: ChaosFloor | None = None) -> tuple[QuantityChart, ...]:
     """A chart for each quantity that is a number throughout; of many, those most beyond."""
     agreements = {agreement.name: agreement for agreement in comparison.agreements}
-    bands = {} if floor is None else {band.name: band._width for band in floor.bands}
+    bands = {} if floor is None else {band.name: band.width for band in floor.bands}
     drawn = [curve for curve in comparison.curves if np.isfinite(curve.difference).all()]
     ranked = sorted(
         drawn, key=lambda curve: (curve.kind != "tip", -agreements[curve.name].tolerances())

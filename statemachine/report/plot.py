@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..compare import Comparison, default_tip
+from ..compare.perturbed import ChaosFloor
 from ..interface import Array, JointType
 from ..measures import COUNT, distances
 from ..measures.text import few, milliseconds, reading, short_time
@@ -47,7 +48,7 @@ COMMAND = "the command"
 Spans = Sequence[Sequence[Sequence[float]]]
 
 
-def of_comparison(comparison: Comparison, floor: Figures | None = None) -> Figures:
+def of_comparison(comparison: Comparison, floor: ChaosFloor | None = None) -> Figures:
     """The figure of two traces: a row for each quantity, and who touches when.
 
     Returns:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compare.labels import lacking
+from ..compare.perturbed import CLEAR
 from ..installed import DEFAULT
 from ..measures.text import (
     NONE,
@@ -53,13 +54,27 @@ PLAYED = "the models were run again, with the recorded starts and commands"
 ANSWERS = {
     "rounding": "The two sides move alike: {gap}",
     "alike": "The two sides move alike, although they differ: {gap}",
-    "chaos": "Nothing can be concluded: the gap is {gap}, and the chaos floor {floor}",
+    "within": "The gap of {gap} is within its tolerance of {tolerance}, and may be chance: the "
+    "chaos floor is {floor}, from {draws} perturbed runs of each side",
+    "inside": "Nothing can be concluded: the gap is {gap}, and the chaos floor {floor}, from "
+    "{draws} perturbed runs of each side",
+    "cannot be told": "Whether the gap of {gap} is more than chance cannot be told: the chaos "
+    "floor is {floor}, from {draws} perturbed runs of each side",
     "cause": "{cause}, {left} on the left and {right} on the right: {part} of the {gap}",
     "bare": "{cause}: {part} of the {gap}",
     "hidden": "The differences do not cause the {gap}: without them it is {brought}",
     "masked": "No single difference causes the {gap}: the differences act together",
+    "together": "No single difference causes the {gap}: all of them together explain {part}",
     "located": (
         "{part} of the {gap} comes from {cause}, which no setting that both read makes the same"
+    ),
+    "one engine": (
+        "The cause was not found: {part} of the {gap} goes without {cause} on both sides, but both "
+        "compute that in the same way, so it is where the gap shows and not what causes it"
+    ),
+    "one engine, integrator": (
+        "The cause was not found: {part} of the {gap} goes when both sides run with {without}, but "
+        "both integrate in the same way, so it is where the gap shows and not what causes it"
     ),
     "refused": (
         "{part} of the {gap} goes without {cause} on both sides; it may come from {refused}, which "
@@ -92,10 +107,11 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     title, *further = [*missing(result.missing), answer(result)]
     lines = [*map(sentence, (*further, *said, *only, *result.notes)), *proofs(result), result.says]
     engines = {side.backend for side in result.provenance}
-    stays = not (result.is_rounding or result.is_explained)
+    verdict = result.verdict
+    stays = verdict.divides and not verdict.holds
     hint = result.located > UNEXPLAINED >= result.unexplained
     located = {place.name for place in result.found_in}
-    between = hint and not result.is_rounding and len(engines) > 1
+    between = hint and verdict.divides and len(engines) > 1
     refused = [row.name for row in result.shares if row.note]
     files = {side.model_sha256 for side in result.provenance}
     return template.page(
@@ -118,9 +134,9 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         files=if_true(stays and not refused and len(engines) == 1),
         both=if_true(min(len(engines), len(files)) > 1),
         parts=three_parts(result)[1:],
-        holds=result.is_explained and not (result.is_rounding and refused),
+        holds=verdict.holds,
         answer=answer(result),
-        three="" if result.is_rounding else f" {parts(result)}.",
+        three=f" {parts(result)}." if verdict.divides else "",
     )
 
 
@@ -132,46 +148,43 @@ def missing(parts: Sequence[tuple[str, str]]) -> list[str]:
 
 def answer(result: Explanation) -> str:
     """What the gap comes from, in a sentence without its end."""
-    gap, floor = _amount(result, result.gap), _amount(result, result.floor)
-    if result.is_rounding:
-        differ = "alike" if result.shares else "rounding"
-        kind = differ if result.gap <= result.negligible else "chaos"
-        if kind != "chaos":
-            gap = f"{gap} is rounding" if result.gap else "the gap is 0"
-        return ANSWERS[kind].format(gap=gap, floor=floor)
-    causes = [row for row in result.shares if row.share]
+    verdict, kind = result.verdict, str(result.verdict.answer)
+    gap = _amount(result, result.gap)
+    if kind in ("rounding", "alike"):
+        gap = f"{gap} is rounding" if result.gap else "the gap is 0"
+    cause, left, right, without, part = "", NONE, NONE, "", percent(result.unexplained)
     refused = [row.name for row in result.shares if row.note]
+    causes = [row for row in result.shares if row.share]
     places = sorted(result.found_in, key=lambda place: -place.share)
-    parts = {
-        "cause": abs(causes[0].share) if causes else 0.0,
-        "located": places[0].share if places else 0.0,
-        "unexplained": result.unexplained,
-    }
-    kind = max(parts, key=parts.__getitem__)
-    part, cause, left, right = percent(parts[kind]), "", NONE, NONE
-    if result.is_masked:
-        kind = "hidden" if result.is_wider else "masked"
-    elif kind == "located":
-        cause = f"the {places[0].name}" if places[0].values else places[0].name
-        # What only one side has is a setting, and closes the gap only where both are without it.
-        switches = [_values(row) for row in result.shares if row.name == places[0].name]
-        kind = "refused" if refused else kind
-        kind = "still" if places[0].is_still else kind
-        kind, (left, right) = ("switched", switches[0]) if switches else (kind, (left, right))
+    if kind in ("located", "switched", "one engine", "refused", "still"):
+        place = places[0]
+        part, without = percent(place.share), place.without
+        cause = f"the {place.name}" if place.values else place.name
+        if kind == "one engine" and place.values:
+            kind = "one engine, integrator"
+        if kind == "switched":
+            # The feature is on on one side alone, and the gap closes where both are without it.
+            left, right = next(_values(row) for row in result.shares if row.name == place.name)
+    elif kind == "together":
+        part = percent(result.explained)
     elif kind == "cause":
+        part = percent(abs(causes[0].share))
         cause, (left, right) = capital(causes[0].name), _values(causes[0])
         kind = "bare" if NONE in (left, right) else "cause"
-    brought = _amount(result, result.brought or 0.0)
     said = ANSWERS[kind].format(
         cause=cause,
         left=left,
         right=right,
         part=part,
+        without=without,
         gap=gap,
-        brought=brought,
+        brought=_amount(result, result.brought or 0.0),
         refused=", ".join(refused[:2]),
+        tolerance=_amount(result, result.tolerance),
+        floor=_amount(result, result.floor),
+        draws=result.draws,
     )
-    if kind in ("cause", "bare"):
+    if verdict.answer == "cause":
         alone, last = causes[0].alone, causes[0].last
         if None not in (alone, last) and abs(alone - last) > _INTERACTS:
             return INTERACT.format(answer=said, alone=percent(alone), last=percent(last))
@@ -198,7 +211,8 @@ def causes(result: Explanation) -> list[Block]:
     able = [row for row in result.shares if not row.note]
     refused = [f"{capital(row.name)}: {row.note}." for row in result.shares if row.note]
     small, floor = result.gap <= result.negligible, _amount(result, result.floor)
-    noisy = not result.is_rounding and result.floor > _SMALL * result.gap
+    divides = result.verdict.divides
+    noisy = divides and result.floor > _SMALL * result.gap
     hardly = _hardly(result, able)
     gap, method = result.first[result.quantity], result.method
     others = [
@@ -216,8 +230,10 @@ def causes(result: Explanation) -> list[Block]:
         explained=result.quantity,
         elsewhere="; ".join(others) or None,
         between=if_true(result.between),
-        negligible=_amount(result, result.negligible) if result.is_rounding and small else None,
-        chaos=floor if result.is_rounding and not small else None,
+        negligible=_amount(result, result.negligible) if small else None,
+        chaos=floor if not (divides or small) else None,
+        draws=result.draws,
+        clear=f"{CLEAR:g}",
         same=if_true(not (result.shares or result.found_in)),
         table=_table(result, able, hardly),
         more=few([row.name for row in hardly], 6) or None,
@@ -250,14 +266,14 @@ def causes(result: Explanation) -> list[Block]:
         impossible=len(result.impossible) or None,
         such_as=", ".join(next(iter(result.impossible), ())),
         noise=floor if noisy else None,
-        quiet=floor if result.floor and not (noisy or result.is_rounding) else None,
+        quiet=floor if result.floor and divides and not noisy else None,
         noise_part=percent(result.floor / result.gap) if noisy else None,
     )
 
 
 def steps(result: Explanation) -> list[Block]:
     """What to change, where, and what is left of the gap with everything changed."""
-    if result.is_rounding:
+    if not result.verdict.divides:
         return []
     lines = []
     able = [row for row in result.shares if not (row.note or row.chosen)]
@@ -294,8 +310,10 @@ def steps(result: Explanation) -> list[Block]:
 
 def parts(result: Explanation) -> str:
     """The three parts of a gap, in a sentence without its end."""
-    scale = result.gap / result.brought if result.is_wider and result.brought else 1.0
-    return (HIDDEN if result.is_wider else PARTS).format(
+    text, scale = PARTS, 1.0
+    if result.verdict.answer == "hidden" and result.brought:
+        text, scale = HIDDEN, result.gap / result.brought  # parts of the wider gap
+    return text.format(
         gap=_amount(result, result.gap),
         brought=_amount(result, result.brought or 0.0),
         explained=percent(result.explained),
@@ -306,9 +324,9 @@ def parts(result: Explanation) -> str:
 
 def three_parts(result: Explanation) -> list[Block]:
     """The three parts of the gap, and what they mean; nothing where there is none to explain."""
-    if result.is_rounding:
+    if not result.verdict.divides:
         return []
-    clear = result.is_explained and not result.located
+    clear = result.verdict.holds and not result.located
     return template.blocks("why_parts", parts=parts(result))[: 1 if clear else None]
 
 
@@ -325,7 +343,7 @@ def _table(result: Explanation, able: Sequence[Figures], small: Sequence[Figures
         rows.append((f"{len(small)} more, none above 0.1 %", NONE, NONE, explains, NONE, NONE))
     title = (
         "What differs"
-        if result.is_rounding
+        if not result.verdict.divides
         else TITLE.format(
             gap=_amount(result, result.gap),
             quantity=result.quantity,
@@ -344,7 +362,7 @@ def _table(result: Explanation, able: Sequence[Figures], small: Sequence[Figures
 
 def _hardly(result: Explanation, able: Sequence[Figures]) -> list[Figures]:
     """The differences without an effect, if there are several."""
-    large = able if result.is_rounding else _at_least(_NO_PART, able)
+    large = _at_least(_NO_PART, able) if result.verdict.divides else able
     return [row for row in able if row not in large] if len(able) > len(large) + 1 else []
 
 
@@ -372,7 +390,7 @@ def _row(result: Explanation, row: Figures) -> tuple[str, ...]:
     explains, alone, last = percent(row.share), percent(row.alone), percent(row.last)
     if row.error and math.isfinite(row.error):
         explains += f" ± {percent(row.error)}"
-    noise = 0.0 if result.is_rounding else result.floor / result.gap
+    noise = result.floor / result.gap if result.verdict.divides else 0.0
     if abs(row.share or 0.0) < noise and noise > _SMALL:  # no part is claimed inside the floor
         explains, alone, last = f"< {percent(noise)}", NONE, NONE
     return what, *_values(row), TableCell(explains, share=row.share), alone, last

@@ -5,16 +5,19 @@
 - `settings`: what an engine as it comes sets, and what can be left out
 - `trials`: the runs, each made once; `gap`: what they are measured by, and what touches first
 - `shapley`: shares of a gap among causes, and where the rest comes from
+- `verdict`: what is answered, and whether that answers the question
 """
 
 from __future__ import annotations
 
-from .explain import UNEXPLAINED, Explanation, explain
+from .explain import Explanation, explain
 from .shapley import ADDS_UP
+from .verdict import UNEXPLAINED, Verdict
 
 __all__ = [
     "ADDS_UP",
     "UNEXPLAINED",
     "Explanation",
+    "Verdict",
     "explain",
 ]

@@ -21,20 +21,18 @@ from ...runs.robot import moved_by_actuators
 from ...runs.scenarios import Scenario
 from ..labels import files_apart
 from ..matching import match_alike, match_models, missing_parts
-from ..perturbed import EXACT, Uncertainty
+from ..perturbed import EXACT, RUNS, Uncertainty, against_floor
 from .causes import Cause, as_written, order_of_joints
 from .gap import touched_at_start
 from .shapley import locate, shapley
 from .trials import Measure, Trials
+from .verdict import UNEXPLAINED, CausePart, Facts, LocatedPart, Verdict, gap_state, verdict_of
 
 # What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
 # 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
 ROUNDING = {"rad": 1e-8, "m": 1e-9}
-UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
 _REDUNDANT = 0.1  # of the gap: so much a cause may leave that makes others needless
-_MASKED = 2.0  # of the gap: a cause with more has others against it
 _STILL = 1e-3  # [rad or m] over a whole run
-NOISY = 0.5  # of the gap: where the chaos floor is more, nothing can be concluded
 _PERIODS = (
     "commands come by the step, which is {left} on the left and {right} on the right: what comes "
     "of that counts as timestep"
@@ -62,8 +60,12 @@ class Explanation(Figures):
             where the rest comes from, not why.
         unexplained: The part that stays.
         negligible: Gaps below this are taken for rounding, in `unit`.
-        floor: The chaos floor, in `unit`: how far the left side is from itself, started and
-            commanded anew with rounding, and with what is not known of the start.
+        tolerance: A gap that does not matter, in `unit`.
+        floor: The chaos floor, in `unit`: how far the two sides are at most from themselves,
+            started and commanded anew with rounding, and with what is not known of the start.
+        draws: How many such runs were made of each side; 0 if the floor was not looked for.
+        one_engine: Whether both sides run on one engine and release, both with its own settings or
+            both with the model's.
         redundant: Causes of which each one alone takes away nine tenths of the gap or more, and the
             last of them less than a tenth.
         impossible: Sets of causes that could not be run.
@@ -78,48 +80,35 @@ class Explanation(Figures):
     """
 
     @property
-    def is_rounding(self) -> bool:
-        """Whether there is no gap to explain: it is rounding, or chaos is most of it."""
-        return self.gap <= max(self.negligible, self.floor / NOISY)
+    def verdict(self) -> Verdict:
+        """What the gap comes from, and whether that answers the question."""
+        return verdict_of(
+            Facts(
+                state=gap_state(self.gap, self.negligible, self.tolerance, self.floor),
+                differs=bool(self.shares),
+                refused=any(row.note for row in self.shares),
+                one_engine=self.one_engine,
+                explained=self.explained,
+                located=self.located,
+                unexplained=self.unexplained,
+                cause=self._largest_cause(),
+                places=tuple(
+                    LocatedPart(place.share, place.is_still, self._is_switch(place.name))
+                    for place in self.found_in
+                ),
+            )
+        )
 
-    @property
-    def is_explained(self) -> bool:
-        """Whether no more than a twentieth of the gap stays unexplained.
+    def _largest_cause(self) -> CausePart | None:
+        """The cause with the largest share, which comes first; None if none takes away anything."""
+        for row in self.shares:
+            if row.share:
+                return CausePart(row.share, row.alone, row.last)
+        return None
 
-        Nothing is explained of a gap that may be chaos, nor where the gap grows when the
-        differences are brought to the same.
-        Where something differs that cannot be brought to the same, what is only located may come
-        from that, and counts as unexplained; so does a part that goes with the motion itself.
-        """
-        weak = any(row.note for row in self.shares) or any(p.is_still for p in self.found_in)
-        stays = 1.0 - self.explained if weak else self.unexplained
-        if self.is_rounding:
-            return self.gap <= self.negligible
-        return abs(stays) <= UNEXPLAINED and not self.is_wider
-
-    @property
-    def is_wider(self) -> bool:
-        """Whether the gap is wider with all differences brought to the same."""
-        return self.explained < -UNEXPLAINED
-
-    @property
-    def is_masked(self) -> bool:
-        """Whether the differences act together, so that none of them causes the gap.
-
-        All of them together widen it; or the cause with the largest share, where no more is
-        located, widens it or takes away more than twice of it: by its share, alone, or last.
-        """
-        parts = [
-            self.explained,
-            *(
-                part
-                for row in self.shares[:1]
-                if abs(row.share or 0.0) > self.located
-                for part in (row.share, row.alone, row.last)
-                if part
-            ),
-        ]
-        return min(parts) < -UNEXPLAINED or max(parts) > _MASKED
+    def _is_switch(self, feature: str) -> bool:
+        """Whether a feature that was left out on both sides is on on one side, and off on one."""
+        return any(row.name == feature for row in self.shares)
 
 
 def explain(
@@ -176,7 +165,7 @@ def explain(
     scenario = scenario if recordings else scenario.on(left)
     compiled = left.compiled is not None and right.compiled is not None
     matched = match_models(left, right, names) if compiled else match_alike(left, right)
-    runs, expected = 0, 10
+    runs, expected = 0, 10 + (2 * RUNS if uncertain is not None else 0)
 
     def ran() -> None:
         nonlocal runs, expected
@@ -209,8 +198,8 @@ def explain(
     if quantity is None:
         quantity = _quantity(trials, first, floors, measure, left)
     gap, floor = getattr(first[quantity], measure), floors.get(quantity, 0.0)
-    negligible = ROUNDING[units[quantity]]
-    nothing = gap <= max(negligible, floor / NOISY)
+    negligible, tolerance = ROUNDING[units[quantity]], trials.ruler.tolerance(quantity)
+    nothing = gap_state(gap, negligible, tolerance, floor) != "beyond"
     if nothing:
         listed = tuple(cause for cause in listed if cause.kind != "sensor")
 
@@ -218,7 +207,7 @@ def explain(
         gaps = trials.gaps(brought)
         return getattr(gaps[quantity], measure) if gaps else None
 
-    expected = 3 * len(able) + 10
+    expected = runs + 3 * len(able) + 10
     divided = shapley(
         [] if nothing else able,
         value,
@@ -276,7 +265,10 @@ def explain(
         located=located,
         unexplained=unexplained,
         negligible=negligible,
+        tolerance=tolerance,
         floor=floor,
+        draws=0 if uncertain is None else RUNS,
+        one_engine=_is_one_engine(left, right),
         redundant=tuple(redundant) if len(redundant) > 1 and explained > UNEXPLAINED else (),
         impossible=divided.impossible,
         unmatched=matched.only,
@@ -290,6 +282,15 @@ def explain(
         took=time.perf_counter() - began,
         provenance=(provenance(left), provenance(right)),
     )
+
+
+def _is_one_engine(left: Model, right: Model) -> bool:
+    """Whether two sides are computed by one engine and release, with settings of one kind."""
+    sides = [
+        (model.backend, model.engine_version, getattr(model, "defaults", "model"))
+        for model in (left, right)
+    ]
+    return sides[0] == sides[1]
 
 
 def _ended(trials: Trials, able: list[str]) -> EndedEarlyError:
@@ -323,12 +324,16 @@ def _quantity(
         for name, gap in first.items()
         if getattr(gap, measure) > ROUNDING[ruler.units[name]]
     }
-    clear = {
-        name: off
-        for name, off in above.items()
-        if getattr(first[name], measure) > floors.get(name, 0.0)
-    }
-    beyond = clear or above
+    beyond = above
+    for chance in ("beyond", "cannot be told"):
+        clear = {
+            name: off
+            for name, off in above.items()
+            if against_floor(getattr(first[name], measure), floors.get(name, 0.0)) == chance
+        }
+        if clear:
+            beyond = clear
+            break
     if preferred not in ruler.coordinates and beyond.get(preferred, 0.0) > 1:
         return preferred
     own = {name: beyond[name] for name in ruler.coordinates if beyond.get(name, 0.0) > 1}

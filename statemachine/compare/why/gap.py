@@ -197,7 +197,7 @@ class Ruler:
     def floor(
         self, run: Curves, perturbed: Sequence[Curves | None], measure: str
     ) -> dict[str, float]:
-        """The chaos floor of every quantity, in its unit: a gap that is no larger says nothing.
+        """Return how far perturbed runs of a side get from it, in every quantity, in its unit.
 
         Args:
             run: The side as it comes.

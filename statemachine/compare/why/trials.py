@@ -392,24 +392,44 @@ class Trials:
         )
 
     def floor(self, uncertain: Uncertainty, measure: Measure) -> dict[str, float]:
-        """The chaos floor of each quantity, in its unit: a gap that is no larger says nothing."""
-        base = _Run(0, _NONE)
-        rerun = self._rerun(base, self._models[0])
+        """Compute the chaos floor of each quantity, in its unit.
 
-        def run(k: int) -> tuple[Curves | None]:
-            trace = perturbed_run(rerun, k, seed=self.seed, uncertain=uncertain, derive=False)
-            return (self.ruler.curves(trace),)
+        Args:
+            uncertain: What is not known of the start.
+            measure: Which figure of a gap; the largest of all perturbed runs of both sides counts.
 
-        runs = [partial(run, k) for k in range(RUNS)]
-        jobs = self._forks_for(RUNS)
-        curves = (
-            in_forks(runs, jobs, lambda: None, self._took)
-            if jobs > 1
-            else [call() for call in runs]
-        )
-        if None in curves:
+        Raises:
+            EngineError: A process ended before its run was done, twice.
+        """
+        reruns = [self._rerun(_Run(side, _NONE), self._models[side]) for side in (0, 1)]
+
+        def run(side: int, k: int) -> tuple[Curves | None]:
+            trace = perturbed_run(
+                reruns[side], k, seed=self.seed, uncertain=uncertain, derive=False
+            )
+            return (self.ruler.curves(trace, self._posed(self._models[side]), side),)
+
+        def called(call: Callable[[], tuple[Curves | None]]) -> tuple[Curves | None]:
+            outcome = call()
+            self._ran()
+            return outcome
+
+        runs = [partial(run, side, k) for side in (0, 1) for k in range(RUNS)]
+        jobs = self._forks_for(len(runs))
+        if jobs > 1:
+            outcomes = in_forks(runs, jobs, self._ran, self._took)
+        else:
+            outcomes = [called(call) for call in runs]
+        curves = [outcome[0] for outcome in outcomes if outcome is not None]
+        if len(curves) < len(runs):
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
-        return self.ruler.floor(self._runs[base].curves, [run[0] for run in curves if run], measure)
+        floors = [
+            self.ruler.floor(
+                self._runs[_Run(side, _NONE)].curves, curves[side * RUNS :][:RUNS], measure
+            )
+            for side in (0, 1)
+        ]
+        return {name: max(floor[name] for floor in floors) for name in self.ruler.units}
 
     def _measured(self, side: int, model: Model, trace: Trace) -> Figures:
         curves = self.ruler.curves(trace, self._posed(model), side)
