@@ -64,7 +64,8 @@ def test_one_cause_is_found_and_explains_all(name, tmp_path):
     assert all(abs(share) <= 0.02 for cause, share in told.items() if cause != case.cause), told
     assert set(told) <= {case.cause, idle.cause, "extra actuator of more"}
     assert is_brought(found)
-    assert_has(found, is_explained=True, located=0)
+    assert_has(found, located=0)
+    assert found.verdict.holds
 
 
 Game = tuple[str, str, dict[str, float]]
@@ -281,7 +282,7 @@ REFUSED = [
 def test_what_is_not_brought_over_is_refused_with_its_reason(left, right, reason, tmp_path):
     found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
     assert {each.note.rpartition(" of ")[2] for each in found.shares} == {reason}
-    assert not found.is_explained
+    assert not found.verdict.holds
 
 
 EXTRA = (
@@ -295,7 +296,7 @@ def test_what_cannot_be_brought_over_stays_unexplained(tmp_path):
     found = explained(tmp_path, ARM, ARM.replace(*EXTRA), scenario=SWING)
     assert [each.name for each in found.shares if each.share is None] == ["extra joint of more"]
     assert found.unexplained > 0.9
-    assert not found.is_explained
+    assert not found.verdict.holds
     assert found.unmatched[1]["joint"] == ("more",)
     # A joint more on a body that is there does not hang it on another part.
     assert {"joints of lower", "extra joint of tilt"} == {
@@ -359,7 +360,7 @@ def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):
     told = shares(found)
     assert told[case.cause] >= 0.95, told
     assert all(abs(share) <= 0.02 for cause, share in told.items() if cause != case.cause), told
-    assert found.is_explained
+    assert found.verdict.holds
 
 
 @pytest.mark.usefixtures("bullet")
@@ -593,7 +594,7 @@ def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
     assert [each.name for each in found.shares] == (
         ["order of ctrl"] if name == "permuted actuators" else []
     )
-    assert_has(found, is_rounding=True, is_explained=True)
+    assert_has(found.verdict, answer="alike", holds=True)
 
 
 def _easily_missed(name: str) -> tuple[str, str, list[str], dict[str, Any]]:
@@ -703,7 +704,8 @@ def test_causes_are_brought_over(name, tmp_path):
     assert len(told) > 1 or told[causes[0]] == pytest.approx(1.0)
     # A weld is turned round; else the bits are the same.
     rounding = 1e-15 * ("parameters" in causes[0])
-    assert_has(found, brought=pytest.approx(0.0, abs=rounding), is_explained=True)
+    assert_has(found, brought=pytest.approx(0.0, abs=rounding))
+    assert found.verdict.holds
     assert found.unit == "rad" or "rotation" not in how.get("quantity", "")
 
 

@@ -120,7 +120,7 @@ def test_json_terminal_and_page_say_what_was_found(name, ran, tmp_path, here):
     assert told.items() >= json.loads(dumps(found)).items()
     assert not any(each["name"].startswith("start") for each in told["shares"])
 
-    rounding, sentence = found.is_rounding, why.parts(found)
+    rounding, sentence = not found.verdict.divides, why.parts(found)
     able = [e for e in found.shares if not e.note and (rounding or abs(e.share) >= 1e-3)]
     rows = [
         (capital(each.name), "\N{EM DASH}" if rounding else percent(each.share)) for each in able

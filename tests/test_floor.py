@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ import statemachine as sm
 from statemachine.compare import Uncertainty, chaos_floor, compare, perturbed_runs
 from statemachine.compare.convergence import convergence, verdict_of
 from statemachine.compare.matching import match_models
-from statemachine.compare.perturbed import ROUNDING, parse_uncertainty
+from statemachine.compare.perturbed import ROUNDING, RUNS, Band, parse_uncertainty
 from statemachine.compare.why.gap import Ruler
 from statemachine.errors import BadInputError, EndedEarlyError, EngineWarning
 from statemachine.page import Figures
 from statemachine.report import compare as report
+from statemachine.report.finding import headline, leading
 from statemachine.report.steps import convergence as page
 from statemachine.runs import Rerun, Trace, record
 
@@ -30,10 +32,10 @@ def rerun(model: sm.Model, seconds: float, **start: Any) -> Rerun:
     return Rerun(model, lambda _: None, seconds, **start)
 
 
-def band_of(run: Rerun, name: str, two: Trace | None = None, **how: Any) -> Figures:
-    """The floor of one quantity of a run, against itself or another."""
+def band_of(run: Rerun, name: str, two: Trace | None = None, **how: Any) -> Band:
+    """The floor of one quantity of a run, against itself or one that was recorded."""
     one = run.record()
-    floor = chaos_floor(compare(one, two or one), run, **how)
+    floor = chaos_floor(compare(one, two or one), (run, None), **how)
     (band,) = [band for band in floor.bands if band.name == name]
     return band
 
@@ -47,22 +49,22 @@ def test_a_damped_pendulum_that_hangs_has_a_floor_at_rounding(tmp_path: Path) ->
 def test_the_floor_of_a_double_pendulum_grows(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 20.0, qpos=np.array([2.5, 1.0]))
     band = band_of(run, "lower")
-    assert band._width[0] < 1e-9
-    assert band.end > 1e4 * band._width[0]
+    assert band.width[0] < 1e-9
+    assert band.end > 1e4 * band.width[0]
 
 
 def test_the_floor_of_a_box_that_lands_on_an_edge_grows_with_the_impact(tmp_path: Path) -> None:
     tilt = np.array([0.0, 0.0, 0.4, np.cos(0.6), np.sin(0.6) * 0.8, np.sin(0.6) * 0.6, 0.0])
     band = band_of(rerun(model_of(tmp_path, TILTED_BOX), 1.0, qpos=tilt), "box, rotation")
-    assert band.most > 20 * band._width[:75].max()  # of 0.15 s
+    assert band.most > 20 * band.width[:75].max()  # of 0.15 s
 
 
 def test_identical_sides_are_inside_all_the_time(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 2.0, qpos=np.array([2.5, 1.0]))
     comparison = compare(*[run.record()] * 2)
-    floor = chaos_floor(comparison, run)
+    floor = chaos_floor(comparison, (run, run))
     assert {band.inside_from for band in floor.bands} == {0.0}
-    assert not any(band.beyond for band in floor.bands)
+    assert {band.chance for band in floor.bands} == {None}
     text = shown(report.page(comparison, floor=floor))
     assert "Every gap lies inside it, all the time." in " ".join(text.split())
 
@@ -75,17 +77,102 @@ def test_a_gap_of_chaos_alone_is_told_from_one_that_was_made(tmp_path: Path) -> 
     heavier = model_of(tmp_path, text, "heavier.xml")
     made = rerun(heavier, 20.0, qpos=np.array([2.5, 1.0])).record()
     bands = [band_of(run, "lower", two) for two in (chance, made)]
-    assert [bool(band.beyond) for band in bands] == [False, True]
+    assert [band.chance for band in bands] == ["inside", "beyond"]
+
+
+def swapped_pair(folder: Path, seconds: float) -> tuple[Rerun, Rerun]:
+    """A double pendulum that swings without damping, and one that comes to rest."""
+    start = np.array([2.9, 0.3])
+    damped = DOUBLE_PENDULUM.replace("<joint ", '<joint damping="0.1" ')
+    assert damped != DOUBLE_PENDULUM
+    models = model_of(folder, damped, "damped.xml"), model_of(folder, DOUBLE_PENDULUM, "free.xml")
+    one, two = (rerun(model, seconds, qpos=start) for model in models)
+    return one, two
+
+
+def test_the_floor_is_the_largest_of_both_sides_and_swapping_them_changes_nothing(
+    tmp_path: Path,
+) -> None:
+    calm, chaotic = swapped_pair(tmp_path, 12.0)
+    comparison = compare(calm.record(), chaotic.record())
+    both = chaos_floor(comparison, (calm, chaotic))
+    swapped = chaos_floor(compare(chaotic.record(), calm.record()), (chaotic, calm))
+    for band, other in zip(both.bands, swapped.bands, strict=True):
+        assert (band.name, band.chance, band.most) == (other.name, other.chance, other.most)
+        np.testing.assert_array_equal(band.width, other.width)
+    ours, theirs = (
+        {band.name: band.most for band in chaos_floor(comparison, one).bands}
+        for one in ((calm, None), (None, chaotic))
+    )
+    assert ours["lower"] < 1e-9
+    assert theirs["lower"] > 1e-3
+    assert {band.name: band.most for band in both.bands} == theirs
+
+
+def test_forks_give_the_floor_that_one_process_gives(tmp_path: Path) -> None:
+    calm, chaotic = swapped_pair(tmp_path, 0.2)
+    comparison = compare(calm.record(), chaotic.record())
+    widths = [
+        [band.width for band in chaos_floor(comparison, (calm, chaotic), runs=2, jobs=jobs).bands]
+        for jobs in (1, 2)
+    ]
+    one, two = widths
+    np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.slow
+def test_no_seed_turns_inside_into_beyond(tmp_path: Path) -> None:
+    """Starts that differ by less than the draws, and by about twice as much."""
+    start = np.array([2.5, 1.0])
+    model = model_of(tmp_path, DOUBLE_PENDULUM).replace(timestep=0.01, integrator="rk4")
+    run = rerun(model, 20.0, qpos=start)
+    met = set()
+    for off in (1e-13, 2e-12):
+        comparison = compare(run.record(), rerun(model, 20.0, qpos=start + off).record())
+        found: dict[str, set[str | None]] = {}
+        for seed in range(20):
+            for band in chaos_floor(comparison, (run, None), seed=seed).bands:
+                found.setdefault(band.name, set()).add(band.chance)
+        for chances in found.values():
+            assert not {"inside", "beyond"} <= chances
+            met |= chances
+    assert "inside" in met
+
+
+def test_a_gap_within_its_tolerance_agrees_whatever_the_floor(tmp_path: Path) -> None:
+    run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 0.05, qpos=np.array([2.5, 1.0]))
+    near = rerun(run.model, 0.05, qpos=np.array([2.5 + 1e-9, 1.0]))
+    comparison = compare(run.record(), near.record())
+    floor = chaos_floor(comparison, (run, near), uncertain=Uncertainty(0.0, 0.5))
+    assert comparison.agrees
+    assert report.page(comparison, floor=floor).holds
+    assert {band.chance for band in floor.bands} == {None}
+
+
+def test_what_may_be_chance_is_not_what_leads(tmp_path: Path) -> None:
+    """A quantity inside the floor is named only where no other is beyond it."""
+    run = rerun(model_of(tmp_path, DOUBLE_PENDULUM), 1.0, qpos=np.array([2.5, 1.0]))
+    near = rerun(run.model, 1.0, qpos=np.array([2.5, 1.1]))
+    comparison = compare(run.record(), near.record())
+    first = leading(comparison)
+    floor = chaos_floor(comparison, (run, near), runs=1)
+    bands = [replace(b, chance="inside") if b.name == first.name else b for b in floor.bands]
+    assert leading(comparison, replace(floor, bands=tuple(bands))).name != first.name
+    everywhere = replace(floor, bands=tuple(replace(b, chance="inside") for b in bands))
+    finding = headline(comparison, [], floor=everywhere)
+    assert "Nothing can be concluded" in finding.end
+    assert "1 perturbed runs of each side" in finding.end
+    assert not finding.holds
 
 
 def test_the_band_is_wide_about_a_moment_and_forgets_it_later(tmp_path: Path) -> None:
     """A running maximum would not fall, and one moment alone would dip at each crossing."""
     run = rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([1.0]))
     band = band_of(run, "swing", uncertain=Uncertainty(0.0, 0.01))
-    assert band._width.min() > 0
+    assert band.width.min() > 0
     assert band.end < 0.2 * band.most
     # The difference oscillates: at a moment alone it is next to zero again and again.
-    assert band._width[:200].min() > 0.2 * band.most
+    assert band.width[:200].min() > 0.2 * band.most
 
 
 def test_quaternions_of_perturbed_starts_stay_unit(tmp_path: Path) -> None:
@@ -104,7 +191,7 @@ def test_a_seed_gives_the_same_runs_again_and_another_gives_others(tmp_path: Pat
         for seed in (0, 0, 1)
     )
     assert one == again
-    assert len({*one, *other}) == 8
+    assert len({*one, *other}) == 2 * RUNS
 
 
 def test_a_command_that_stays_as_it_is_does_not_wander() -> None:
@@ -138,7 +225,7 @@ def test_uncertainties_are_read_in_their_units() -> None:
 @pytest.mark.usefixtures("bullet")
 def test_the_command_line_shows_the_floor(here: Cli) -> None:
     asked = ("compare", "hold", "--seconds", "0.4")
-    assert json.loads(here(*asked, "--json").stdout)["floor"]["runs"] == 4
+    assert json.loads(here(*asked, "--json").stdout)["floor"]["runs"] == RUNS
     assert "chaos" not in here(*asked, "--no-chaos").stdout
     # Where it is above a tolerance it stands in the table, quantity by quantity.
     assert re.search("RMS +settled +from, s\n", here(*asked).stdout)

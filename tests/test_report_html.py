@@ -307,6 +307,7 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
         "method": "all sets", "orders": 0, "brought": 0.5 * gap.worst,
         "found_in": (contact,),
         "explained": 0.5, "located": 0.5, "unexplained": 1e-8, "negligible": 1e-9, "floor": 0.0,
+        "tolerance": 1e-3, "draws": 8, "one_engine": False,
         "redundant": (), "impossible": (), "unmatched": ({}, {}), "missing": (), "notes": (),
         "still": (), "touch": None, "moments": 401, "between": False, "runs": 9, "took": 1.0,
         "provenance": (one.header.provenance, two.header.provenance),
@@ -384,8 +385,17 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
             "1.5708 on the left and 1.570796 on the right",
         ),
         (
-            explanation_of(hold, floor=0.04),
+            explanation_of(hold, floor=0.05),
             "^Nothing can be concluded: the gap is 2.58°, and the chaos",
+        ),
+        (
+            explanation_of(hold, floor=0.04),
+            "^Whether the gap of 2.58° is more than chance cannot be told: the chaos floor is",
+        ),
+        (explanation_of(hold, floor=0.04, tolerance=0.1), "^The gap of 2.58° is within its tol"),
+        (
+            with_figures(located, one_engine=True),
+            "^The cause was not found: 50.0 % of the 2.58° goes without contact on both sides",
         ),
         (explanation_of(hold, negligible=1.0), "^The two sides move alike"),
     ):
@@ -429,8 +439,8 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     row = Figures(name="shape of box", note="another size", share=None)
     found = (with_figures(contact, share=1.0),)
     assert parts(worse).endswith("Of the 3.22°, 100.0 % is localised and < 0.1 % unexplained")
-    assert [each.is_explained for each in (located, worse, still)] == [True, False, False]
-    assert not with_figures(located, shares=(row,), found_in=found).is_explained
+    assert [each.verdict.holds for each in (located, worse, still)] == [True, False, False]
+    assert not with_figures(located, shares=(row,), found_in=found).verdict.holds
 
 
 def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:

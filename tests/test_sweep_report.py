@@ -474,8 +474,8 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
         spread="0.5deg",
     )  # fmt: skip
     run_sweep(sweep, tmp_path / "s", jobs=1)
-    found = sweep_report(tmp_path / "s", floor_cells=4, jobs=1)
-    assert (the(found.floor).cells, the(found.floor).settings) == (4, 2)
+    found = sweep_report(tmp_path / "s", floor_cells=8, jobs=1)
+    assert (the(found.floor).cells, the(found.floor).settings) == (8, 2)
     assert 0 < max(each.floor or 0 for each in found.settings) < 1e-6
     (fit,) = found.together
     assert_has(fit, label="damping", varied="right", own=1.0, pairs=2)

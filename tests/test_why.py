@@ -63,7 +63,7 @@ def test_an_integrator_is_chosen_on_the_side_that_has_several(tmp_path: Path) ->
     result = explain(one, two, FALL, seconds=1.0)
     (row,) = result.shares
     assert (row.values[0][1:], row.chosen[0]) == (("rk4", "its own"), "left")
-    assert result.is_explained
+    assert result.verdict.holds
     assert "can be chosen: type integrator=" in shown(report.page(result))
 
 

@@ -224,7 +224,10 @@ def test_no_combination_is_called_an_answer_that_is_none() -> None:
         unexplained = 1.0 - explained - located
         if unexplained < 0.0:
             continue
-        facts = Facts(state, *flag, explained, located, unexplained, cause, places)
+        differs, refused, one_engine = flag
+        facts = Facts(
+            state, differs, refused, one_engine, explained, located, unexplained, cause, places
+        )
         verdict = verdict_of(facts)
         met.add(verdict.answer)
         assert verdict.divides == (state == "beyond")

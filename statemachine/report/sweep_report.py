@@ -80,7 +80,7 @@ def _floor_slots(sweep: Figures) -> dict[str, Any]:
         return {"no_floor": sweep.no_floor, "backend": None, "width": None}
     widths = [setting.floor for setting in sweep.settings if setting.floor is not None]
     return {
-        **{"no_floor": None, "backend": floor.backend, "rounding": floor.rounding},
+        **{"no_floor": None, "backend": listed(list(floor.backends)), "rounding": floor.rounding},
         **{"where": floor.settings, "cells": floor.cells, "seconds": floor.seconds},
         "width": rough(max(widths), sweep.quantity.unit),
         "inside": sum(setting.inside_floor for setting in sweep.settings),

@@ -83,12 +83,15 @@ def run_gap(left: Model, right: Model, seed: int, halve: bool = False) -> RunGap
         halve: Whether to repeat it at half the timestep, where they part.
     """
     orders = commands(left, STEPS, seed)
-    first = run(left, orders)
-    gap = _gap(left, first, run(right, orders))
+    first = {model: run(model, orders) for model in (left, right)}
+    gap = _gap(left, first[left], first[right])
     if gap.ended or gap.largest <= TOLERANCE:
         return gap
-    again = run(left, orders, np.random.default_rng(seed))
-    gap = replace(gap, floor=_gap(left, first, again).largest)
+    floors = []
+    for model in (left, right):  # the same draws, so that the order of the sides is the same
+        again = run(model, orders, np.random.default_rng(seed))
+        floors.append(_gap(model, first[model], again).largest)
+    gap = replace(gap, floor=max(floors))
     if not halve or gap.is_rounding:
         return gap
     timestep = left.timestep / 2

@@ -38,8 +38,8 @@ class RunGap:
         fastest: The largest velocity on the other engine [rad/s or m/s].
         ended: Why a side ended early; "" if none did.
         shrinks: The gap divided by that at half the timestep; None where not measured.
-        floor: How far the first engine is from its own run when start and commands are changed by
-            rounding [rad or m]; None where not measured.
+        floor: How far the two engines are at most from their own runs when start and commands are
+            changed by rounding [rad or m]; None where not measured.
     """
 
     steps: int

@@ -25,7 +25,7 @@ from .prepare import prepared
 from .request import DESIGN, REQUEST, PreparedSweep, Sweep, SweepCell, own_value
 from .rows import require_parquet, schema_of
 
-NUDGES = 2  # perturbed runs at a setting, for the chaos floor
+NUDGES = 2  # perturbed runs of each side at a setting, for the chaos floor
 # A backend, the values of the factors and a seed; a value that is None is the model's own.
 AskedCell = tuple[str, tuple[Value | None, ...], int]
 
@@ -108,7 +108,7 @@ def runner_of(
 def floor_of(
     data: SweepData, runner: CellRunner, most: int, progress: Progress = silent
 ) -> Figures | None:
-    """The chaos floor, from cells of the left side, perturbed as `compare` does it.
+    """The chaos floor, from cells of both sides, perturbed as `compare` does it.
 
     Args:
         data: Of the sweep.
@@ -117,7 +117,7 @@ def floor_of(
         progress: Told the fraction that is done.
 
     Returns:
-        backend: The side that was run again.
+        backends: The sides that were run again.
         settings: At how many settings; the others have that of the one nearest to them.
         cells: How many runs it is made of.
         seconds: What they took.
@@ -128,20 +128,23 @@ def floor_of(
     done = np.isfinite(data.runs["time"][0])
     seed = int(done.any(axis=0).argmax())
     known = np.flatnonzero(done[:, seed])
-    if not len(known) or most < NUDGES:
+    in_a_setting = NUDGES * len(data.sides)
+    if not len(known) or most < in_a_setting:
         return None
-    chosen = known[evenly(len(known), most // NUDGES)]
+    chosen = known[evenly(len(known), most // in_a_setting)]
     again = np.repeat(chosen, NUDGES)
-    cells = [(data.sides[0], data.points[k].values, seed) for k in again]
-    runs = runner.run(cells, [1 + n for _ in chosen for n in range(NUDGES)], progress)
+    cells = [(side, data.points[k].values, seed) for side in data.sides for k in again]
+    nudges = [1 + n for _ in data.sides for _ in chosen for n in range(NUDGES)]
+    runs = runner.run(cells, nudges, progress).reshape(len(data.sides), len(again))
     nearest = _nearest(data, chosen)
     width = {}
     for name in data.gaps:
-        gap = gap_between(name, data.runs[0, again, seed], runs).reshape(len(chosen), NUDGES)
-        gap = np.where(np.isnan(gap), np.inf, gap)  # one of them failed
-        width[name] = gap.max(axis=1)[nearest]
+        gaps = gap_between(name, data.runs[:, again, seed], runs)
+        gaps = np.where(np.isnan(gaps), np.inf, gaps)  # one of them failed
+        by_setting = gaps.reshape(len(data.sides), len(chosen), NUDGES)
+        width[name] = by_setting.max(axis=(0, 2))[nearest]
     return Figures(
-        backend=data.sides[0],
+        backends=data.sides,
         settings=len(chosen),
         cells=len(cells),
         seconds=time.monotonic() - began,
