@@ -10,7 +10,7 @@ import numpy as np
 
 from ...engines.description.records import Robot
 from ...engines.description.tree import GroupTree
-from ...engines.records import ModelDifference
+from ...engines.records import TURNED, ModelDifference
 from ...interface import Model
 from ...measures.text import few
 from ..matching import Matched, match_models
@@ -131,11 +131,15 @@ def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) ->
     for name, *values in difference.values or (("", "as it is", "another"),):
         if name.endswith("limited") and len(difference.values) > 1:
             continue  # the range says so
-        metres = difference.unit == "m" and "[rad]" not in name
+        unit = difference.unit_of(name)
+        metres = unit == "m"
+        scale = reach if metres else 0.0
+        if name == TURNED:
+            scale = math.pi
         book.enter(
             *(subject, difference.where, name, [_value(value) for value in values]),
-            difference.unit,
-            scale=reach if metres else math.pi if "[rad]" in name else 0.0,
+            unit,
+            scale=scale,
             slack=4,
             against=reach,
             share=None if metres else 0.5,

@@ -289,7 +289,7 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
         name: What it is, and of what.
         values: Each figure that differs: its name, the left's value, the right's; of masses that
             are multiplied alike the density that says so, or the factor.
-        unit: Of the first figure.
+        units: SI unit of each of them.
         place: The one line that says it, with the value that the side has: an element's own; of a
             change that several elements share, that of the default; None where that was not found.
     """
@@ -301,8 +301,10 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
         moved = cause.kind == "body" and {row.subject for row in rows} >= _WEIGHT
         scale = "" if moved else scale_of(rows[0])
         shown = [row for row in rows if row.subject == "mass"] if moved else rows
-        values = tuple(value for row in shown[: 1 if scale else None] for value in row.values)
-        unit = shown[0].unit
+        if scale:
+            shown = shown[:1]
+        values = tuple(value for row in shown for value in row.values)
+        units = tuple(row.unit_of(value[0]) for row in shown for value in row.values)
         lines = {element.place for element in theirs if _says(element, cause)}
         if moved and not lines:  # the mass of one of its geoms
             known = {said[:2] for said in _weights(ours)}
@@ -311,11 +313,11 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
             said = _scalings(ours, theirs, float(scale))
             if len(said) == 1:
                 name = name.replace("mass and inertia", said[0][0])
-                values, unit, lines = (said[0][:3],), _SCALING[said[0][0]], {said[0][3]}
+                values, units, lines = (said[0][:3],), (_SCALING[said[0][0]],), {said[0][3]}
             elif len({row.where for row in rows}) > 1:
-                values, unit = (("scale", 1.0, float(scale)),), "×"
+                values, units = (("scale", 1.0, float(scale)),), ("×",)
         place = lines.pop() if len(lines) == 1 else None
-        yield Figures(name=name, values=values, unit=unit, place=place)
+        yield Figures(name=name, values=values, units=units, place=place)
 
 
 def _scalings(

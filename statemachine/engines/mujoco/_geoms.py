@@ -99,7 +99,8 @@ class Geoms:
         ]
         if values:
             edits = copies(("geom_type", *_BOUNDS, "geom_fluid"), left, a, b)
-            yield sides.tell("shape", "geom", a, values, "m", edits)
+            fluid_units = dict.fromkeys(("fluidshape", "fluidcoef", "fluid", "type"), "")
+            yield sides.tell("shape", "geom", a, values, "m", edits, units=fluid_units)
         if _off(ours, theirs):
             yield self._moved(a, b)
 

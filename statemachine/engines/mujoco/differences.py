@@ -128,8 +128,8 @@ def _options(left: Any, right: Any, world: bool) -> Iterator[ModelDifference]:
         if names:
             values = tuple((name, ours[name], theirs[name]) for name in names)
             edits = tuple((f"opt.{name}", (), copy.copy(getattr(left.opt, name))) for name in names)
-            unit = fields.OPTION_UNITS.get(subject, "")
-            yield ModelDifference(subject, "option", "", values, unit, edits)
+            units = {name: fields.OPTION_UNITS.get(name, "") for name in names}
+            yield ModelDifference(subject, "option", "", values, units[names[0]], edits, units=units)
     for field, word, bit in _flag_bits():
         name = f"flag {word}"
         if ours[name] != theirs[name]:
@@ -230,18 +230,24 @@ def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, .
             difference,
             subject=f"{difference.subject} ({name})",
             values=((name, *rows[0][1:3]),),
-            unit=rows[0][3] or difference.unit,
+            unit=rows[0][3] or difference.unit_of(_word(rows[0][4][0])),
+            units={},
             edits=tuple(row[4] for row in rows),
         )
         for name, rows in parts.items()
     )
 
 
+def _word(array: str) -> str:
+    """Return what an array, or an option, is called without the kind of its element."""
+    kind, _, rest = array.partition("." if array.startswith("opt.") else "_")
+    return rest or kind
+
+
 def _by_entry(right: Any, edit: Edit) -> Iterator[tuple[str, Any, Any, str, Edit]]:
     """What an entry is called, both values, its unit if that is another, what brings it over."""
     (name, index, value), old = edit, _read(right, edit)
-    kind, _, rest = name.partition("." if name.startswith("opt.") else "_")
-    word, names = rest or kind, _SPLIT.get(name)
+    word, names = _word(name), _SPLIT.get(name)
     if name in ("body_quat", "geom_quat", "site_quat"):
         angle = 2 * float(np.arccos(np.clip(abs(np.dot(value, old)), 0.0, 1.0)))
         yield "turn", 0.0, angle, "rad", edit
