@@ -95,6 +95,8 @@ class ModelDifference:
         refused: Why neither can be brought to the other; "" if one can.
         units: SI unit of each figure that has another unit, by its name; "" of one without. The
             entries of an array have that of the array.
+        only_read: Whether the engine does not use it, so that nothing depends on it but a function
+            of the user's that reads it.
     """
 
     subject: str
@@ -106,6 +108,7 @@ class ModelDifference:
     edits_one: tuple[Edit, ...] = ()
     refused: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
+    only_read: bool = False
 
     @property
     def title(self) -> str:

@@ -22,7 +22,7 @@ from ...runs.scenarios import Scenario
 from ..labels import files_apart
 from ..matching import match_alike, match_models, missing_parts
 from ..perturbed import EXACT, Uncertainty
-from .causes import Cause, as_written, order_of_joints
+from .causes import Cause, as_written
 from .gap import touched_at_start
 from .shapley import locate, shapley
 from .trials import Measure, Trials
@@ -243,8 +243,6 @@ def explain(
         for what in room(engine_of(model.backend)).ignored(model)
         if "integrator" not in what  # which is a cause
     ]
-    # What a function of the user's may stumble over.
-    orders = order_of_joints(matched) if scenario.own else ()
     periods = [milliseconds(model.timestep, 3) for model in (left, right)]
     asked = [_PERIODS.format(left=periods[0], right=periods[1])] if len(set(periods)) > 1 else []
     explained, located, unexplained = _parts(gap, brought, rest, nothing)
@@ -281,7 +279,7 @@ def explain(
         impossible=divided.impossible,
         unmatched=matched.only,
         missing=missing_parts(left, right),
-        notes=tuple(dict.fromkeys((*matched.notes, *orders, *left_out, *asked))),
+        notes=tuple(dict.fromkeys((*matched.notes, *left_out, *asked))),
         still=_still(listed, left, trials.traces[0]),
         touch=None if nothing else trials.touch(quantity),
         moments=len(trials.ruler.time),

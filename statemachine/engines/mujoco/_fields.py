@@ -226,7 +226,7 @@ FATES = {
         "light_texid "
         # It groups elements for the viewer.
         "*_group "
-        # A user's own data, which the engine does not read.
+        # A user's own data, which the engine does not read: `_readable`, where a function might.
         "*_user numeric_* text_* tuple_* "
         # Names pair elements, and act on nothing.
         "name* "

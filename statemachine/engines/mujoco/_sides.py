@@ -27,7 +27,7 @@ _SAME_PLACE = 1e-15  # the same: what composing with frames that are none leaves
 NOBODY = -2  # in the place of an id that has no counterpart; -1 is that of nothing
 _TOGETHER = 3  # entries: a longer array is told by those that differ
 _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves it
-_COUNTED = {"equality": "eq"}  # in the names of counts and of views
+_COUNTED = {"equality": "eq", "camera": "cam"}  # in the names of counts and of views
 
 Pairs = Sequence[tuple[int, int]]
 NO_UNITS: Mapping[str, str] = MappingProxyType({})  # that are other than that of a difference
