@@ -62,6 +62,12 @@ class Matched(Counterparts):
             for a, b in self.joints
         )
 
+    @property
+    def mocap_elsewhere(self) -> bool:
+        """Whether who moves mocap bodies by number meets others on the second."""
+        ours, theirs = self.places["mocap_pos"]
+        return ours != theirs
+
     def start(self, left: SideStart, right: SideStart) -> SideStart:
         """The start of the first Model in the second's terms; the rest is that of `right`."""
         return SideStart(

@@ -220,7 +220,8 @@ def causes(result: Explanation) -> list[Block]:
         between=if_true(result.between),
         negligible=_amount(result, result.negligible) if result.is_rounding and small else None,
         chaos=floor if result.is_rounding and not small else None,
-        same=if_true(not (result.shares or result.found_in)),
+        same=if_true(not (result.shares or result.found_in or result.unread)),
+        unread=few(list(result.unread), 6) or None,
         table=_table(result, able, hardly),
         more=few([row.name for row in hardly], 6) or None,
         located=[
@@ -437,8 +438,9 @@ def _value(value: object, unit: str) -> str:
 
 def _scaled(value: object, factor: float) -> object:
     """Return a number times a factor, and anything else as it is."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return value * factor if is_number and factor != 1 else value
+    if isinstance(value, bool) or not isinstance(value, int | float) or factor == 1:
+        return value
+    return value * factor
 
 
 def _amount(result: Explanation, value: float) -> str:

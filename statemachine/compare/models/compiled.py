@@ -14,7 +14,7 @@ from ...engines.records import TURNED, ModelDifference
 from ...interface import Model
 from ...measures.text import few
 from ..matching import Matched, match_models
-from ..why.causes import data_of, differences_of, order_of_qpos, sensors_of
+from ..why.causes import data_of, differences_of, order_of_mocap, order_of_qpos, sensors_of
 from .ledger import Key, Ledger, Value
 
 _CALLED = {"com": "centre of mass", "moments": "inertia"}  # of a part that is cut otherwise
@@ -53,6 +53,7 @@ _SUBJECTS: dict[str, dict[str, str]] = {
 }
 _READ = "only a function that reads it moves otherwise"
 _READ_BY_NUMBER = "only a function that reads qpos or qvel by number moves otherwise"
+_MOVED_BY_NUMBER = "only a function that moves them by number moves otherwise"
 _UNTOLD = ("filter", "adhesion", "moving surface")  # of which a URDF's reading knows nothing
 _UNTOLD_FIGURES = {"dampingpoly", "stiffnesspoly", "springyield", "gap"}
 
@@ -117,6 +118,9 @@ def enter_rest(book: Ledger, matched: Matched, robots: Sequence[Robot], reach: f
     for difference in order_of_qpos(matched):
         orders = list(difference.values[0][1:])
         book.differ("further", "qpos", "order", orders, share=0.5, effect=_READ_BY_NUMBER)
+    for difference in order_of_mocap(matched):
+        orders = list(difference.values[0][1:])
+        book.differ("further", "mocap bodies", "order", orders, share=0.5, effect=_MOVED_BY_NUMBER)
     _enter_keyframes(book, matched)
     _enter_sensors(book, matched)
     _enter_data(book, matched)

@@ -22,7 +22,7 @@ from ...runs import SideStart
 from ..matching import Matched
 
 START, COMMANDS, ORDER = "start", "commands", "order of ctrl"  # of the run itself
-ORDER_OF_QPOS = "order of qpos"
+ORDER_OF_QPOS, ORDER_OF_MOCAP = "order of qpos", "order of mocap bodies"
 EXTRA_ACTUATOR = "extra actuator"
 _SAME = 1e-12
 _NAMED = 3  # elements of one cause, before they are counted
@@ -48,6 +48,11 @@ class Cause:
     def kind(self) -> str:
         """Of the elements: "body", "joint", "option", "run", "engine", …"""
         return self.differences[0].kind
+
+    @property
+    def only_read(self) -> bool:
+        """Whether nothing depends on it but a function of the user's that reads it."""
+        return all(row.only_read for row in self.differences)
 
     @property
     def refused(self) -> str:
@@ -274,6 +279,26 @@ def order_of_qpos(matched: Matched) -> tuple[ModelDifference, ...]:
         for model in (matched.left, matched.right)
     ]
     return (ModelDifference(ORDER_OF_QPOS, "run", "", (("order", *orders),)),)
+
+
+def order_of_mocap(matched: Matched) -> tuple[ModelDifference, ...]:
+    """The mocap bodies, where somebody who moves them by number meets others on the right."""
+    if not matched.mocap_elsewhere:
+        return ()
+    orders: list[str] = []
+    for model in (matched.left, matched.right):
+        bodies = np.flatnonzero(model.compiled.body_mocapid >= 0)
+        numbers = model.compiled.body_mocapid[bodies]
+        in_order = bodies[np.argsort(numbers)]
+        orders.append(" ".join(model.body_names[body] or f"body {body}" for body in in_order))
+    return (ModelDifference(ORDER_OF_MOCAP, "run", "", (("order", *orders),)),)
+
+
+def orders_of(matched: Matched) -> list[ModelDifference]:
+    """Everything that a function of the user's reads or writes by number, and that is elsewhere."""
+    if matched.left.compiled is None or matched.right.compiled is None:
+        return []
+    return [*order_of_qpos(matched), *order_of_mocap(matched), *order_of_ctrl(matched)]
 
 
 def _of_keyframe(matched: Matched, name: str) -> Iterator[ModelDifference]:

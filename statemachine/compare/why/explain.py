@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...engines import room
+from ...engines.records import ModelDifference
 from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import JointType, Model
 from ...measures import Deviation
@@ -20,9 +21,9 @@ from ...runs.header import provenance
 from ...runs.robot import moved_by_actuators
 from ...runs.scenarios import Scenario
 from ..labels import files_apart
-from ..matching import match_alike, match_models, missing_parts
+from ..matching import Matched, match_alike, match_models, missing_parts
 from ..perturbed import EXACT, Uncertainty
-from .causes import Cause, as_written
+from .causes import Cause, as_written, orders_of, readable_of
 from .gap import touched_at_start
 from .shapley import locate, shapley
 from .trials import Measure, Trials
@@ -70,6 +71,8 @@ class Explanation(Figures):
         unmatched: What only one side has: joints, actuators, by side.
         missing: What one side has nothing of, and the other has: see `missing_parts`.
         notes: What a reader should know, in sentences.
+        unread: What differs, too, and nothing depends on but a function that reads it, where there
+            is none, or no gap.
         still: Joints with a difference that the left hardly moves: it cannot show.
         touch: The first contact; None without one.
         moments: How many moments the runs are compared at; between: whether rows had to be
@@ -212,7 +215,7 @@ def explain(
     negligible = ROUNDING[units[quantity]]
     nothing = gap <= max(negligible, floor / NOISY)
     if nothing:
-        listed = tuple(cause for cause in listed if cause.kind != "sensor")
+        listed = tuple(cause for cause in listed if not cause.only_read)
 
     def value(brought: frozenset[str]) -> float | None:
         gaps = trials.gaps(brought)
@@ -280,6 +283,7 @@ def explain(
         unmatched=matched.only,
         missing=missing_parts(left, right),
         notes=tuple(dict.fromkeys((*matched.notes, *left_out, *asked))),
+        unread=_unread(matched, scenario, nothing) if compiled else (),
         still=_still(listed, left, trials.traces[0]),
         touch=None if nothing else trials.touch(quantity),
         moments=len(trials.ruler.time),
@@ -396,6 +400,16 @@ def _parts(
     explained = (gap - brought) / gap + sum(part.share for part in rest if part._side)
     located = sum(part.share for part in rest if not part._side)
     return explained, located, (rest[-1].gap if rest else brought) / gap
+
+
+def _unread(matched: Matched, scenario: Scenario, nothing: bool) -> tuple[str, ...]:
+    """What differs, and only a function would read, where none does: names of differences."""
+    rows: list[ModelDifference] = []
+    if nothing or not scenario.own:
+        rows += readable_of(matched)
+    if not scenario.own:
+        rows += orders_of(matched)
+    return tuple(row.title for row in rows)
 
 
 def _still(listed: tuple[Cause, ...], model: Model, trace: Trace) -> tuple[str, ...]:

@@ -90,6 +90,8 @@ def seen_in_order_of_left(
     matched: Matched,
     slots: list[tuple[int, int]],
     starts: tuple[Array, Array],
+    *,
+    mocap_in_order: bool,
 ) -> Controller:
     """Return a controller of the right that sees it in the order of the left.
 
@@ -99,15 +101,17 @@ def seen_in_order_of_left(
         matched: What of the left is what of the right.
         slots: Which of its commands is for which number of the right's ctrl.
         starts: Ctrl (nu,) of the left, and of the right, which what nobody commands keeps.
+        mocap_in_order: Whether mocap bodies, too, are in the order of the left.
     """
     controller = controller_of(shown)
-    data = room(DEFAULT).data_in_other_order(shown, _elements(shown, matched))
+    data = room(DEFAULT).data_in_other_order(shown, _elements(shown, matched, mocap_in_order))
     data.ctrl[:] = starts[0]
 
     def translate(time: float, source: Data) -> Any:
         data.show(source)
         before = np.array(data.ctrl)
         wanted = controller(time, data)
+        data.give_back()
         if wanted is not None:
             data.ctrl[:] = np.asarray(wanted, np.float64)
         elif np.array_equal(before, data.ctrl):  # nor did it write into data.ctrl
@@ -126,7 +130,9 @@ def commands_by_number(values: Array, slots: list[tuple[int, int]], start: Array
     return ctrl
 
 
-def _elements(shown: Model, matched: Matched) -> dict[str, list[tuple[int, int]]]:
+def _elements(
+    shown: Model, matched: Matched, mocap_in_order: bool
+) -> dict[str, list[tuple[int, int]]]:
     """Return pairs of ids, or of places in an array, by kind: of the left, and of the right."""
     right = matched.right
     places = matched.places
@@ -145,4 +151,8 @@ def _elements(shown: Model, matched: Matched) -> dict[str, list[tuple[int, int]]
         "body": list(matched.bodies),
         "site": list(matched.sites),
     }
+    if not mocap_in_order:
+        for part, size in (("mocap_pos", 3), ("mocap_quat", 4)):
+            count = size * min(shown.nmocap, right.nmocap)
+            elements[part] = [(k, k) for k in range(count)]
     return elements | room(DEFAULT).shown_elements(shown.compiled, right.compiled, matched)

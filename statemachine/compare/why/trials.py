@@ -32,6 +32,7 @@ from .causes import (
     COMMANDS,
     EXTRA_ACTUATOR,
     ORDER,
+    ORDER_OF_MOCAP,
     ORDER_OF_QPOS,
     START,
     Cause,
@@ -39,11 +40,10 @@ from .causes import (
     causes,
     differences_of,
     of_the_run,
-    order_of_ctrl,
-    order_of_qpos,
+    orders_of,
 )
-from .order import commands_by_number, in_order_of_left, seen_in_order_of_left, slots_of_ctrl
 from .gap import Curves, Ruler, first_touch
+from .order import commands_by_number, in_order_of_left, seen_in_order_of_left, slots_of_ctrl
 from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, OwnSettings, leave_out
 
 Measure = Literal["worst", "end", "rms"]
@@ -185,7 +185,7 @@ class Trials:
         self._replaced = frozenset(row.subject for row in replaced)
         rows += replaced
         if self._scenario.own and not self._recordings:
-            rows += [*order_of_qpos(self._matched), *order_of_ctrl(self._matched)]
+            rows += orders_of(self._matched)
         listed = causes(rows, finer)
         self._by_name = {cause.name: cause for cause in listed}
         return listed
@@ -401,7 +401,8 @@ class Trials:
         )
         ordered = ORDER in brought
         reads_in_order = ORDER_OF_QPOS in brought or not matched.joints_elsewhere
-        if not (ordered or completed or ORDER_OF_QPOS in brought):
+        mocap_in_order = ORDER_OF_MOCAP in brought
+        if not (ordered or completed or mocap_in_order or ORDER_OF_QPOS in brought):
             return self._from_start(self._scenario.controller(model, self.seed))
         slots = slots_of_ctrl(matched, ordered=ordered, completed=completed)
         if reads_in_order and model.compiled is not None:
@@ -412,17 +413,18 @@ class Trials:
                 matched,
                 slots,
                 starts,
+                mocap_in_order=mocap_in_order,
             )
             return self._from_start(controller)
-        own = self._scenario.controller(model, self.seed)
+        as_it_is = self._scenario.controller(model, self.seed)
 
-        def controller(time: float, data: Data) -> Any:
-            ctrl = own(time, data)
+        def by_number(time: float, data: Data) -> Any:
+            ctrl = as_it_is(time, data)
             if ctrl is None:
                 return None
             return commands_by_number(np.asarray(ctrl, np.float64), slots, starts[1])
 
-        return self._from_start(controller)
+        return self._from_start(by_number)
 
     def _from_start(self, controller: Controller) -> Controller:
         """A controller of the right.

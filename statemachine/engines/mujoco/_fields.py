@@ -64,9 +64,7 @@ ROWS: dict[str, tuple[FieldRow, ...]] = {
     ),
     "dof": (
         FieldRow("armature", ("dof_armature",), "kg m²"),
-        FieldRow(
-            "damping", ("dof_damping", "dof_dampingpoly"), "N·m·s", units={"dampingpoly": ""}
-        ),
+        FieldRow("damping", ("dof_damping", "dof_dampingpoly"), "N·m·s", units={"dampingpoly": ""}),
         FieldRow("dry friction", ("dof_frictionloss",), "N·m"),
         FieldRow("softness of dry friction", ("dof_solref", "dof_solimp"), when="dof_frictionloss"),
     ),

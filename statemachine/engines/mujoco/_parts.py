@@ -253,7 +253,11 @@ def _place(
         ]
         # Of joints of both kinds the positions have no common unit.
         kinds = {int(left.jnt_type[a]) for a, _ in joints}
-        unit = {frozenset({_HINGE}): "rad", frozenset({_SLIDE}): "m"}.get(frozenset(kinds), "")
+        unit = ""
+        if kinds == {int(_HINGE)}:
+            unit = "rad"
+        elif kinds == {int(_SLIDE)}:
+            unit = "m"
         values = (("ref", *zip(*refs, strict=True)),)
         yield sides.tell("zero", "body", pair.left, values, unit, zero)
         alike = True

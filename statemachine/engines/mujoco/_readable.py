@@ -68,7 +68,9 @@ def _pairs_of_elements(sides: Sides) -> dict[str, Pairs]:
         "site": sides.pairs.sites,
         "camera": list(sides.by_name("camera")),
         "tendon": list(sides.by_name("tendon")),
-        "actuator": sorted({(int(owners[0][a]), int(owners[1][b])) for a, b in sides.pairs.actuators}),
+        "actuator": sorted(
+            {(int(owners[0][a]), int(owners[1][b])) for a, b in sides.pairs.actuators}
+        ),
         "sensor": list(sides.by_name("sensor")),
     }
 

@@ -137,7 +137,9 @@ def _options(left: Any, right: Any, world: bool) -> Iterator[ModelDifference]:
             values = tuple((name, ours[name], theirs[name]) for name in names)
             edits = tuple((f"opt.{name}", (), copy.copy(getattr(left.opt, name))) for name in names)
             units = {name: fields.OPTION_UNITS.get(name, "") for name in names}
-            yield ModelDifference(subject, "option", "", values, units[names[0]], edits, units=units)
+            yield ModelDifference(
+                subject, "option", "", values, units[names[0]], edits, units=units
+            )
     for field, word, bit in _flag_bits():
         name = f"flag {word}"
         if ours[name] != theirs[name]:

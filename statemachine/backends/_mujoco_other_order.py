@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import UnsupportedError
 from ..interface import MOCAP, Contacts, Data
-from .mujoco_backend import MujocoData, MujocoModel
+from .mujoco_backend import MujocoData
 
 Pairs = Sequence[tuple[int, int]]  # of ids: in the model that shows, in the other
 
@@ -49,11 +49,11 @@ class DataInOtherOrder(MujocoData):
 
     __slots__ = ("_elements", "_is_behind", "_source")
 
-    def __init__(self, model: MujocoModel, elements: Mapping[str, Pairs]) -> None:
+    def __init__(self, model: Any, elements: Mapping[str, Pairs]) -> None:
         """Make one.
 
         Args:
-            model: The model in whose order everything is shown.
+            model: The Model of this backend in whose order everything is shown.
             elements: By kind of element pairs of ids: in `model`, and in the other. Places in an
                 array are by "qpos", "dof", "act", "mocap_pos", "mocap_quat" and "sensordata".
         """
@@ -74,6 +74,21 @@ class DataInOtherOrder(MujocoData):
         for name in MOCAP:
             ours, theirs = self._elements[name]
             getattr(self, name).reshape(-1)[ours] = getattr(source, name).reshape(-1)[theirs]
+
+    def give_back(self) -> None:
+        """Write into the other Data what a function wrote: mocap bodies, applied forces."""
+        source = self._source
+        if source is None:
+            return
+        for name in MOCAP:
+            ours, theirs = self._elements[name]
+            getattr(source, name).reshape(-1)[theirs] = getattr(self, name).reshape(-1)[ours]
+        if self._is_behind or not isinstance(source.raw, mujoco.MjData):
+            return
+        raw = super().raw
+        for name, kind in (("qfrc_applied", "dof"), ("xfrc_applied", "body")):
+            ours, theirs = self._elements[kind]
+            getattr(source.raw, name)[theirs] = getattr(raw, name)[ours]
 
     @property
     def raw(self) -> mujoco.MjData:
