@@ -145,8 +145,12 @@ class _Entry:
 def _custom(sides: Sides, kind: str) -> Iterator[ModelDifference]:
     """Compare the elements of one kind of `<custom>`, by name."""
     entry_of = {"numeric": _numeric, "text": _text, "tuple": _tuple}[kind]
-    pairs = list(sides.by_name(kind))
-    for a, b in pairs:
+    ours, theirs = _names_of_custom(sides.left, kind), _names_of_custom(sides.right, kind)
+    for a, name in enumerate(ours):
+        if name not in theirs:
+            yield _extra(kind, name, ("there", None))
+            continue
+        b = theirs.index(name)
         left, right = entry_of(sides, 0, a, b), entry_of(sides, 1, b, b)
         if left.value == right.value:
             continue
@@ -154,26 +158,29 @@ def _custom(sides: Sides, kind: str) -> Iterator[ModelDifference]:
         yield ModelDifference(
             f"{kind} data",
             kind,
-            name_of(sides.left, kind, a),
+            name,
             (("data", left.value, right.value),),
             edits=left.edits if fits else (),
             refused="" if fits else _ANOTHER_SIZE,
             only_read=True,
         )
-    for side, raw in enumerate(sides.raws):
-        paired = {pair[side] for pair in pairs}
-        for k in range(getattr(raw, f"n{kind}")):
-            if k not in paired:
-                there = ("there", None)
-                values = (kind, *(there[::-1] if side else there))
-                yield ModelDifference(
-                    f"extra {kind}",
-                    kind,
-                    name_of(raw, kind, k),
-                    (values,),
-                    refused=_BUILT,
-                    only_read=True,
-                )
+    for name in theirs:
+        if name not in ours:
+            yield _extra(kind, name, (None, "there"))
+
+
+def _names_of_custom(raw: Any, kind: str) -> list[str]:
+    """Return the names of all elements of a kind of `<custom>`, in their order."""
+    mujoco = require("mujoco")
+    object_type = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+    count = getattr(raw, f"n{kind}")
+    return [mujoco.mj_id2name(raw, int(object_type), k) or f"{kind} {k}" for k in range(count)]
+
+
+def _extra(kind: str, name: str, sides: tuple[str | None, str | None]) -> ModelDifference:
+    """Tell that only one model has an element of `<custom>`."""
+    values = ((kind, *sides),)
+    return ModelDifference(f"extra {kind}", kind, name, values, refused=_BUILT, only_read=True)
 
 
 def _numeric(sides: Sides, side: int, k: int, there: int) -> _Entry:
