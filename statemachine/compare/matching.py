@@ -53,6 +53,21 @@ class Matched(Counterparts):
         places = [b for _, b in self.actuators]
         return places != sorted(places)
 
+    @property
+    def joints_elsewhere(self) -> bool:
+        """Whether who reads qpos or qvel by number meets other joints on the second."""
+        return any(
+            self.left.jnt_qposadr[a] != self.right.jnt_qposadr[b]
+            or self.left.jnt_dofadr[a] != self.right.jnt_dofadr[b]
+            for a, b in self.joints
+        )
+
+    @property
+    def mocap_elsewhere(self) -> bool:
+        """Whether who moves mocap bodies by number meets others on the second."""
+        ours, theirs = self.places["mocap_pos"]
+        return ours != theirs
+
     def start(self, left: SideStart, right: SideStart) -> SideStart:
         """The start of the first Model in the second's terms; the rest is that of `right`."""
         return SideStart(

@@ -261,6 +261,28 @@ class RawEngine:
 
     @_needed
     @abstractmethod
+    def readable(self, left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]:
+        """What two compiled models differ in that the engine does not use: user and custom data."""
+
+    @_needed
+    @abstractmethod
+    def shown_elements(
+        self, left: Any, right: Any, pairs: Counterparts
+    ) -> dict[str, list[tuple[int, int]]]:
+        """Pairs of geoms, tendons and actuators, and of places in sensordata, by kind."""
+
+    @_needed
+    @abstractmethod
+    def data_in_other_order(self, model: Model, elements: Mapping[str, Any]) -> Any:
+        """A Data of a Model that shows what a Data of another one has.
+
+        Args:
+            model: In whose order it is shown.
+            elements: By kind pairs of ids, or of places in an array: in `model`, in the other.
+        """
+
+    @_needed
+    @abstractmethod
     def entries(self, right: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
         """A difference by its single entries, or itself where it is of one piece.
 

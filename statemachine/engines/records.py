@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from ..interface import Array, Model
@@ -73,6 +73,9 @@ class Counterparts:
     solids: tuple[BodyPair, ...]
 
 
+# The figure of a difference that is the angle [rad] by which the second model's element is turned.
+TURNED = "turned by"
+
 # An array of a compiled model or an option, where in it, and what is to stand there.
 Edit = tuple[str, tuple[int | slice, ...], Any]
 
@@ -86,10 +89,14 @@ class ModelDifference:
         kind: Of the element that it is of: "body", "joint", "geom", "actuator", "option", …
         where: Name of that element; "" of the whole model.
         values: For each figure that differs its name and both values; None: it has none.
-        unit: SI unit of the first of them.
+        unit: SI unit of the figures, but for those in `units`.
         edits: What brings the second model to the first.
         edits_one: What brings the first to the second, where only it can be changed.
         refused: Why neither can be brought to the other; "" if one can.
+        units: SI unit of each figure that has another unit, by its name; "" of one without. The
+            entries of an array have that of the array.
+        only_read: Whether the engine does not use it, so that nothing depends on it but a function
+            of the user's that reads it.
     """
 
     subject: str
@@ -100,8 +107,15 @@ class ModelDifference:
     edits: tuple[Edit, ...] = ()
     edits_one: tuple[Edit, ...] = ()
     refused: str = ""
+    units: Mapping[str, str] = field(default_factory=dict)
+    only_read: bool = False
 
     @property
     def title(self) -> str:
         """What it is, and of what."""
         return f"{self.subject} of {self.where}" if self.where else self.subject
+
+    def unit_of(self, figure: str) -> str:
+        """Return the SI unit of one of the figures in `values`, given by its name."""
+        array, _, _ = figure.partition("[")
+        return self.units.get(array, self.unit)

@@ -33,7 +33,12 @@ _APART = {
     _MOMENT: (1e6, " kg mm²"),
 }
 # ... and of the figures themselves.
-_SHOWN = {"m": _APART["m"], "m³": _APART["m³"], _MOMENT: (1e6, "")}  # three in a row
+_SHOWN = {
+    "m": _APART["m"],
+    "rad": _APART["rad"],
+    "m³": _APART["m³"],
+    _MOMENT: (1e6, ""),
+}  # three in a row
 _LAST = {
     "places": "effect",
     "armature": "share",

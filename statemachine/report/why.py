@@ -10,6 +10,7 @@ import numpy as np
 
 from ..compare.labels import lacking
 from ..compare.perturbed import CLEAR
+from ..engines.records import TURNED
 from ..installed import DEFAULT
 from ..measures.text import (
     NONE,
@@ -18,6 +19,7 @@ from ..measures.text import (
     listed,
     percent,
     quantity,
+    reading,
     sentence,
     short_time,
     significant,
@@ -234,7 +236,8 @@ def causes(result: Explanation) -> list[Block]:
         chaos=floor if not (divides or small) else None,
         draws=result.draws,
         clear=f"{CLEAR:g}",
-        same=if_true(not (result.shares or result.found_in)),
+        same=if_true(not (result.shares or result.found_in or result.unread)),
+        unread=few(list(result.unread), 6) or None,
         table=_table(result, able, hardly),
         more=few([row.name for row in hardly], 6) or None,
         located=[
@@ -280,7 +283,8 @@ def steps(result: Explanation) -> list[Block]:
     for row in _at_least(_NO_PART, able):
         place = f"{row.place.file}, line {row.place.line}: " if row.place else ""
         singles = [
-            (f", {value[0]}", Figures(**{**vars(row), "values": (value,)})) for value in row.values
+            (f", {value[0]}", Figures(**{**vars(row), "values": (value,), "units": (unit,)}))
+            for value, unit in zip(row.values, row.units, strict=True)
         ]
         for figure, one in singles if _is_several(row) else [(_figure(row), row)]:
             left, right = _values(one)
@@ -381,7 +385,8 @@ def _figure(row: Figures) -> str:
     figure = row.values[0][0] if row.values else ""
     if _is_several(row):
         return f" ({len(row.values)} figures)"
-    shown = ("[" in figure or row.kind == "option") and figure not in row.name
+    told = "[" in figure or figure == TURNED or row.kind == "option"
+    shown = told and figure not in row.name
     return f" ({figure})" if shown else ""
 
 
@@ -401,19 +406,22 @@ def _values(row: Figures) -> tuple[str, str]:
 
     Of a place, or a direction, how far the right one is off.
     """
-    figure = max(row.values, key=_relative, default=("", None, None))
+    if not row.values:
+        return NONE, NONE
+    figures = list(zip(row.values, row.units, strict=True))
+    figure, unit = max(figures, key=lambda pair: _relative(pair[0]))
     name, left, right = figure
     a, b = (np.array(value if isinstance(value, tuple) else (), object) for value in (left, right))
     if name in _OFF and len(a) and len(b):
         a, b = a.astype(float), b.astype(float)
-        if row.unit:
-            return "here", f"{quantity(float(np.linalg.norm(a - b)), row.unit)} off"
+        if unit:
+            return "here", f"{quantity(float(np.linalg.norm(a - b)), unit)} off"
         angle = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
         return "this way", f"{quantity(angle, 'rad')} off"
-    texts = [_value(value, row.unit) for value in (left, right)]
+    texts = [_value(value, unit) for value in (left, right)]
     if len(a) and len(a) == len(b) and max(map(len, texts)) > _WIDE:
         differ = a != b  # a cut would hide those
-        texts = [_value(tuple(side[differ]), "") for side in (a, b)]
+        texts = [_value(tuple(side[differ]), unit) for side in (a, b)]
         texts = texts if differ.all() else [f"{text} …" for text in texts]
     texts = [text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…" for text in texts]
     if texts[0] == texts[1] and _relative(figure):  # numbers, which read the same: all digits
@@ -437,12 +445,20 @@ def _value(value: object, unit: str) -> str:
         case None:
             return NONE
         case tuple():
-            return " ".join(_value(number, "") for number in value)
+            factor, shown = reading(unit)
+            return " ".join(_value(_scaled(entry, factor), "") for entry in value) + shown
         case bool():
             return "on" if value else "off"
         case int() | float():
             return quantity(float(value), unit) if unit else significant(float(value))
     return str(value)
+
+
+def _scaled(value: object, factor: float) -> object:
+    """Return a number times a factor, and anything else as it is."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or factor == 1:
+        return value
+    return value * factor
 
 
 def _amount(result: Explanation, value: float) -> str:

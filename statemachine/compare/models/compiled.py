@@ -10,11 +10,11 @@ import numpy as np
 
 from ...engines.description.records import Robot
 from ...engines.description.tree import GroupTree
-from ...engines.records import ModelDifference
+from ...engines.records import TURNED, ModelDifference
 from ...interface import Model
 from ...measures.text import few
 from ..matching import Matched, match_models
-from ..why.causes import differences_of, sensors_of
+from ..why.causes import data_of, differences_of, order_of_mocap, order_of_qpos, sensors_of
 from .ledger import Key, Ledger, Value
 
 _CALLED = {"com": "centre of mass", "moments": "inertia"}  # of a part that is cut otherwise
@@ -51,6 +51,9 @@ _SUBJECTS: dict[str, dict[str, str]] = {
     ),
     "equality": {"extra equality": "structure"},
 }
+_READ = "only a function that reads it moves otherwise"
+_READ_BY_NUMBER = "only a function that reads qpos or qvel by number moves otherwise"
+_MOVED_BY_NUMBER = "only a function that moves them by number moves otherwise"
 _UNTOLD = ("filter", "adhesion", "moving surface")  # of which a URDF's reading knows nothing
 _UNTOLD_FIGURES = {"dampingpoly", "stiffnesspoly", "springyield", "gap"}
 
@@ -112,8 +115,15 @@ def enter_rest(book: Ledger, matched: Matched, robots: Sequence[Robot], reach: f
     if matched.reordered:  # who writes ctrl by number meets other actuators
         names = [few(list(model.actuator_names), 6) for model in (matched.left, matched.right)]
         book.differ("further", "ctrl", "order", names, share=0.5)
+    for difference in order_of_qpos(matched):
+        orders = list(difference.values[0][1:])
+        book.differ("further", "qpos", "order", orders, share=0.5, effect=_READ_BY_NUMBER)
+    for difference in order_of_mocap(matched):
+        orders = list(difference.values[0][1:])
+        book.differ("further", "mocap bodies", "order", orders, share=0.5, effect=_MOVED_BY_NUMBER)
     _enter_keyframes(book, matched)
     _enter_sensors(book, matched)
+    _enter_data(book, matched)
     return skipped
 
 
@@ -131,11 +141,15 @@ def _enter(book: Ledger, key: Key, difference: ModelDifference, reach: float) ->
     for name, *values in difference.values or (("", "as it is", "another"),):
         if name.endswith("limited") and len(difference.values) > 1:
             continue  # the range says so
-        metres = difference.unit == "m" and "[rad]" not in name
+        unit = difference.unit_of(name)
+        metres = unit == "m"
+        scale = reach if metres else 0.0
+        if name == TURNED:
+            scale = math.pi
         book.enter(
             *(subject, difference.where, name, [_value(value) for value in values]),
-            difference.unit,
-            scale=reach if metres else math.pi if "[rad]" in name else 0.0,
+            unit,
+            scale=scale,
             slack=4,
             against=reach,
             share=None if metres else 0.5,
@@ -174,6 +188,14 @@ def _enter_keyframes(book: Ledger, matched: Matched) -> None:
                 book.differ(
                     "further", where, f"{figure}, farthest entry", [0.0, off], "", off, share=0.5
                 )
+
+
+def _enter_data(book: Ledger, matched: Matched) -> None:
+    """What a function of the user's may read: user data of elements, numeric, text, tuple."""
+    for difference in data_of(matched):
+        for _, left, right in difference.values:
+            values = ["nothing" if value is None else _value(value) for value in (left, right)]
+            book.enter("further", difference.title, "", values, share=0.5, effect=_READ)
 
 
 def _enter_sensors(book: Ledger, matched: Matched) -> None:

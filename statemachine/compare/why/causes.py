@@ -16,14 +16,15 @@ from ...engines import room
 from ...engines.records import Edit, ModelDifference
 from ...installed import DEFAULT
 from ...interface import Model
-from ...measures.text import listed
+from ...measures.text import few, listed
 from ...page import Figures
 from ...runs import SideStart
 from ..matching import Matched
 
 START, COMMANDS, ORDER = "start", "commands", "order of ctrl"  # of the run itself
+ORDER_OF_QPOS, ORDER_OF_MOCAP = "order of qpos", "order of mocap bodies"
+EXTRA_ACTUATOR = "extra actuator"
 _SAME = 1e-12
-_MOST = 24  # causes, before all of one quantity are taken together
 _NAMED = 3  # elements of one cause, before they are counted
 _WEIGHT = {"mass", "centre of mass", "inertia"}  # what the mass of a geom changes of its body
 _DENSITY = 1000.0  # kg/m³, where an MJCF says none
@@ -49,6 +50,11 @@ class Cause:
         return self.differences[0].kind
 
     @property
+    def only_read(self) -> bool:
+        """Whether nothing depends on it but a function of the user's that reads it."""
+        return all(row.only_read for row in self.differences)
+
+    @property
     def refused(self) -> str:
         """Why it cannot be brought to the same; "" if it can."""
         return next((row.refused for row in self.differences if row.refused), "")
@@ -65,7 +71,7 @@ def differences_of(
     matched: Matched,
     world: bool = True,
     finer: bool = False,
-    sensors: bool = False,
+    readable: bool = False,
 ) -> tuple[ModelDifference, ...]:
     """All that two Models differ in by their compiled models.
 
@@ -75,12 +81,12 @@ def differences_of(
         matched: What of one is what of the other.
         world: Whether gravity and timestep count; not where they are an engine's own.
         finer: By single entries, where they can be brought over one by one.
-        sensors: Whether sensors count, which act on nothing but a controller that reads them.
+        readable: Whether that counts on which nothing but a function of the user's depends.
     """
     own = room(DEFAULT)
     rows = list(own.differences(left.compiled, right.compiled, matched, world=world))
-    if sensors:
-        rows += sensors_of(matched)
+    if readable:
+        rows += readable_of(matched)
     if finer:
         rows = [part for row in rows for part in own.entries(right.compiled, row)]
     extra = [
@@ -99,6 +105,16 @@ def sensors_of(matched: Matched) -> list[ModelDifference]:
     return room(DEFAULT).sensors(matched.left.compiled, matched.right.compiled, matched)
 
 
+def data_of(matched: Matched) -> list[ModelDifference]:
+    """What two Models keep for whoever reads it: user data of elements, numeric, text, tuple."""
+    return room(DEFAULT).readable(matched.left.compiled, matched.right.compiled, matched)
+
+
+def readable_of(matched: Matched) -> list[ModelDifference]:
+    """Everything in which two Models differ and that no engine uses, but a function may read."""
+    return [*sensors_of(matched), *data_of(matched)]
+
+
 def built(model: Model, edits: tuple[Edit, ...]) -> Model:
     """A Model whose compiled model was edited.
 
@@ -113,15 +129,23 @@ def built(model: Model, edits: tuple[Edit, ...]) -> Model:
 def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:
     """Differences as causes: what was changed alike in several elements is one.
 
-    A changed default of a file's class is such a change; so are masses and moments of inertia that
-    are multiplied alike, as by a density, and the mass of a geom that takes the centre and the
-    inertia of its body along.
-    Where there are more than 24 causes, all of one quantity are one.
+    Alike means from one value of the right to one value of the left, as by a changed default of a
+    file's class: elements with other values are another cause, however many causes there are.
+    Masses and moments of inertia that are multiplied alike, as by a density, are one change; so is
+    the mass of a geom that takes the centre and the inertia of its body along.
 
     Args:
         rows: Differences, in their order.
-        finer: Each by itself, however many there are.
+        finer: Each by itself.
+
+    Returns:
+        The causes, each with a name of its own.
     """
+    return _with_own_names(_merged(rows, finer))
+
+
+def _merged(rows: Sequence[ModelDifference], finer: bool) -> tuple[Cause, ...]:
+    """Differences as causes, of which several may have one name."""
     able = [row for row in rows if not row.refused]
     refused = _grouped([row for row in rows if row.refused], lambda row: row.title)
     if finer:
@@ -134,20 +158,36 @@ def causes(rows: Sequence[ModelDifference], finer: bool = False) -> tuple[Cause,
         parts = {(row.where, subject) for subject in (row.subject, *_WEIGHT)}
         return (row.kind, row.where) if row.kind == "body" and parts <= weighed else _change(row)
 
-    grouped = _grouped(able, change)
-    if len(grouped) > _MOST:
-        grouped = _grouped(able, lambda row: (row.kind, row.subject))
-    return (*grouped, *refused)
+    return (*_grouped(able, change), *refused)
+
+
+def _with_own_names(merged: Iterable[Cause]) -> tuple[Cause, ...]:
+    """Give causes whose names are alike, such as "friction of 4 geoms", names that are not.
+
+    A cause is known by its name. One whose name is taken names its elements; where that is taken,
+    too, it is numbered.
+    """
+    named: dict[str, Cause] = {}
+    for cause in merged:
+        name = cause.name
+        if name in named:
+            places = list(dict.fromkeys(row.where for row in cause.differences))
+            name = f"{_subjects(cause.differences)} of {few(places, _NAMED)}"
+        first, number = name, 2
+        while name in named:
+            name, number = f"{first} ({number})", number + 1
+        named[name] = Cause(name, cause.differences)
+    return tuple(named.values())
 
 
 def _change(row: ModelDifference) -> object:
     """What is equal for two differences that are the same change of different elements."""
-    if row.subject == "extra actuator":  # a file without motors is one difference
+    if row.subject == EXTRA_ACTUATOR:  # a file without motors is one difference
         return row.subject, repr(row.values)
     if scale := scale_of(row):
         return row.kind, scale
     single = not row.where or row.subject.startswith("extra ")
-    return row.title if single else (row.kind, row.subject, repr(row.values))
+    return row.title if single else (row.kind, row.subject, row.unit, repr(row.values))
 
 
 def scale_of(row: ModelDifference) -> str:
@@ -168,10 +208,15 @@ def _grouped(
     return tuple(Cause(_name(rows), tuple(rows)) for rows in groups.values())
 
 
+def _subjects(rows: Sequence[ModelDifference]) -> str:
+    """What differences are of, in words: "mass and inertia"."""
+    return listed(list(dict.fromkeys(row.subject for row in rows)))
+
+
 def _name(rows: list[ModelDifference]) -> str:
     """What a cause is, and of what: of up to three elements by name."""
     first, places = rows[0], list(dict.fromkeys(row.where for row in rows))
-    subject = listed(list(dict.fromkeys(row.subject for row in rows)))
+    subject = _subjects(rows)
     if len(rows) == 1:
         return first.title
     if len(places) <= _NAMED:
@@ -225,15 +270,35 @@ def order_of_ctrl(matched: Matched) -> tuple[ModelDifference, ...]:
     return (ModelDifference(ORDER, "run", "", values),)
 
 
-def order_of_joints(matched: Matched) -> tuple[str, ...]:
-    """What a function of the user's may stumble over."""
-    places = [matched.right.jnt_qposadr[b] for _, b in matched.joints]
-    if places == sorted(places):
+def order_of_qpos(matched: Matched) -> tuple[ModelDifference, ...]:
+    """The joints, where somebody who reads qpos or qvel by number meets others on the right."""
+    if not matched.joints_elsewhere:
         return ()
-    return (
-        "the right has its joints in another order: a function that reads qpos or qvel by "
-        "number meets others there (model.joint_id, jnt_qposadr and jnt_dofadr tell which)",
-    )
+    orders = [
+        " ".join(name or f"joint {k}" for k, name in enumerate(model.joint_names))
+        for model in (matched.left, matched.right)
+    ]
+    return (ModelDifference(ORDER_OF_QPOS, "run", "", (("order", *orders),)),)
+
+
+def order_of_mocap(matched: Matched) -> tuple[ModelDifference, ...]:
+    """The mocap bodies, where somebody who moves them by number meets others on the right."""
+    if not matched.mocap_elsewhere:
+        return ()
+    orders: list[str] = []
+    for model in (matched.left, matched.right):
+        bodies = np.flatnonzero(model.compiled.body_mocapid >= 0)
+        numbers = model.compiled.body_mocapid[bodies]
+        in_order = bodies[np.argsort(numbers)]
+        orders.append(" ".join(model.body_names[body] or f"body {body}" for body in in_order))
+    return (ModelDifference(ORDER_OF_MOCAP, "run", "", (("order", *orders),)),)
+
+
+def orders_of(matched: Matched) -> list[ModelDifference]:
+    """Everything that a function of the user's reads or writes by number, and that is elsewhere."""
+    if matched.left.compiled is None or matched.right.compiled is None:
+        return []
+    return [*order_of_qpos(matched), *order_of_mocap(matched), *order_of_ctrl(matched)]
 
 
 def _of_keyframe(matched: Matched, name: str) -> Iterator[ModelDifference]:
@@ -289,7 +354,7 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
         name: What it is, and of what.
         values: Each figure that differs: its name, the left's value, the right's; of masses that
             are multiplied alike the density that says so, or the factor.
-        unit: Of the first figure.
+        units: SI unit of each of them.
         place: The one line that says it, with the value that the side has: an element's own; of a
             change that several elements share, that of the default; None where that was not found.
     """
@@ -301,8 +366,10 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
         moved = cause.kind == "body" and {row.subject for row in rows} >= _WEIGHT
         scale = "" if moved else scale_of(rows[0])
         shown = [row for row in rows if row.subject == "mass"] if moved else rows
-        values = tuple(value for row in shown[: 1 if scale else None] for value in row.values)
-        unit = shown[0].unit
+        if scale:
+            shown = shown[:1]
+        values = tuple(value for row in shown for value in row.values)
+        units = tuple(row.unit_of(value[0]) for row in shown for value in row.values)
         lines = {element.place for element in theirs if _says(element, cause)}
         if moved and not lines:  # the mass of one of its geoms
             known = {said[:2] for said in _weights(ours)}
@@ -311,11 +378,11 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
             said = _scalings(ours, theirs, float(scale))
             if len(said) == 1:
                 name = name.replace("mass and inertia", said[0][0])
-                values, unit, lines = (said[0][:3],), _SCALING[said[0][0]], {said[0][3]}
+                values, units, lines = (said[0][:3],), (_SCALING[said[0][0]],), {said[0][3]}
             elif len({row.where for row in rows}) > 1:
-                values, unit = (("scale", 1.0, float(scale)),), "×"
+                values, units = (("scale", 1.0, float(scale)),), ("×",)
         place = lines.pop() if len(lines) == 1 else None
-        yield Figures(name=name, values=values, unit=unit, place=place)
+        yield Figures(name=name, values=values, units=units, place=place)
 
 
 def _scalings(

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...engines import room
+from ...engines.records import ModelDifference
 from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import JointType, Model
 from ...measures import Deviation
@@ -20,9 +21,9 @@ from ...runs.header import provenance
 from ...runs.robot import moved_by_actuators
 from ...runs.scenarios import Scenario
 from ..labels import files_apart
-from ..matching import match_alike, match_models, missing_parts
+from ..matching import Matched, match_alike, match_models, missing_parts
 from ..perturbed import EXACT, RUNS, Uncertainty, against_floor
-from .causes import Cause, as_written, order_of_joints
+from .causes import Cause, as_written, orders_of, readable_of
 from .gap import touched_at_start
 from .shapley import locate, shapley
 from .trials import Measure, Trials
@@ -72,6 +73,8 @@ class Explanation(Figures):
         unmatched: What only one side has: joints, actuators, by side.
         missing: What one side has nothing of, and the other has: see `missing_parts`.
         notes: What a reader should know, in sentences.
+        unread: What differs, too, and nothing depends on but a function that reads it, where there
+            is none, or no gap.
         still: Joints with a difference that the left hardly moves: it cannot show.
         touch: The first contact; None without one.
         moments: How many moments the runs are compared at; between: whether rows had to be
@@ -201,7 +204,7 @@ def explain(
     negligible, tolerance = ROUNDING[units[quantity]], trials.ruler.tolerance(quantity)
     nothing = gap_state(gap, negligible, tolerance, floor) != "beyond"
     if nothing:
-        listed = tuple(cause for cause in listed if cause.kind != "sensor")
+        listed = tuple(cause for cause in listed if not cause.only_read)
 
     def value(brought: frozenset[str]) -> float | None:
         gaps = trials.gaps(brought)
@@ -232,8 +235,6 @@ def explain(
         for what in room(engine_of(model.backend)).ignored(model)
         if "integrator" not in what  # which is a cause
     ]
-    # What a function of the user's may stumble over.
-    orders = order_of_joints(matched) if scenario.own else ()
     periods = [milliseconds(model.timestep, 3) for model in (left, right)]
     asked = [_PERIODS.format(left=periods[0], right=periods[1])] if len(set(periods)) > 1 else []
     explained, located, unexplained = _parts(gap, brought, rest, nothing)
@@ -273,7 +274,8 @@ def explain(
         impossible=divided.impossible,
         unmatched=matched.only,
         missing=missing_parts(left, right),
-        notes=tuple(dict.fromkeys((*matched.notes, *orders, *left_out, *asked))),
+        notes=tuple(dict.fromkeys((*matched.notes, *left_out, *asked))),
+        unread=_unread(matched, scenario, nothing) if compiled else (),
         still=_still(listed, left, trials.traces[0]),
         touch=None if nothing else trials.touch(quantity),
         moments=len(trials.ruler.time),
@@ -351,7 +353,7 @@ def _shares(
     """The causes, the largest share first; of what was found by a setting of one side, too.
 
     Returns:
-        name, values, unit, place: See `as_written`.
+        name, values, units, place: See `as_written`.
         kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
             start, "engine" of a setting of an engine as it comes.
         share: Its part of the gap (Shapley value); below zero where it hides others; None where it
@@ -379,7 +381,7 @@ def _shares(
             name=part.name,
             kind="option",
             values=((part.name, *part.values),) if part.values else (),
-            unit="",
+            units=("",) if part.values else (),
             share=part.share,
             error=0.0,
             alone=part.alone,
@@ -403,6 +405,16 @@ def _parts(
     explained = (gap - brought) / gap + sum(part.share for part in rest if part._side)
     located = sum(part.share for part in rest if not part._side)
     return explained, located, (rest[-1].gap if rest else brought) / gap
+
+
+def _unread(matched: Matched, scenario: Scenario, nothing: bool) -> tuple[str, ...]:
+    """What differs, and only a function would read, where none does: names of differences."""
+    rows: list[ModelDifference] = []
+    if nothing or not scenario.own:
+        rows += readable_of(matched)
+    if not scenario.own:
+        rows += orders_of(matched)
+    return tuple(row.title for row in rows)
 
 
 def _still(listed: tuple[Cause, ...], model: Model, trace: Trace) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from ...engines import room
 from ...engines.records import ModelDifference
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
-from ...interface import Model
+from ...interface import Data, Model
 from ...measures import Deviation
 from ...page import Figures
 from ...processes import checked_jobs
@@ -30,16 +30,20 @@ from ..matching import Matched
 from ..perturbed import RUNS, Uncertainty, perturbed_run
 from .causes import (
     COMMANDS,
+    EXTRA_ACTUATOR,
     ORDER,
+    ORDER_OF_MOCAP,
+    ORDER_OF_QPOS,
     START,
     Cause,
     built,
     causes,
     differences_of,
     of_the_run,
-    order_of_ctrl,
+    orders_of,
 )
 from .gap import Curves, Ruler, first_touch
+from .order import commands_by_number, in_order_of_left, seen_in_order_of_left, slots_of_ctrl
 from .settings import ENGINE_CAN_BE_WITHOUT, NEEDS, TITLES, OwnSettings, leave_out
 
 Measure = Literal["worst", "end", "rms"]
@@ -161,7 +165,7 @@ class Trials:
         rows: list[ModelDifference] = []
         if left.compiled is not None and right.compiled is not None:
             files = differences_of(
-                left, right, self._matched, not own, finer, sensors=self._scenario.own
+                left, right, self._matched, not own, finer, readable=self._scenario.own
             )
             # An integrator that one side does not read is chosen on the other, see `locate`.
             apart = ("timestep", "integrator" * (len(self.selects) == 1))
@@ -180,9 +184,9 @@ class Trials:
         replaced = [] if own else list(self._by_option())
         self._replaced = frozenset(row.subject for row in replaced)
         rows += replaced
-        listed = causes(
-            (*rows, *(order_of_ctrl(self._matched) if self._scenario.own else ())), finer
-        )
+        if self._scenario.own and not self._recordings:
+            rows += orders_of(self._matched)
+        listed = causes(rows, finer)
         self._by_name = {cause.name: cause for cause in listed}
         return listed
 
@@ -339,7 +343,13 @@ class Trials:
             if self._by_name[name].edits(side)
             or (self._own[side] and self._by_name[name].kind == "engine")
             or (side == 1 and (name in self._replaced or self._by_name[name].kind == "run"))
+            or (side == 1 and self._is_in_ctrl(name))
         )
+
+    def _is_in_ctrl(self, name: str) -> bool:
+        """Whether a cause moves the numbers of ctrl that a function of the user's writes."""
+        rows = self._by_name[name].differences
+        return self._scenario.own and any(row.subject == EXTRA_ACTUATOR for row in rows)
 
     def _rerun(self, run: _Run, model: Model) -> Rerun:
         start, brought = self._starts[run.side], run.brought
@@ -363,6 +373,8 @@ class Trials:
         It is that of the left as it comes, whatever is edited.
         """
         own = self._scenario.own
+        if own and side and not self._recordings:
+            return self._own_controller(model, brought)
         if self._recordings and side and COMMANDS not in brought:
             return commands_of(self._recordings[1])
         if self._recordings:  # in the order of the left's actuators
@@ -372,14 +384,57 @@ class Trials:
         if side == 0:
             return controller
         start = self._starts[1].ctrl
-        if not own or ORDER in brought:
-            controller = controller_for_right(controller, self._matched, start)
-        # Without a keyframe of its own it starts with the commands of the left, too.
-        return (
-            controller
-            if self._keyframes[0] == self._keyframes[1]
-            else beginning_with(lambda _: start, controller)
+        controller = controller_for_right(controller, self._matched, start)
+        return self._from_start(controller)
+
+    def _own_controller(self, model: Model, brought: frozenset[str]) -> Controller:
+        """A function of the user's on the right, as far as that has the order of the left.
+
+        An actuator that only one side has is put back, or taken out, in its place of ctrl: the
+        numbers of the others are then those of the left.
+        """
+        matched, starts = self._matched, (self._starts[0].ctrl, self._starts[1].ctrl)
+        completed = any(
+            row.subject == EXTRA_ACTUATOR
+            for name in brought
+            for row in self._by_name[name].differences
         )
+        ordered = ORDER in brought
+        reads_in_order = ORDER_OF_QPOS in brought or not matched.joints_elsewhere
+        mocap_in_order = ORDER_OF_MOCAP in brought
+        if not (ordered or completed or mocap_in_order or ORDER_OF_QPOS in brought):
+            return self._from_start(self._scenario.controller(model, self.seed))
+        slots = slots_of_ctrl(matched, ordered=ordered, completed=completed)
+        if reads_in_order and model.compiled is not None:
+            left = self._model(_Run(0, self._acting(0, brought)))
+            controller = seen_in_order_of_left(
+                lambda shown: self._scenario.controller(shown, self.seed),
+                in_order_of_left(left, model, matched),
+                matched,
+                slots,
+                starts,
+                mocap_in_order=mocap_in_order,
+            )
+            return self._from_start(controller)
+        as_it_is = self._scenario.controller(model, self.seed)
+
+        def by_number(time: float, data: Data) -> Any:
+            ctrl = as_it_is(time, data)
+            if ctrl is None:
+                return None
+            return commands_by_number(np.asarray(ctrl, np.float64), slots, starts[1])
+
+        return self._from_start(by_number)
+
+    def _from_start(self, controller: Controller) -> Controller:
+        """A controller of the right.
+
+        Without a keyframe of its own it starts with the commands of the left, too.
+        """
+        if self._keyframes[0] == self._keyframes[1]:
+            return controller
+        start = self._starts[1].ctrl
+        return beginning_with(lambda _: start, controller)
 
     def repeats(self) -> bool:
         """Whether the left moves the same when it is run again, so that a gap can have causes."""

@@ -36,6 +36,8 @@ class MujocoEngine(RawEngine):
     describe = function_of(".mujoco.description:describe")
     differences = function_of(".mujoco.differences:differences")
     sensors = function_of(".mujoco._drives:sensors")
+    readable = function_of(".mujoco._readable:readable")
+    shown_elements = function_of(".mujoco._readable:shown_elements")
     entries = function_of(".mujoco.differences:entries")
     integrator = function_of(".mujoco.differences:integrator")
     edited = function_of(".mujoco.differences:edited")
@@ -139,6 +141,12 @@ class MujocoEngine(RawEngine):
         from ...backends.mujoco_backend import MujocoData
 
         return MujocoData
+
+    def data_in_other_order(self, model: Model, elements: Mapping[str, Any]) -> Any:
+        """One whose derived arrays are looked up in the Data that it shows."""
+        from ...backends._mujoco_other_order import DataInOtherOrder
+
+        return DataInOtherOrder(model, elements)
 
     def origin(self, raw: Any) -> object:
         """The names of an MjModel lie in one memory, its copies' too."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ...installed import require
 from ...measures import ctrl_owners
 from ..records import Counterparts, Edit, ModelDifference
 from ._sides import Sides, name_of, plain, same, zeros
 
+ORDER_OF_SENSORS = "order of sensordata"
 # mjtTrn: what an actuator acts on, and from which site it measures.
 _DRIVES = {
     0: ("joint",),
@@ -119,10 +123,12 @@ def sensors(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference]
         pairs: What of one is what of the other.
     """
     why = "a sensor is built by the compiler"  # so only a cutoff can be brought over
-    return [
-        row if row.subject == "cutoff" else replace(row, edits=(), edits_one=(), refused=why)
-        for row in _sensors(Sides(left, right, pairs))
-    ]
+    rows: list[ModelDifference] = []
+    for row in _sensors(Sides(left, right, pairs)):
+        able = row.subject in ("cutoff", ORDER_OF_SENSORS)
+        able_row = row if able else replace(row, edits=(), edits_one=(), refused=why)
+        rows.append(replace(able_row, only_read=True))
+    return rows
 
 
 def _sensors(sides: Sides) -> Iterator[ModelDifference]:
@@ -144,7 +150,56 @@ def _sensors(sides: Sides) -> Iterator[ModelDifference]:
     ours = [b for _, b in pairs]
     if ours != sorted(ours):
         orders = [", ".join(name_of(right, "sensor", b) for b in s) for s in (ours, sorted(ours))]
-        yield ModelDifference("order of sensordata", "sensor", "", (("order", *orders),))
+        refused = ""
+        if not len(ours) == left.nsensor == right.nsensor:
+            refused = "one of the sides has other sensors, too, which have places among them"
+        yield ModelDifference(
+            ORDER_OF_SENSORS,
+            "sensor",
+            "",
+            (("order", *orders),),
+            edits=() if refused else _reordered_sensors(right, ours),
+            refused=refused,
+        )
+
+
+def _reordered_sensors(raw: Any, order: list[int]) -> tuple[Edit, ...]:
+    """Return edits that put the sensors of a compiled model in another order.
+
+    Args:
+        raw: An mjModel.
+        order: Of each place in the new order the id that its sensor has now.
+    """
+    whole = slice(None)
+    edits: list[Edit] = []
+    for name in dir(raw):
+        array = getattr(raw, name) if name.startswith("sensor_") else None
+        if isinstance(array, np.ndarray) and len(array) == raw.nsensor and name != "sensor_adr":
+            edits.append((name, (whole,), np.array(array[order])))
+    sizes = raw.sensor_dim[order]
+    edits.append(("sensor_adr", (whole,), np.cumsum([0, *sizes[:-1]])))
+    edits.append(("name_sensoradr", (whole,), np.array(raw.name_sensoradr[order])))
+    return (*edits, ("names_map", (whole,), _reordered_names(raw, order)))
+
+
+def _reordered_names(raw: Any, order: list[int]) -> Any:
+    """Return the table (nnames_map,) by which names are looked up, for sensors in another order.
+
+    Its entries are ids of elements of all kinds. Those of sensors are told by that a sensor is not
+    found any more when its entry is gone.
+    """
+    mujoco = require("mujoco")
+    kind = int(mujoco.mjtObj.mjOBJ_SENSOR)
+    probe, table = copy.copy(raw), np.array(raw.names_map)
+    place_of = {now: place for place, now in enumerate(order)}
+    for at, entry in enumerate(raw.names_map.tolist()):
+        name = raw.sensor(entry).name if 0 <= entry < raw.nsensor else ""
+        if name:
+            probe.names_map[at] = -1
+            if mujoco.mj_name2id(probe, kind, name) != entry:
+                table[at] = place_of[entry]
+            probe.names_map[at] = entry
+    return table
 
 
 def _object(raw: Any, end: str, k: int) -> tuple[str, int, str]:

@@ -74,10 +74,13 @@ def _joint(sides: Sides, a: int, b: int) -> Iterator[ModelDifference]:
         edits = tuple(edit for difference in rows for edit in difference.edits)
         differences.append(replace(rows[0], edits=edits))
     for difference in differences:
-        unit = difference.unit
-        yield replace(
-            difference, unit=OF_A_SLIDE.get(unit, "") if kind == JointType.SLIDE else unit
-        )
+        yield _of_a_slide(difference) if kind == JointType.SLIDE else difference
+
+
+def _of_a_slide(difference: ModelDifference) -> ModelDifference:
+    """Give a difference of a joint the units that its figures have of a slide."""
+    units = {figure: OF_A_SLIDE.get(unit, "") for figure, unit in difference.units.items()}
+    return replace(difference, unit=OF_A_SLIDE.get(difference.unit, ""), units=units)
 
 
 def _rest(sides: Sides, a: int, b: int, kind: JointType) -> Iterator[ModelDifference]:

@@ -7,7 +7,8 @@ mjModel has and fails for what none of these tables knows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
 
@@ -18,14 +19,17 @@ class FieldRow:
     Attributes:
         subject: What it is called.
         fields: Arrays of the compiled model.
-        unit: Of the first field.
+        unit: SI unit of the fields, but for those in `units`.
         when: Arrays of which one must not be zero, on either side, for the rest to have an effect.
+        units: SI unit of each field that has another unit, by its name without the kind of the
+            element; "" of one without.
     """
 
     subject: str
     fields: tuple[str, ...]
     unit: str = ""
     when: str = ""
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 # A limited quantity is compared with its range; a range without the flag says nothing.
@@ -43,14 +47,24 @@ LIMITED = {
 ROWS: dict[str, tuple[FieldRow, ...]] = {
     "joint": (
         FieldRow("range", ("jnt_limited", "jnt_range"), "rad"),
-        FieldRow("stop", ("jnt_solref", "jnt_solimp", "jnt_margin"), when="jnt_limited"),
-        FieldRow("spring", ("jnt_stiffness", "jnt_stiffnesspoly", "jnt_springyield"), "N·m/rad"),
+        FieldRow(
+            "stop",
+            ("jnt_solref", "jnt_solimp", "jnt_margin"),
+            when="jnt_limited",
+            units={"margin": "rad"},
+        ),
+        FieldRow(
+            "spring",
+            ("jnt_stiffness", "jnt_stiffnesspoly", "jnt_springyield"),
+            "N·m/rad",
+            units={"stiffnesspoly": "", "springyield": ""},
+        ),
         FieldRow("force limit", ("jnt_actfrclimited", "jnt_actfrcrange"), "N·m"),
         FieldRow("weight carried by its motor", ("jnt_actgravcomp",)),
     ),
     "dof": (
         FieldRow("armature", ("dof_armature",), "kg m²"),
-        FieldRow("damping", ("dof_damping", "dof_dampingpoly"), "N·m·s"),
+        FieldRow("damping", ("dof_damping", "dof_dampingpoly"), "N·m·s", units={"dampingpoly": ""}),
         FieldRow("dry friction", ("dof_frictionloss",), "N·m"),
         FieldRow("softness of dry friction", ("dof_solref", "dof_solimp"), when="dof_frictionloss"),
     ),
@@ -88,6 +102,7 @@ ROWS: dict[str, tuple[FieldRow, ...]] = {
             "stop",
             ("tendon_solref_lim", "tendon_solimp_lim", "tendon_margin"),
             when="tendon_limited",
+            units={"margin": "m"},
         ),
         FieldRow("spring", ("tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield")),
         FieldRow(
@@ -114,7 +129,7 @@ ROWS: dict[str, tuple[FieldRow, ...]] = {
     "pair": (
         FieldRow("friction", ("pair_friction", "pair_dim")),
         FieldRow("softness", ("pair_solref", "pair_solimp", "pair_solreffriction")),
-        FieldRow("margin", ("pair_margin", "pair_gap")),
+        FieldRow("margin", ("pair_margin", "pair_gap"), "m"),
         FieldRow("adhesion", ("pair_adhesion",)),
     ),
     "sensor": (
@@ -161,7 +176,16 @@ CHOICES = {
     "jacobian": "mjtJacobian",
 }
 FLAGS = ("disableflags", "enableflags")
-OPTION_UNITS = {"gravity": "m/s²", "timestep": "s", "wind": "m/s", "density": "kg/m³"}
+# SI unit of each of these that has one.
+OPTION_UNITS = {
+    "gravity": "m/s²",
+    "timestep": "s",
+    "wind": "m/s",
+    "density": "kg/m³",
+    "viscosity": "Pa·s",
+    "magnetic": "T",
+    "o_margin": "m",
+}
 # Flags without an effect on the motion, and why.
 IDLE_FLAGS = {
     "mjDSBL_SENSOR": "sensors are read only",
@@ -200,7 +224,7 @@ FATES = {
         "light_texid "
         # It groups elements for the viewer.
         "*_group "
-        # A user's own data, which the engine does not read.
+        # A user's own data, which the engine does not read: `_readable`, where a function might.
         "*_user numeric_* text_* tuple_* "
         # Names pair elements, and act on nothing.
         "name* "

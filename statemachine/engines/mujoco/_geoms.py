@@ -20,6 +20,8 @@ NO_TOUCH = -1e3  # [m] a margin at which nothing touches
 _VERTEX = 1e-6  # [m]: vertices are single precision
 # How a medium flows around a geom; what follows from its shape stands behind these.
 _FLUID = ("fluidshape", *(f"fluidcoef[{k}]" for k in range(5)))
+# Of the figures of a shape those without a unit.
+_NO_LENGTHS = {"type": "", "fluidshape": "", "fluidcoef": "", "fluid": ""}
 _BOUNDS = ("geom_size", "geom_rbound", "geom_aabb")
 _WRAPPED = (4, 5)  # mjtWrap: a sphere, a cylinder
 
@@ -99,7 +101,7 @@ class Geoms:
         ]
         if values:
             edits = copies(("geom_type", *_BOUNDS, "geom_fluid"), left, a, b)
-            yield sides.tell("shape", "geom", a, values, "m", edits)
+            yield sides.tell("shape", "geom", a, values, "m", edits, units=_NO_LENGTHS)
         if _off(ours, theirs):
             yield self._moved(a, b)
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
 
 from ...installed import require
 from ...interface import Array, JointType
-from ...rotations import HERE
+from ...rotations import HERE, angle_between
 from ..description.records import Inertial, motion
-from ..records import BodyPair, Edit, ModelDifference
+from ..records import TURNED, BodyPair, Edit, ModelDifference
 from ._sides import NEAR, Sides, apart, copies, plain, quat_of, same, zeros
 
 _FREE, _BALL, _SLIDE, _HINGE = JointType
@@ -23,6 +23,15 @@ _WEIGHS = {
     "centre of mass": (("body_ipos",), "m"),
     "inertia": (("body_inertia", "body_iquat"), "kg m²"),
 }
+_TURN_UNIT = {TURNED: "rad"}
+# The figures of each subject, and their units.
+_FIGURES = {
+    "mass": {"mass": "kg"},
+    "centre of mass": {"com": "m"},
+    "inertia": {"moments": "kg m²", **_TURN_UNIT},
+}
+_TILTED = 1e-6  # [rad]: less is what the axes of moments that are nearly equal have of rounding
+_EQUAL = 1e-6  # of the largest moment: two that are nearer to each other are equal
 _DIAGONAL = "its mass matrix is stored as a diagonal"
 
 
@@ -45,18 +54,61 @@ def weights(sides: Sides) -> Iterator[ModelDifference]:
             yield _lumped(sides, pair, composite, there)
 
 
-def _differing(left: Inertial, right: Inertial) -> dict[str, tuple[str, Any, Any]]:
-    """What two bodies weigh otherwise, by subject: a figure's name and values."""
-    figures: dict[str, tuple[str, Any, Any]] = {}
+def _differing(left: Inertial, right: Inertial) -> dict[str, list[tuple[str, Any, Any]]]:
+    """What two bodies weigh otherwise, by subject: each figure's name and values."""
+    figures: dict[str, list[tuple[str, Any, Any]]] = {}
     if not same(left.mass, right.mass):
-        figures["mass"] = ("mass", left.mass, right.mass)
+        figures["mass"] = [("mass", left.mass, right.mass)]
     if not np.linalg.norm(left.com - right.com) <= NEAR:
-        figures["centre of mass"] = ("com", plain(left.com), plain(right.com))
+        figures["centre of mass"] = [("com", plain(left.com), plain(right.com))]
     size = max(np.abs(left.tensor).max(), np.abs(right.tensor).max())
     if not np.abs(left.tensor - right.tensor).max() <= 1e-9 * size:
-        moments = [plain(np.linalg.eigvalsh(body.tensor)[::-1]) for body in (left, right)]
-        figures["inertia"] = ("moments", *moments)
+        figures["inertia"] = _of_tensors(left.tensor, right.tensor)
     return figures
+
+
+def _of_tensors(left: Array, right: Array) -> list[tuple[str, Any, Any]]:
+    """What two tensors of inertia (3, 3) [kg m²] differ in: their moments, and their axes."""
+    moments = [np.linalg.eigvalsh(tensor)[::-1] for tensor in (left, right)]
+    angle = _turn_of_axes(left, right)
+    turned = (TURNED, 0.0, angle)
+    if np.allclose(*moments, rtol=1e-9, atol=0) and angle:
+        return [turned]
+    figures: list[tuple[str, Any, Any]] = [("moments", *map(plain, moments))]
+    if angle > _TILTED:
+        figures.append(turned)
+    return figures
+
+
+def _turn_of_axes(left: Array, right: Array) -> float:
+    """Return the smallest angle [rad] that turns the principal axes of one tensor to another's.
+
+    An axis has no direction, and where two moments are equal the axes of these two are any that are
+    perpendicular to the third.
+
+    Args:
+        left: A tensor of inertia (3, 3) [kg m²].
+        right: The other.
+    """
+    (ours, a), (theirs, b) = (np.linalg.eigh(tensor) for tensor in (left, right))
+    equal = [
+        [moments[k + 1] - moments[k] <= _EQUAL * moments[2] for k in (0, 1)]
+        for moments in (ours, theirs)
+    ]
+    low, high = (any(side[k] for side in equal) for k in (0, 1))
+    if low and high:
+        return 0.0
+    if low or high:
+        single = 2 if low else 0  # the axis of the moment that is not one of two
+        cosine = abs(a[:, single] @ b[:, single])
+        sine = np.linalg.norm(np.cross(a[:, single], b[:, single]))
+        return float(np.arctan2(sine, cosine))
+    turns = []
+    for signs in product((1.0, -1.0), repeat=3):
+        axes = b * signs
+        if np.linalg.det(axes) * np.linalg.det(a) > 0:
+            turns.append(float(angle_between(a, axes)))
+    return min(turns)
 
 
 def _made_alike(sides: Sides, here: list[int], there: list[int]) -> bool:
@@ -80,7 +132,7 @@ def _of_body(
     simple = left.body_simple[pair.left]
     fits = not right.body_simple[target] or simple
     back_fits = not simple and align is HERE
-    for subject, values in _differing(wanted, sides.solids[1].inertial(target)).items():
+    for subject, figures in _differing(wanted, sides.solids[1].inertial(target)).items():
         (fields, unit), edits, back, why = _WEIGHS[subject], (), (), ""
         if subject == "mass" or fits:
             edits = _weighs(sides, subject, target, wanted)
@@ -90,7 +142,7 @@ def _of_body(
             back = copies(fields, right, pair.right, pair.left)
         else:
             why = _DIAGONAL
-        yield sides.tell(subject, "body", pair.left, (values,), unit, edits, back, why)
+        yield sides.tell(subject, "body", pair.left, figures, unit, edits, back, why, _TURN_UNIT)
 
 
 def _weighs(sides: Sides, subject: str, body: int, there: Inertial) -> tuple[Edit, ...]:
@@ -113,10 +165,16 @@ def _lumped(sides: Sides, pair: BodyPair, there: Inertial, bodies: list[int]) ->
     emptied = [zeros(("body_mass", "body_inertia"), sides.right, body) for body in fixed]
     filled = [_weighs(sides, figure, pair.right, there) for figure in _WEIGHS]
     why = _DIAGONAL if sides.right.body_simple[pair.right] else ""
+    units = {figure: unit for subject in differing for figure, unit in _FIGURES[subject].items()}
     return sides.tell(
-        *(subject, "body", pair.left, differing.values(), _WEIGHS[subject][1]),
+        subject,
+        "body",
+        pair.left,
+        chain(*differing.values()),
+        _WEIGHS[subject][1],
         edits=() if why else chain(*emptied, *filled),
         refused=why,
+        units=units,
     )
 
 
@@ -193,7 +251,15 @@ def _place(
             for (_, b), (ref, other) in zip(joints, refs, strict=True)
             if not same(ref, other)
         ]
-        yield sides.tell("zero", "body", pair.left, (("ref", *zip(*refs, strict=True)),), "", zero)
+        # Of joints of both kinds the positions have no common unit.
+        kinds = {int(left.jnt_type[a]) for a, _ in joints}
+        unit = ""
+        if kinds == {int(_HINGE)}:
+            unit = "rad"
+        elif kinds == {int(_SLIDE)}:
+            unit = "m"
+        values = (("ref", *zip(*refs, strict=True)),)
+        yield sides.tell("zero", "body", pair.left, values, unit, zero)
         alike = True
     wanted = parent.align @ ours @ pair.align.inverse
     if not alike:  # the same zero, another reference: turn back by ours, on by theirs

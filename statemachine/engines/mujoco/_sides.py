@@ -5,9 +5,10 @@ What moves as one is compared in one frame: fixed bodies are no difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import product
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...rotations import HERE, Placement, matrix_from_quat
 from ..description.records import Inertial
 from ..description.shapes import one_to_one
 from ..description.tree import together
-from ..records import BodyPair, Counterparts, Edit, ModelDifference
+from ..records import TURNED, BodyPair, Counterparts, Edit, ModelDifference
 from . import _fields as fields
 
 NEAR = 1e-10  # [m], and of entries of matrices: less is rounding
@@ -26,9 +27,10 @@ _SAME_PLACE = 1e-15  # the same: what composing with frames that are none leaves
 NOBODY = -2  # in the place of an id that has no counterpart; -1 is that of nothing
 _TOGETHER = 3  # entries: a longer array is told by those that differ
 _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves it
-_COUNTED = {"equality": "eq"}  # in the names of counts and of views
+_COUNTED = {"equality": "eq", "camera": "cam"}  # in the names of counts and of views
 
 Pairs = Sequence[tuple[int, int]]
+NO_UNITS: Mapping[str, str] = MappingProxyType({})  # that are other than that of a difference
 
 
 def same(left: Any, right: Any) -> bool:
@@ -245,11 +247,12 @@ class Sides:
         edits: Iterable[Edit] = (),
         back: Iterable[Edit] = (),
         refused: str = "",
+        units: Mapping[str, str] = NO_UNITS,
     ) -> ModelDifference:
         """A difference of an element of the first model; the rest as of ModelDifference."""
         name = name_of(self.left, kind, element)
         return ModelDifference(
-            subject, kind, name, tuple(values), unit, tuple(edits), tuple(back), refused
+            subject, kind, name, tuple(values), unit, tuple(edits), tuple(back), refused, units
         )
 
     def rows(
@@ -282,7 +285,14 @@ class Sides:
                     edits_one = copies(row.fields, self.right, b, a) if back else ()
                     where = name or name_of(self.left, kind, a)
                     yield ModelDifference(
-                        row.subject, kind, where, values, row.unit, edits, edits_one
+                        row.subject,
+                        kind,
+                        where,
+                        values,
+                        row.unit,
+                        edits,
+                        edits_one,
+                        units=row.units,
                     )
 
     def _entries(self, names: Sequence[str], a: int, b: int) -> list[list[Any]]:
@@ -343,7 +353,7 @@ class Sides:
         if far > NEAR:
             values.append(("place", plain(wanted.pos), plain(theirs.pos)))
         if turn > NEAR:
-            values.append(("turned by [rad]", 0.0, wanted.angle(theirs)))
+            values.append((TURNED, 0.0, wanted.angle(theirs)))
         names = f"{kind}_pos", f"{kind}_quat"
         on = self.right.body_parentid if kind == "body" else getattr(self.right, f"{kind}_bodyid")
         inner = self.solids[1].place(int(on[b])).inverse @ wanted
@@ -351,4 +361,4 @@ class Sides:
         # The first model's own numbers, where they say that place: both move by the same bits.
         if max(apart(inner, placed(*(value for _, _, value in edits)))) > _SAME_PLACE:
             edits = ((names[0], (b,), inner.pos), (names[1], (b,), quat_of(inner.mat)))
-        return self.tell("place", kind, a, values, "m", edits)
+        return self.tell("place", kind, a, values, "m", edits, units={TURNED: "rad"})

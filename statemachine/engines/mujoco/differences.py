@@ -23,6 +23,7 @@ from ._drives import drives
 from ._elements import AS_GEOMS, as_geoms, contact_pairs, elements, equalities
 from ._geoms import Geoms
 from ._parts import places, weights
+from ._readable import patched_text
 from ._sides import Sides, plain, same
 
 # After these the boxes around the geoms of a body are no longer where they were.
@@ -70,7 +71,12 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
     model = copy.copy(raw)
     # After what is done to the geoms: what makes a pair as its geoms are then.
     edits = sorted(edits, key=lambda edit: edit[0] == AS_GEOMS)
+    texts = [edit for edit in edits if edit[0] == "text_data"]
+    if texts:
+        model = patched_text(model, texts)
     for name, index, value in edits:
+        if name == "text_data":
+            continue
         for edit in as_geoms(model, *index) if name == AS_GEOMS else ((name, index, value),):
             put(model, edit[0], edit[2], edit[1])
     if any(name in _MOVES for name, _, _ in edits):
@@ -80,7 +86,9 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
     model.flg_adhesion = model.flg_adhesion or model.geom_adhesion.any()
     model.flg_surfacevel = model.flg_surfacevel or model.geom_surfacevel.any()
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    return model
+    # A copy looks up its elements by the names that they have now.
+    renamed = any(name.startswith("name_") for name, _, _ in edits)
+    return copy.copy(model) if renamed else model
 
 
 def _read(raw: Any, edit: Edit) -> Any:
@@ -128,8 +136,10 @@ def _options(left: Any, right: Any, world: bool) -> Iterator[ModelDifference]:
         if names:
             values = tuple((name, ours[name], theirs[name]) for name in names)
             edits = tuple((f"opt.{name}", (), copy.copy(getattr(left.opt, name))) for name in names)
-            unit = fields.OPTION_UNITS.get(subject, "")
-            yield ModelDifference(subject, "option", "", values, unit, edits)
+            units = {name: fields.OPTION_UNITS.get(name, "") for name in names}
+            yield ModelDifference(
+                subject, "option", "", values, units[names[0]], edits, units=units
+            )
     for field, word, bit in _flag_bits():
         name = f"flag {word}"
         if ours[name] != theirs[name]:
@@ -206,7 +216,8 @@ def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, .
         right: The compiled model that its edits are of.
         difference: One of `differences`.
     """
-    if difference.edits_one or difference.refused or difference.subject.startswith("extra "):
+    whole = difference.only_read or difference.subject.startswith("extra ")
+    if whole or difference.edits_one or difference.refused:
         return (difference,)
     edits = [edit for edit in difference.edits if not same(edit[2], _read(right, edit))]
     if any(
@@ -230,18 +241,24 @@ def entries(right: Any, difference: ModelDifference) -> tuple[ModelDifference, .
             difference,
             subject=f"{difference.subject} ({name})",
             values=((name, *rows[0][1:3]),),
-            unit=rows[0][3] or difference.unit,
+            unit=rows[0][3] or difference.unit_of(_word(rows[0][4][0])),
+            units={},
             edits=tuple(row[4] for row in rows),
         )
         for name, rows in parts.items()
     )
 
 
+def _word(array: str) -> str:
+    """Return what an array, or an option, is called without the kind of its element."""
+    kind, _, rest = array.partition("." if array.startswith("opt.") else "_")
+    return rest or kind
+
+
 def _by_entry(right: Any, edit: Edit) -> Iterator[tuple[str, Any, Any, str, Edit]]:
     """What an entry is called, both values, its unit if that is another, what brings it over."""
     (name, index, value), old = edit, _read(right, edit)
-    kind, _, rest = name.partition("." if name.startswith("opt.") else "_")
-    word, names = rest or kind, _SPLIT.get(name)
+    word, names = _word(name), _SPLIT.get(name)
     if name in ("body_quat", "geom_quat", "site_quat"):
         angle = 2 * float(np.arccos(np.clip(abs(np.dot(value, old)), 0.0, 1.0)))
         yield "turn", 0.0, angle, "rad", edit
