@@ -155,7 +155,7 @@ COMMANDS = (
     "compare gravity {0} --why",
     "compare gravity {0} {0}@mujoco:engine",
     "compare --models {0} {0}",
-    "view {0}",
+    "view {0} --seconds 1",
     "lesson hold --model {0}",
     "audit {0}",
     "trace record gravity {0}",

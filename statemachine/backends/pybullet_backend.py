@@ -34,8 +34,10 @@ from ..releases import version_of
 from . import _bullet_urdf as urdf
 from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import Act, DrivenWorld
+from ._bullet_file import UrdfFile
 from ._bullet_plan import Plan
-from ._bullet_scope import as_targets, check, ignored, softness
+from ._bullet_scope import as_targets, check, ignored, otherwise, softness
+from ._bullet_weights import weighed_as_it_comes
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._edits import edited, step_length
 from ._hidden_data import HiddenModel
@@ -171,7 +173,8 @@ def load(
     substeps = checked.get("substeps", 1)
     if checked:
         raw = edited(raw, checked, step_length(float(raw.opt.timestep), substeps, checked))
-    plan = Plan(raw)
+    file = UrdfFile.read(Path(path)) if defaults == "engine" else None
+    plan = Plan(raw, file)
     check(plan, "pybullet", defaults == "engine")
     model = PybulletModel(
         plan, Path(path), substeps, defaults, checked.get("max_qvel"), there=there
@@ -180,8 +183,9 @@ def load(
     (model._open_world() if there else World(plan, model._kind)).close()
     if defaults == "model":
         _tell(plan, ignored(plan), stacklevel=4)
-    elif targets := as_targets(plan):
-        warnings.warn(f"PyBullet: {targets[0]}", EngineWarning, stacklevel=3)
+    else:
+        for difference in (*as_targets(plan), *otherwise(plan)):
+            warnings.warn(f"PyBullet: {difference}", EngineWarning, stacklevel=3)
     return model._started_as(model, checked)
 
 
@@ -240,7 +244,9 @@ class PybulletModel(HiddenModel):
             raw={
                 raw.body(b).name or f"body {b}": plan.described(b, kind)[0]
                 for b in (0, *urdf.roots(raw))
-            },
+            }
+            if plan.file is None
+            else {plan.file.path.name: plan.file.content.decode(errors="replace")},
             capabilities=_capabilities(as_it_comes, bound, softness(plan)),
             max_qvel=bound,
             timestep=float(raw.opt.timestep) * substeps,
@@ -260,7 +266,10 @@ class PybulletModel(HiddenModel):
 
     def with_compiled(self, compiled: mujoco.MjModel) -> PybulletModel:
         check_numbers(compiled, str(self.path))
-        return self._of(compiled, self.substeps, self._asked)._started_as(self, {})
+        plan = Plan(compiled, weighed=self.plan.weighed)
+        if self.plan.file:
+            plan = Plan(weighed_as_it_comes(self.plan, compiled), weighed=True)
+        return self._of(plan, self.substeps, self._asked)._started_as(self, {})
 
     @property
     def shared_worlds(self) -> dict[str, World]:
@@ -272,13 +281,13 @@ class PybulletModel(HiddenModel):
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
         substeps = options.get("substeps", self.substeps)
         raw = edited(self.plan.raw, options, step_length(self.timestep, substeps, options))
-        model = self._of(raw, substeps, options.get("max_qvel", self._asked))
+        plan = Plan(raw, self.plan.file, self.plan.weighed)
+        model = self._of(plan, substeps, options.get("max_qvel", self._asked))
         if "friction" in options:
             _tell(model.plan, [], stacklevel=4)
         return model
 
-    def _of(self, raw: mujoco.MjModel, substeps: int, asked: Array | None) -> PybulletModel:
-        plan = Plan(raw)
+    def _of(self, plan: Plan, substeps: int, asked: Array | None) -> PybulletModel:
         check(plan, "pybullet", self.defaults == "engine")
         return PybulletModel(
             plan, self.path, substeps, self.defaults, asked, self.acts, self._there
