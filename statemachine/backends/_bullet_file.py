@@ -94,6 +94,14 @@ class UrdfFile:
             ),
         )
 
+    @classmethod
+    def is_one(cls, path: Path) -> bool:
+        """Whether a file is a URDF that PyBullet can read."""
+        try:
+            return cls.read(path) is not None
+        except (ModelError, UnsupportedError):
+            return False
+
     def load(self, client: int) -> int:
         """Put it into a world as PyBullet's users do, without flags; the body's number.
 

@@ -96,13 +96,14 @@ class FileTree(Tree):
         infos = joint_infos(client, body)
         base = pb.getBodyInfo(body, client)[0].decode()
         numbers = {base: -1} | {info[12].decode(): info[0] for info in infos}
-        known = {raw.body(b).name: b for b in range(1, raw.nbody)}
+        known: dict[str, int] = {raw.body(b).name: b for b in range(1, raw.nbody)}
         self.links = {b: numbers[name] for name, b in known.items() if name in numbers}
-        self.bodies = [0] * (len(infos) + 1)
+        self.bodies: list[int] = [0] * (len(infos) + 1)
         self.bodies[-1] = known.get(base, 0)
         for info in infos:
             above = self.bodies[info[16]]
-            self.bodies[info[0]] = known.get(info[12].decode(), above)
+            name = info[12].decode()
+            self.bodies[info[0]] = known[name] if name in known else above
         free = np.flatnonzero(raw.jnt_type == int(JointType.FREE)).tolist()
         strange = [_KINDS[info[2]] for info in infos if info[2] in _KINDS]
         if len(free) > 1:

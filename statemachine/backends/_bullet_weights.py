@@ -116,3 +116,12 @@ def weighed_as_it_comes(plan: Plan, compiled: mujoco.MjModel) -> mujoco.MjModel:
         com = weight.com + compiled.body_ipos[body] - of_file.body_ipos[body]
         found[body] = Weight(mass, com, weight.inertia * (mass / max(weight.mass, 1e-9)))
     return with_weights(compiled, found)
+
+
+def with_weights_of(compiled: mujoco.MjModel, other: mujoco.MjModel) -> mujoco.MjModel:
+    """Make a compiled model with the inertias of another, and what follows from them."""
+    raw = copy.copy(compiled)
+    for name in ("body_mass", "body_ipos", "body_iquat", "body_inertia"):
+        getattr(raw, name)[:] = getattr(other, name)
+    mujoco.mj_setConst(raw, mujoco.MjData(raw))
+    return raw

@@ -144,6 +144,16 @@ class World:
         ]
 
     @property
+    def stands(self) -> bool:
+        """Whether the base does not move, though the model has a free joint there."""
+        return self._of_file is not None and self._of_file.standing >= 0
+
+    @property
+    def reads_file(self) -> bool:
+        """Whether PyBullet read the robot's file itself, and nothing else is here."""
+        return self._of_file is not None
+
+    @property
     def closed(self) -> bool:
         """Whether the client was given back; its number may be another's by now."""
         return not self.close.alive

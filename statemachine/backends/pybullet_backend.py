@@ -10,6 +10,7 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
@@ -187,6 +188,14 @@ def load(
         for difference in (*as_targets(plan), *otherwise(plan)):
             warnings.warn(f"PyBullet: {difference}", EngineWarning, stacklevel=3)
     return model._started_as(model, checked)
+
+
+def base_stands(model: PybulletModel) -> bool:
+    """Whether PyBullet as it comes does not move a base that has a free joint in the model."""
+    if model.plan.file is None or not model.plan.file.floats:
+        return False
+    with closing(World(model.plan, "engine")) as world:
+        return world.stands
 
 
 def _tell(plan: Plan, settings: list[str], stacklevel: int) -> None:

@@ -9,11 +9,13 @@ from typing import Literal
 import numpy as np
 
 from ..backends import check_backend
+from ..engines import room
 from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError, refuse
 from ..installed import DEFAULT
 from ..interface import Model
 from ..measures import common_moments
 from ..measures.text import command, milliseconds
+from ..releases import engine_of
 from ..runs import (
     Rerun,
     SideStart,
@@ -117,7 +119,9 @@ def prepare_sides(
     _check_moments(models, seconds)
     for model in models:
         check_length(model, seconds)
-    said, seed, start, key = list[str](), request.seed, None, scenario.keyframe
+    unlike = (room(engine_of(model.backend)).unlike_its_users(model) for model in models)
+    said = list(dict.fromkeys(line for lines in unlike for line in lines))
+    seed, start, key = request.seed, None, scenario.keyframe
     if trace is not None:
         _refuse_of_run(request)
         trace = for_left(trace, left, request)
