@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -14,15 +15,20 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare.models import read
+from statemachine.compare.sides import Request, Side
+from statemachine.compare.two_sides import run_sides
+from statemachine.compare.why.explain import explain
 from statemachine.errors import EngineWarning, ModelError, UnsupportedError
 from statemachine.installed import silence
 from statemachine.models import models_dir
+from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import opened, refused, warnings_of, written
 
 pytestmark = pytest.mark.usefixtures("bullet")
 
 STEPS = 240
+STEP = {"timestep": 0.002}
 GRAVITY = (0.3, -0.2, -9.81)
 as_it_comes = partial(sm.load, backend="pybullet", defaults="engine", gravity=GRAVITY)
 
@@ -366,3 +372,61 @@ def test_what_pybullet_reads_otherwise_is_refused(tmp_path: Path) -> None:
 def test_an_mjcf_is_still_written_for_it() -> None:
     model = sm.load("so101", backend="pybullet", defaults="engine")
     assert all(text.startswith("<?xml") for text in model.raw.values())
+
+
+@pytest.mark.parametrize(
+    ("name", "cause", "own"),
+    [
+        ("two arms that pass through each other", "self-collision", "off"),
+        (
+            "links without inertial, at the end and on the way",
+            "inertias",
+            "of shapes, 3 links 1 kg",
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::statemachine.errors.EngineWarning")
+def test_what_the_engine_gives_of_its_own_explains_a_gap(
+    tmp_path: Path, name: str, cause: str, own: str
+) -> None:
+    """Self-collision and 1 kg are settings; with all of them changed nothing of the gap stays."""
+    path = written(tmp_path / "robot.urdf", URDFS[name])
+    sides = sm.load(path, backend="pybullet", defaults="engine"), sm.load(path, backend="pybullet")
+    found = explain(*sides, SCENARIOS["gravity"], seconds=0.25, jobs=1)
+    (row,) = (row for row in found.shares if row.name == cause)
+    assert own in str(row.values)
+    assert row.last is not None
+    assert row.last > 0.01
+    assert found.brought == pytest.approx(0, abs=1e-9)
+    assert found.explained == pytest.approx(1)
+    assert not found.located
+
+
+def test_that_links_of_one_robot_touch_is_said(tmp_path: Path) -> None:
+    """Only of a robot of which two links can, and only where the engine's users have it off."""
+    arms = written(tmp_path / "robot.urdf", URDFS["two arms that pass through each other"])
+    slides = written(tmp_path / "slides.urdf", URDFS["slides"])
+
+    def said(path: Path, defaults: Any) -> str:
+        with warnings.catch_warnings(action="ignore", category=EngineWarning):
+            sides = Side(str(path), "mujoco"), Side(str(path), "pybullet", defaults, STEP)
+            return " ".join(run_sides(Request(("gravity",), sides=sides, seconds=0.5)).said)
+
+    assert "the links of one robot can touch each other" in said(arms, "model")
+    assert "touch each other" not in said(arms, "engine")
+    assert "touch each other" not in said(slides, "model")
+
+
+def test_an_edit_of_a_file_keeps_what_pybullet_gives_it(tmp_path: Path) -> None:
+    """A mass that is edited counts by its difference, and the inertia of the shapes grows."""
+    text = URDFS["several shapes on a link"]
+    heavier = written(tmp_path / "heavier.urdf", text.replace('value="1.5"', 'value="2.5"'))
+    model = as_it_comes(written(tmp_path / "robot.urdf", text))
+    edited = copy.copy(model.compiled)
+    edited.body_mass[edited.body("a").id] += 1.0
+    with opened(model.with_compiled(edited)) as (changed, data):
+        sm.step(changed, data, STEPS)
+        ours = data.qpos.copy()
+    theirs = our_motion_of(heavier, limp=False)[-1]
+    assert ours == pytest.approx(theirs, abs=1e-9)
+    assert np.abs(theirs - our_motion_of(model.path, limp=False)[-1]).max() > 1e-6

@@ -77,21 +77,23 @@ class UrdfFile:
                 feature="a tree of so many parts",
                 reason=f"{len(links)} links",
             )
+        floating = tuple(
+            joint.get("name", "") for joint in joints if joint.get("type") == "floating"
+        )
+        # One that is fixed to the world weighs nothing; so does one of this name, in PyBullet.
+        still = {"world"} if floating else {"world", *roots}
         return cls(
             path=path.absolute(),
             content=content,
             without_inertial=tuple(
                 name
                 for name, link in links.items()
-                # PyBullet takes a link of this name for what stands still.
-                if link.find("inertial") is None and name != "world"
+                if link.find("inertial") is None and name not in still
             ),
             mimics=tuple(
                 joint.get("name", "") for joint in joints if joint.find("mimic") is not None
             ),
-            floating=tuple(
-                joint.get("name", "") for joint in joints if joint.get("type") == "floating"
-            ),
+            floating=floating,
         )
 
     @classmethod

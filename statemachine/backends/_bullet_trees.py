@@ -101,9 +101,9 @@ class FileTree(Tree):
         self.bodies: list[int] = [0] * (len(infos) + 1)
         self.bodies[-1] = known.get(base, 0)
         for info in infos:
-            above = self.bodies[info[16]]
+            above = self.bodies[int(info[16])]
             name = info[12].decode()
-            self.bodies[info[0]] = known[name] if name in known else above
+            self.bodies[int(info[0])] = known.get(name, above)
         free = np.flatnonzero(raw.jnt_type == int(JointType.FREE)).tolist()
         strange = [_KINDS[info[2]] for info in infos if info[2] in _KINDS]
         if len(free) > 1:

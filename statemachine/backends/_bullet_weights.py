@@ -113,7 +113,8 @@ def weighed_as_it_comes(plan: Plan, compiled: mujoco.MjModel) -> mujoco.MjModel:
     of_file, found = plan.raw, weights(plan)
     for body, weight in found.items():
         mass = max(weight.mass + float(compiled.body_mass[body] - of_file.body_mass[body]), 1e-9)
-        com = weight.com + compiled.body_ipos[body] - of_file.body_ipos[body]
+        moment = weight.mass * weight.com + compiled.body_mass[body] * compiled.body_ipos[body]
+        com = (moment - of_file.body_mass[body] * of_file.body_ipos[body]) / mass
         found[body] = Weight(mass, com, weight.inertia * (mass / max(weight.mass, 1e-9)))
     return with_weights(compiled, found)
 
