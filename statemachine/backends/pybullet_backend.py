@@ -149,9 +149,12 @@ def load(
     Args:
         path: The file.
         options: As `Model.replace` takes them; what they switch off is not refused.
-        defaults: "engine" is what `loadURDF` gives: velocity motors in the joints,
-            damping 0.04, friction 0.5, inertias of the collision shapes, no gravity until
-            it is set, 1/240 s a step. ctrl is then what POSITION_CONTROL aims at.
+        defaults: "engine" is what `loadURDF` gives without flags: velocity motors in the joints,
+            damping 0.04, friction 0.5, inertias of the collision shapes, 1 kg for a link without
+            <inertial>, no contact between two links of one robot, no <mimic>, no gravity until
+            it is set, 1/240 s a step. PyBullet reads a URDF itself, by `useFixedBase` unless it
+            has a floating joint; of an MJCF a URDF is written. ctrl is then what
+            POSITION_CONTROL aims at.
         there: Another release of the engine, in whose process worlds are; None for the installed.
 
     Raises:
