@@ -120,8 +120,8 @@ def prepare_sides(
     for model in models:
         check_length(model, seconds)
     unlike = (room(engine_of(model.backend)).unlike_its_users(model) for model in models)
-    said = list(dict.fromkeys(line for lines in unlike for line in lines))
-    seed, start, key = request.seed, None, scenario.keyframe
+    unlike_users = dict.fromkeys(line for lines in unlike for line in lines)
+    said, seed, start, key = list[str](), request.seed, None, scenario.keyframe
     if trace is not None:
         _refuse_of_run(request)
         trace = for_left(trace, left, request)
@@ -173,7 +173,7 @@ def prepare_sides(
         )
         for model, side, at in zip(models, sides, (start, begin), strict=True)
     )
-    return (left_rerun, right_rerun), matched, (*said, *request.taken)
+    return (left_rerun, right_rerun), matched, (*said, *request.taken, *unlike_users)
 
 
 def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
