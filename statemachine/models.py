@@ -10,13 +10,16 @@ from __future__ import annotations
 import importlib
 import math
 import os
+import re
 import sys
 import urllib.error
 import urllib.request
+from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from xml.parsers import expat
 
 from .errors import (
     MissingEngineError,
@@ -170,7 +173,7 @@ def model_names() -> list[str]:
 
 
 def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
-    """The file of a model.
+    """Find the file of a model: everything that reads one asks here.
 
     Args:
         name: One of `model_names()`, a path to an .xml, .mjcf, .urdf or .mjb file, or
@@ -183,10 +186,18 @@ def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
 
     Raises:
         ModelFileError: The path or the menagerie folder is not there.
+        ModelError: The file is a xacro; see `refuse_xacro`.
         UnknownNameError: No model has this name.
         MissingEngineError: The package of robots is not installed.
         TypeError: It is not text and no path.
     """
+    path = _file(name, menagerie)
+    refuse_xacro(path)
+    return path
+
+
+def _file(name: AnyPath, menagerie: AnyPath | None) -> Path:
+    """Find the file of a model, whatever is in it; see `resolve`."""
     text = _as_text(name)
     if is_named(text) and (menagerie is None or ":" in text):
         return file_of(text)
@@ -209,6 +220,8 @@ def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
     ours = text if "/" in text else f"{text}/{text}"
     if ours in model_names():
         return models_dir() / f"{ours}.xml"
+    if path.suffix.lower() == _XACRO_SUFFIX and path.is_file():
+        raise ModelError(_is_xacro(path))
     refuse(
         (path.is_dir(), f"{text} is a folder: name a file in it ({', '.join(SUFFIXES)})"),
         (path.is_file(), f"model file {text} does not end in {', '.join(SUFFIXES)}"),
@@ -247,6 +260,115 @@ def _in_menagerie(name: str, root: Path) -> Path:
         found = sorted(f"{robot}/{found.stem}" for found in home.glob("*.xml"))
         raise unknown_name(f"model in {root}", f"{robot}/{file}", found)
     return path.absolute()
+
+
+# A xacro is a text from which a URDF is made: its macros stand for links and joints, which a reader
+# of URDF does not see, and its expressions for numbers and names.
+
+_XACRO_SUFFIX = ".xacro"
+# An expression, as ${pi / 2}, or what is put in from elsewhere, as $(find a_package).
+_XACRO_VALUE = re.compile(r"\$\{[^}]*\}|\$\([^)]*\)")
+# The same, and macros, in a text that is not quite XML, which some readers take.
+_XACRO_TEXT = re.compile(rb"<\s*xacro:|[\"'][^\"'<>]*(?:\$\{|\$\()")
+# Without any of these a file is no xacro, and names no other file.
+_XACRO_SIGNS = (b"xacro", b"${", b"$(", b"<include", b"<model")
+
+
+def refuse_xacro(path: Path) -> None:
+    """Refuse a URDF or an MJCF that is a xacro, or that includes or attaches one.
+
+    A file that only declares the namespace of xacro is none: what xacro writes often does.
+
+    Args:
+        path: The file; a binary model, or a file that cannot be read, is left to its reader.
+
+    Raises:
+        ModelError: It is a xacro, with the line that shows it.
+    """
+    waiting, seen = [path], set[Path]()
+    while waiting:
+        file = waiting.pop()
+        try:
+            place, content = file.resolve(), file.read_bytes()
+        except OSError:
+            continue
+        if place in seen or not any(sign in content for sign in _XACRO_SIGNS):
+            continue
+        seen.add(place)
+        scan = _XacroScan()
+        scan.read(content)
+        if scan.found:
+            where = f"{path.name} includes " if file != path else ""
+            raise ModelError(f"{where}{_is_xacro(file, scan.format)} ({scan.found})")
+        for name in scan.files:
+            included = included_file(name, path, file)
+            if included:
+                waiting.append(included)
+
+
+def _is_xacro(file: Path, form: str = "URDF") -> str:
+    """Say that a file is a xacro, and what to type."""
+    article, suffix = ("an", "xml") if form == "MJCF" else ("a", "urdf")
+    return (
+        f"{file.name}: it is a xacro: turn it into {article} {form} first: "
+        f"`xacro {file.name} > OUT.{suffix}`"
+    )
+
+
+class _XacroScan:
+    """One file while it is looked through, prefixes of names as they are written.
+
+    Attributes:
+        found: What shows that the file is a xacro, and its line; "" if nothing does.
+        files: Names of the files that it includes or attaches.
+        format: "URDF" or "MJCF", by its root element.
+    """
+
+    def __init__(self) -> None:
+        self.found, self.files, self.format = "", list[str](), "URDF"
+        self._prefixes, self._depth = {"xacro"}, 0
+        # One that knows no namespaces: of engines, none asks whether a prefix was declared.
+        self._parser = expat.ParserCreate()
+        self._parser.StartElementHandler = self._start
+
+    def read(self, content: bytes) -> None:
+        """Look a file through; of one that is not XML the rest as text."""
+        try:
+            self._parser.Parse(content, True)
+        except (expat.ExpatError, ValueError, LookupError):
+            rest = content[max(0, self._parser.ErrorByteIndex) :]
+            match = _XACRO_TEXT.search(rest)
+            if match and not self.found:
+                self._says(match[0].decode(errors="replace"), rest[: match.start()].count(b"\n"))
+
+    def _start(self, name: str, attributes: Mapping[str, str]) -> None:
+        if not self._depth and name == "mujoco":
+            self.format = "MJCF"
+        self._depth += 1
+        for key, value in attributes.items():
+            if key.startswith("xmlns:") and value.rstrip("/").endswith("xacro"):
+                self._prefixes.add(key.removeprefix("xmlns:"))
+        if self.found:
+            return
+        prefix, colon, _ = name.partition(":")
+        if colon and prefix in self._prefixes:
+            self._says(f"<{name}>")
+        elif name != "text":  # what an MJCF keeps for the user's own code
+            for expression in _expressions(attributes):
+                self._says(expression)
+                return
+        if name in ("include", "model") and attributes.get("file"):
+            self.files.append(attributes["file"])
+
+    def _says(self, what: str, lines: int = 0) -> None:
+        self.found = f"line {self._parser.CurrentLineNumber + lines} has {shown(what)}"
+
+
+def _expressions(attributes: Mapping[str, str]) -> Iterator[str]:
+    """Give what xacro would have replaced in the attributes of an element."""
+    for value in attributes.values():
+        if match := _XACRO_VALUE.search(value):
+            yield match[0]
 
 
 def mesh_file(name: str, folder: Path) -> Path | None:

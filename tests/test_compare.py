@@ -291,7 +291,7 @@ def test_free_of_contact_the_engines_agree() -> None:
         run = run_sides(name)
         found = compare(*run.traces)
         assert found.agrees, name
-        assert not run.said
+        assert all("links of one robot can touch" in line for line in run.said)
         joints = [each.max for each in found.agreements if each.kind == "joint"]
         assert len(joints) == 6
         assert max(joints) < np.radians(1e-6)

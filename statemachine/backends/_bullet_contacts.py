@@ -66,6 +66,20 @@ class Surfaces:
         self._solve(wanted)
         self.differences += several
 
+    def of_one_robot(self, whole: bool) -> list[tuple[int, int]]:
+        """Give the pairs of solids that meet though both are of one robot.
+
+        Args:
+            whole: Whether all that is here is one robot, as in a URDF; else each tree is one.
+        """
+        roots = self._raw.body_rootid
+        pairs = [pair for pair, meet in self.pairs.items() if meet]
+        return [
+            (i, j)
+            for i, j in pairs
+            if whole or 0 != roots[self.solids[i].body] == roots[self.solids[j].body]
+        ]
+
     def _label(self, i: int, j: int) -> str:
         def name(solid: Figures) -> str:
             if solid.plane:

@@ -67,7 +67,11 @@ class DrivenWorld(HiddenWorld):
                 self.memory_layout += (("act", int(raw.na)),)
                 self.kept_memory = ("act",)
         # Whether the arrays of one arm, in their order, are those of the whole model.
-        self._alone = not self._free and [type(tree.qpos) for tree in trees] == [slice]
+        self._alone = (
+            not self._free
+            and [type(tree.qpos) for tree in trees] == [slice]
+            and sum(len(tree.dofs) for tree in trees) == self._nv
+        )
         self._driven, self._placed = False, None
         for act in acts:
             act(world)
@@ -113,7 +117,8 @@ class DrivenWorld(HiddenWorld):
         """As the base says."""
         if self._alone:
             return self._arms[0].positions, self._arms[0].speed
-        qpos, qvel = np.empty(self._nq), np.empty(self._nv)
+        qpos, qvel = np.empty(self._nq), np.zeros(self._nv)
+        self.raw.read_standing(qpos)
         for arm in self._arms:
             qpos[arm.tree.qpos], qvel[arm.tree.qvel] = arm.positions, arm.speed
         for tree in self._free:

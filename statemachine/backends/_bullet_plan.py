@@ -21,15 +21,13 @@ from numpy.typing import NDArray
 from ..interface import Array
 from . import _bullet_urdf as urdf
 from ._bullet_contacts import Surfaces
+from ._bullet_file import MOST_LINKS, UrdfFile
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 # Of the armature, as inertia of the stepped arm: 0.003 of the SO-101's 0.028 kg m², with
 # which it grips soon and the eigenvalue of `_padding` is 0.97 at most.
 _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
 _YIELDS = 0.02
-# PyBullet has room for 128 numbers of a tree, and of a position for 7 of its base; from 122 joints
-# on what it tells is wrong, and from 127 links on it has no such tree.
-MOST_LINKS = 120
 _WRAP = mujoco.mjtWrap
 _EQ, SITE = mujoco.mjtEq, int(mujoco.mjtObj.mjOBJ_SITE)
 _SUMS, PLACES = (_EQ.mjEQ_JOINT, _EQ.mjEQ_TENDON), (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD)
@@ -56,10 +54,15 @@ class Plan:
         names: What everything is called in a URDF.
         ghost: See `_bullet_driven`; None until it is needed.
         described: Gives the text and the files of a tree of bodies; see `_describe`.
+        file: The URDF that a world as it comes reads itself; None where one is written for it.
+        weighed: Whether the links of a world as it comes get the inertias of `raw`, not those of
+            their shapes. Its robot was a URDF of its own, in which no two links meet.
     """
 
-    def __init__(self, raw: mujoco.MjModel) -> None:
-        self.raw = raw
+    def __init__(
+        self, raw: mujoco.MjModel, file: UrdfFile | None = None, weighed: bool = False
+    ) -> None:
+        self.raw, self.file, self.weighed = raw, file, weighed
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
         self.ghost: Any = None
@@ -67,7 +70,7 @@ class Plan:
         self.described = cache(partial(Plan._describe, proxy(self)))
 
     def __reduce__(self) -> Any:
-        return Plan, (self.raw,)
+        return Plan, (self.raw, self.file, self.weighed)
 
     def driven(self, root: int) -> bool:
         """Whether more than gravity and contact moves a tree: all but one free body by itself."""

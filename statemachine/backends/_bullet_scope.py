@@ -13,11 +13,11 @@ from ..interface import Array, JointType
 from ..measures.text import few
 from ._bullet_contacts import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_drives import DYNAMICS, MUSCLE, in_force
+from ._bullet_file import MOST_LINKS
 from ._bullet_plan import (
     ELLIPSOID,
     HULLS,
     MARGIN,
-    MOST_LINKS,
     Plan,
     ends_of,
     linear_sum,
@@ -53,12 +53,16 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     raw = plan.raw
     whole = {"flex": raw.nflex, "plugin": raw.nplugin}
     problems = [(feature, f"the model has {count}") for feature, count in whole.items() if count]
-    if as_it_comes:
-        problems += _of_the_law(raw)
-    rows = *_of_joints(raw), *_of_bodies(plan), *_of_actuators(raw), *_of_ties(raw)
+    if plan.file:  # it reads the file itself, and what it knows nothing of has no effect
+        rows: tuple[tuple[str, str, Any, str], ...] = tuple(_of_joints(raw))
+    else:
+        if as_it_comes:
+            problems += _of_the_law(raw)
+        rows = *_of_joints(raw), *_of_bodies(plan), *_of_actuators(raw), *_of_ties(raw)
+        rows += tuple(_of_geoms(plan))
     problems += [
         (feature, f"{kind} {_name(raw, kind, k)} {says}")
-        for kind, feature, which, says in (*rows, *_of_geoms(plan))
+        for kind, feature, which, says in rows
         for k in np.flatnonzero(which).tolist()
     ]
     if not problems:
@@ -254,6 +258,21 @@ def as_targets(plan: Plan) -> list[str]:
     names = few([str(_name(raw, "actuator", int(a))) for a in others], 3)
     what = f"ctrl of {names} is a target position there, and no force or speed"
     return [what] if names else []
+
+
+def otherwise(plan: Plan) -> list[str]:
+    """Say what PyBullet makes of a URDF that it reads itself, where the file means something else.
+
+    What every file meets, such as the inertias, is told by `statemachine compare --models`.
+    """
+    sentences: list[str] = []
+    if plan.file and plan.file.mimics:
+        names = few(list(plan.file.mimics), 3)
+        sentences.append(f"<mimic> has no effect there: {names} moves by itself")
+    if plan.file and plan.file.floating:
+        names = few(list(plan.file.floating), 3)
+        sentences.append(f"it makes a fixed joint of the floating {names}")
+    return sentences
 
 
 def _sticks(raw: mujoco.MjModel) -> Any:

@@ -28,13 +28,14 @@ from ._bullet_client import (
     as_file,
     connect,
     disconnect,
-    joint_infos,
     load_urdf,
     pb,
     times,
     turned,
 )
+from ._bullet_contacts import NO_CONTACT
 from ._bullet_plan import Plan
+from ._bullet_trees import FileTree, Tree
 from ._hidden_world import HiddenWorld
 from .compiled import gravity
 
@@ -43,63 +44,6 @@ _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
 _ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # a pose, as the engine has them
 _REST = math.sqrt(1 - 2 * _TILT**2)
-
-
-class Tree:
-    """One tree of bodies in one world.
-
-    Attributes:
-        root: MuJoCo's id of its root.
-        body: PyBullet's id of it.
-        free: Whether it floats: its first joint is then the root's free joint.
-        driven: Whether a law drives it, because it has joints, or more than gravity moves it.
-        joints: PyBullet's indices of its joints, but for the free one.
-        dofs: (n,) degrees of freedom: the six of a free joint, then those of the joints.
-        base: How many of them are the free joint's.
-        qpos, qvel: What of these arrays is the tree's: a slice where that is enough.
-        links: PyBullet's index of each body's link; -1 is the base.
-        parts: The same of each further solid of a body, by body and part.
-        tips: PyBullet's index of each site's link, where it has one.
-    """
-
-    def __init__(self, plan: Plan, root: int, body: int, client: int) -> None:
-        raw, names = plan.raw, plan.names
-        self.root, self.body = root, body
-        self.free = urdf.floats(raw, root)
-        infos = joint_infos(client, body)
-        indices = {info[12].decode(): info[0] for info in infos}
-        bodies = urdf.tree(raw, root)
-        self.links = {b: indices.get(names.links[b], -1) for b in bodies}
-        self.parts = {
-            (solid.body, solid.part): indices.get(names.part(solid.body, solid.part)[0], -1)
-            for solid in plan.surfaces.solids
-            if solid.part and solid.body in self.links
-        }
-        sites = [
-            s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
-        ]
-        self.tips = {s: indices[names.tips[s]] for s in sites if names.tips[s] in indices}
-        by_name = {names.joints[j]: j for b in bodies for j in urdf.axes(raw, b)}
-        moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]
-        self.joints = [index for index, _ in moving]
-        self.driven = plan.driven(root)
-        self.base = 6 * self.free
-        first = int(raw.body_jntadr[root])
-        ids = [joint for _, joint in moving]
-        places = raw.jnt_qposadr[ids].astype(int)
-        self.dofs = raw.jnt_dofadr[ids].astype(int)
-        if self.free:
-            places = np.r_[raw.jnt_qposadr[first] + np.arange(7), places]
-            self.dofs = np.r_[raw.jnt_dofadr[first] + np.arange(6), self.dofs]
-        self.qpos, self.qvel = _index(places), _index(self.dofs)
-
-
-def _index(places: Any) -> Any:
-    """Places in an array: a slice, which NumPy takes faster, where they follow one another."""
-    if not len(places) or (np.diff(places) == 1).all():
-        start = int(places[0]) if len(places) else 0
-        return slice(start, start + len(places))
-    return places
 
 
 class World:
@@ -135,14 +79,21 @@ class World:
         self.trees: list[Tree] = []
         self._led = b""  # what `lead` was told last
         self._planes: dict[int, int] = {}  # PyBullet's body of each plane
-        for root in (0, *urdf.roots(raw)):
-            if plan.driven(root) or kind != "ghost":
-                self._load(root, kind)
+        self._of_file: FileTree | None = None
+        if kind == "engine" and plan.file:
+            self._of_file = FileTree(plan, plan.file.load(self.client), self.client)
+            self.trees.append(self._of_file)
+        else:
+            for root in (0, *urdf.roots(raw)):
+                if plan.driven(root) or kind != "ghost":
+                    self._load(root, kind)
         self._frames = {  # of free bodies: the inertial frame in the body's own
             tree.body: pb.getDynamicsInfo(tree.body, -1, self.client)[3:5]
             for tree in self.trees
             if tree.free
         }
+        if self._of_file and self._of_file.carrier >= 0:
+            self._frames[self._of_file.body] = self._base_of_file(self._of_file)
         # The axes of each body in those of its inertia, which armature turns in what is stepped.
         self._inward = raw.body_iquat * INVERSE
         for body, link, b in self.links() if kind == "stepped" else ():
@@ -158,6 +109,8 @@ class World:
             change = np.zeros((6, 6))
             change[:3, 3:], change[3:, 3:] = inward, dense.product(inward, lever)
             self._changes[body] = change, inward
+        # Where a base stands that PyBullet does not move, though it has a free joint.
+        self._stands: Array | None = None
         self._last: dict[int, Quat] = dict.fromkeys(self._frames, (0.0, 0.0, 0.0, 1.0))
         self._turns_gravity = any(tree.free and tree.driven for tree in self.trees)
         with silence():  # what it has to say of a tree, it says the first time
@@ -178,6 +131,8 @@ class World:
             for _, geoms in self.geoms_of_links.values()
             for g in geoms
         }
+        if kind == "engine" and (plan.weighed or (plan.file and raw.opt.disableflags & NO_CONTACT)):
+            self.set_collision_groups()
         if kind == "stepped":
             pb.setPhysicsEngineParameter(
                 deterministicOverlappingPairs=1, physicsClientId=self.client
@@ -187,6 +142,16 @@ class World:
             (body, pb.getBasePositionAndOrientation(body, self.client))
             for body in (*(tree.body for tree in self.trees), *self._planes.values())
         ]
+
+    @property
+    def stands(self) -> bool:
+        """Whether the base does not move, though the model has a free joint there."""
+        return self._of_file is not None and self._of_file.standing >= 0
+
+    @property
+    def reads_file(self) -> bool:
+        """Whether PyBullet read the robot's file itself, and nothing else is here."""
+        return self._of_file is not None
 
     @property
     def closed(self) -> bool:
@@ -216,6 +181,27 @@ class World:
                 pb.resetBasePositionAndOrientation(tree.body, *pose, self.client)
         return True
 
+    def _base_of_file(self, tree: FileTree) -> tuple[Any, Any]:
+        """Give the inertial frame of the base in the frame of the link that the free joint moves.
+
+        They are held together by fixed joints. PyBullet tells of centres of mass, in double
+        precision.
+        """
+        state = pb.getLinkState(
+            tree.body, tree.carrier, computeForwardKinematics=1, physicsClientId=self.client
+        )
+        inner, (x, y, z, w) = pb.getDynamicsInfo(tree.body, tree.carrier, self.client)[3:5]
+        link = times(state[1], (-x, -y, -z, w))
+        origin = np.subtract(state[0], turned(link, inner))
+        where, quat = pb.getBasePositionAndOrientation(tree.body, self.client)
+        back = (-link[0], -link[1], -link[2], link[3])
+        return turned(back, np.subtract(where, origin).tolist()), times(back, quat)
+
+    def weigh(self) -> None:
+        """Give every link the inertia of the compiled model's body, in place of its shapes'."""
+        for body, link, b in self.links():
+            self.change(body, link, localInertiaDiagonal=self._raw.body_inertia[b].tolist())
+
     def _load(self, root: int, kind: str) -> None:
         raw = self._raw
         text, files = self._plan.described(root, kind)
@@ -238,6 +224,8 @@ class World:
         tree = Tree(self._plan, root, body, self.client)
         self.trees.append(tree)
         if kind == "engine":
+            if self._plan.weighed:
+                self.weigh()
             return
         self.change_all(body, linearDamping=0, angularDamping=0, maxJointVelocity=UNCLAMPED)
         for index in tree.joints:  # each comes with a motor that holds it
@@ -260,7 +248,14 @@ class World:
                 )
 
     def solids(self) -> Iterator[tuple[int, int, Figures]]:
-        """PyBullet's body and link of all that can touch, in the order of the surfaces."""
+        """PyBullet's body and link of all that can touch.
+
+        In the order of the surfaces; of a robot that PyBullet read itself in that of its links,
+        each with the geoms of the body that it is a part of.
+        """
+        if self._of_file:
+            yield from self._solids_of_file(self._of_file)
+            return
         links = {}
         for tree in self.trees:
             own = {(b, 0): link for b, link in tree.links.items()} | tree.parts
@@ -270,6 +265,16 @@ class World:
                 (self._planes[solid.geoms[0]], -1) if solid.plane else links[solid.body, solid.part]
             )
             yield body, link, solid
+
+    def _solids_of_file(self, tree: FileTree) -> Iterator[tuple[int, int, Figures]]:
+        raw = self._raw
+        touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+        for link in range(-1, len(tree.bodies) - 1):
+            if pb.getCollisionShapeData(tree.body, link, self.client):
+                body = tree.bodies[link]
+                geoms = np.flatnonzero(touching & (raw.geom_bodyid == body)).tolist()
+                solid = Figures(body=body, geoms=tuple(geoms), plane=False, part=0)
+                yield tree.body, link, solid
 
     def joints(self) -> Iterator[tuple[int, int, int]]:
         """PyBullet's body and index of each joint, and its degree of freedom."""
@@ -360,6 +365,11 @@ class World:
 
     def put(self, qpos: Array, qvel: Array) -> None:
         """Set the state, and nothing else."""
+        if self._of_file and self._of_file.standing >= 0:
+            start = int(self._raw.jnt_qposadr[self._of_file.standing])
+            self._stands = qpos[start : start + 7].copy()
+            where, pose, _, _ = self._base_at(self._of_file.body, self._stands)
+            pb.resetBasePositionAndOrientation(self._of_file.body, where, pose, self.client)
         for tree in self.trees:
             if tree.free:
                 self._put_free(tree, qpos, qvel)
@@ -374,15 +384,26 @@ class World:
 
     def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
         body, qpos, qvel = tree.body, qpos[tree.qpos][:7], qvel[tree.qvel][:6]
+        where, pose, turn, arm = self._base_at(body, qpos)
+        spin = dense.times(turn, qvel[3:])
+        speed = qvel[:3] + np.cross(spin, arm)
+        self._last[body] = pose
+        pb.resetBasePositionAndOrientation(body, where, pose, self.client)
+        pb.resetBaseVelocity(body, speed.tolist(), spin.tolist(), self.client)
+
+    def _base_at(self, body: int, qpos: Array) -> tuple[list[float], Quat, Array, Array]:
+        """Give where the engine has a base whose free joint is at qpos (7,).
+
+        Returns:
+            Its centre of mass and the quaternion (x, y, z, w) of its inertial frame; the axes
+            (3, 3) of the body, and from its origin to that centre (3,), in the world.
+        """
         centre, axes = self._frames[body]
         quat = qpos[3:] / math.hypot(*qpos[3:])
         turn = matrix_from_quat(quat)
-        arm, spin = dense.times(turn, np.array(centre)), dense.times(turn, qvel[3:])
+        arm = dense.times(turn, np.array(centre))
         pose = times(xyzw_from_wxyz(quat).tolist(), axes)
-        where, speed = qpos[:3] + arm, qvel[:3] + np.cross(spin, arm)
-        self._last[body] = pose
-        pb.resetBasePositionAndOrientation(body, where.tolist(), pose, self.client)
-        pb.resetBaseVelocity(body, speed.tolist(), spin.tolist(), self.client)
+        return (qpos[:3] + arm).tolist(), pose, turn, arm
 
     def follow(self, body: int) -> tuple[Any, Quat]:
         """Where a base is; of a quaternion and its negative the one nearer to the last.
@@ -418,9 +439,18 @@ class World:
     def read(self) -> tuple[Array, Array]:
         """What the engine tells of positions (nq,) and velocities (nv,)."""
         qpos, qvel = np.zeros(self._raw.nq), np.zeros(self._raw.nv)
+        self.read_standing(qpos)
         for tree in self.trees:
             qpos[tree.qpos], qvel[tree.qvel] = self.read_tree(tree)
         return qpos, qvel
+
+    def read_standing(self, qpos: Array) -> bool:
+        """Write the position of a base that has a free joint and stands into qpos (nq,), if any."""
+        if self._stands is None or self._of_file is None:
+            return False
+        start = int(self._raw.jnt_qposadr[self._of_file.standing])
+        qpos[start : start + 7] = self._stands
+        return True
 
     def read_tree(self, tree: Tree) -> tuple[Sequence[float], Sequence[float]]:
         """The same of one tree, in the order of its `qpos` and `qvel`."""
@@ -446,6 +476,8 @@ class World:
             v: Its velocities, in the order of its `qvel`.
             rate: (n,) its acceleration, as qacc.
         """
+        if tree is self._of_file and not tree.free:
+            return self._needed_on_a_base(tree.body, q, v, rate)
         if not tree.free:
             if not self._turns_gravity:
                 return pb.calculateInverseDynamics(tree.body, q, v, rate, 0, self.client)
@@ -476,6 +508,21 @@ class World:
         if any(centre):
             moment = np.add(moment, np.cross(centre, turned(axes, force[:3]))).tolist()
         return [*turned(pose, force[:3]), *moment, *force[6:]]
+
+    def _needed_on_a_base(
+        self, body: int, q: Sequence[float], v: Sequence[float], rate: Sequence[float]
+    ) -> Sequence[float]:
+        """Give the same of a tree whose base stands and weighs something in its file.
+
+        The engine takes gravity in the principal axes of such a base: it is turned into them.
+        """
+        _, (x, y, z, w) = pb.getBasePositionAndOrientation(body, self.client)
+        with HiddenWorld.lock:  # gravity is all trees' of a client
+            try:
+                pb.setGravity(*turned((-x, -y, -z, w), self._gravity), self.client)
+                return pb.calculateInverseDynamics(body, q, v, rate, 0, self.client)
+            finally:
+                pb.setGravity(*self._gravity, self.client)
 
     def mass_matrix(self, tree: Tree, q: Sequence[float]) -> Array:
         """M (n, n) of a tree where its `qpos` are q, in the coordinates of its `qvel`."""

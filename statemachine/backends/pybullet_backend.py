@@ -10,6 +10,7 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
@@ -34,8 +35,10 @@ from ..releases import version_of
 from . import _bullet_urdf as urdf
 from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import Act, DrivenWorld
+from ._bullet_file import UrdfFile
 from ._bullet_plan import Plan
-from ._bullet_scope import as_targets, check, ignored, softness
+from ._bullet_scope import as_targets, check, ignored, otherwise, softness
+from ._bullet_weights import weighed_as_it_comes
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._edits import edited, step_length
 from ._hidden_data import HiddenModel
@@ -146,9 +149,12 @@ def load(
     Args:
         path: The file.
         options: As `Model.replace` takes them; what they switch off is not refused.
-        defaults: "engine" is what `loadURDF` gives: velocity motors in the joints,
-            damping 0.04, friction 0.5, inertias of the collision shapes, no gravity until
-            it is set, 1/240 s a step. ctrl is then what POSITION_CONTROL aims at.
+        defaults: "engine" is what `loadURDF` gives without flags: velocity motors in the joints,
+            damping 0.04, friction 0.5, inertias of the collision shapes, 1 kg for a link without
+            <inertial>, no contact between two links of one robot, no <mimic>, no gravity until
+            it is set, 1/240 s a step. PyBullet reads a URDF itself, by `useFixedBase` unless it
+            has a floating joint; of an MJCF a URDF is written. ctrl is then what
+            POSITION_CONTROL aims at.
         there: Another release of the engine, in whose process worlds are; None for the installed.
 
     Raises:
@@ -171,7 +177,8 @@ def load(
     substeps = checked.get("substeps", 1)
     if checked:
         raw = edited(raw, checked, step_length(float(raw.opt.timestep), substeps, checked))
-    plan = Plan(raw)
+    file = UrdfFile.read(Path(path)) if defaults == "engine" else None
+    plan = Plan(raw, file)
     check(plan, "pybullet", defaults == "engine")
     model = PybulletModel(
         plan, Path(path), substeps, defaults, checked.get("max_qvel"), there=there
@@ -180,9 +187,18 @@ def load(
     (model._open_world() if there else World(plan, model._kind)).close()
     if defaults == "model":
         _tell(plan, ignored(plan), stacklevel=4)
-    elif targets := as_targets(plan):
-        warnings.warn(f"PyBullet: {targets[0]}", EngineWarning, stacklevel=3)
+    else:
+        for difference in (*as_targets(plan), *otherwise(plan)):
+            warnings.warn(f"PyBullet: {difference}", EngineWarning, stacklevel=3)
     return model._started_as(model, checked)
+
+
+def base_stands(model: PybulletModel) -> bool:
+    """Whether PyBullet as it comes does not move a base that has a free joint in the model."""
+    if model.plan.file is None or not model.plan.file.floats:
+        return False
+    with closing(World(model.plan, "engine")) as world:
+        return world.stands
 
 
 def _tell(plan: Plan, settings: list[str], stacklevel: int) -> None:
@@ -240,7 +256,9 @@ class PybulletModel(HiddenModel):
             raw={
                 raw.body(b).name or f"body {b}": plan.described(b, kind)[0]
                 for b in (0, *urdf.roots(raw))
-            },
+            }
+            if plan.file is None
+            else {plan.file.path.name: plan.file.content.decode(errors="replace")},
             capabilities=_capabilities(as_it_comes, bound, softness(plan)),
             max_qvel=bound,
             timestep=float(raw.opt.timestep) * substeps,
@@ -260,7 +278,10 @@ class PybulletModel(HiddenModel):
 
     def with_compiled(self, compiled: mujoco.MjModel) -> PybulletModel:
         check_numbers(compiled, str(self.path))
-        return self._of(compiled, self.substeps, self._asked)._started_as(self, {})
+        plan = Plan(compiled, weighed=self.plan.weighed)
+        if self.plan.file:
+            plan = Plan(weighed_as_it_comes(self.plan, compiled), weighed=True)
+        return self._of(plan, self.substeps, self._asked)._started_as(self, {})
 
     @property
     def shared_worlds(self) -> dict[str, World]:
@@ -272,13 +293,13 @@ class PybulletModel(HiddenModel):
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
         substeps = options.get("substeps", self.substeps)
         raw = edited(self.plan.raw, options, step_length(self.timestep, substeps, options))
-        model = self._of(raw, substeps, options.get("max_qvel", self._asked))
+        plan = Plan(raw, self.plan.file, self.plan.weighed)
+        model = self._of(plan, substeps, options.get("max_qvel", self._asked))
         if "friction" in options:
             _tell(model.plan, [], stacklevel=4)
         return model
 
-    def _of(self, raw: mujoco.MjModel, substeps: int, asked: Array | None) -> PybulletModel:
-        plan = Plan(raw)
+    def _of(self, plan: Plan, substeps: int, asked: Array | None) -> PybulletModel:
         check(plan, "pybullet", self.defaults == "engine")
         return PybulletModel(
             plan, self.path, substeps, self.defaults, asked, self.acts, self._there

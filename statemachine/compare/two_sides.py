@@ -9,11 +9,13 @@ from typing import Literal
 import numpy as np
 
 from ..backends import check_backend
+from ..engines import room
 from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError, refuse
 from ..installed import DEFAULT
 from ..interface import Model
 from ..measures import common_moments
 from ..measures.text import command, milliseconds
+from ..releases import engine_of
 from ..runs import (
     Rerun,
     SideStart,
@@ -117,6 +119,8 @@ def prepare_sides(
     _check_moments(models, seconds)
     for model in models:
         check_length(model, seconds)
+    unlike = (room(engine_of(model.backend)).unlike_its_users(model) for model in models)
+    unlike_users = dict.fromkeys(line for lines in unlike for line in lines)
     said, seed, start, key = list[str](), request.seed, None, scenario.keyframe
     if trace is not None:
         _refuse_of_run(request)
@@ -169,7 +173,7 @@ def prepare_sides(
         )
         for model, side, at in zip(models, sides, (start, begin), strict=True)
     )
-    return (left_rerun, right_rerun), matched, (*said, *request.taken)
+    return (left_rerun, right_rerun), matched, (*said, *request.taken, *unlike_users)
 
 
 def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:

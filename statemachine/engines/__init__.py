@@ -151,6 +151,10 @@ class RawEngine:
         """
         return ()
 
+    def unlike_its_users(self, model: Model) -> list[str]:
+        """Say what a run behind the contract has that the engine's own users do not have."""
+        return []
+
     def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
         """What can be set between the engine as it comes and the contract; None of any other."""
         return None

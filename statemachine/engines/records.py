@@ -20,6 +20,7 @@ class Dials(ABC):
         model: The model as it comes, with the options of an experiment.
         emulated: The same file behind the contract, with the same options.
         words: What the engine's own setting of a factor is, in a few words.
+        self_pairs: Pairs of bodies of one robot that meet behind the contract, and not as it comes.
     """
 
     words: Mapping[str, str]
@@ -27,6 +28,7 @@ class Dials(ABC):
     def __init__(self, model: Model, emulated: Model) -> None:
         """Of a Model as it comes, and of its file behind the contract."""
         self.model, self.emulated = model, emulated
+        self.self_pairs = 0
 
     @property
     @abstractmethod

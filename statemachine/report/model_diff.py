@@ -133,6 +133,11 @@ def page(result: Figures, sides: Sequence[str], everything: bool = False) -> Pag
         able=len(able) if able and refused else None,
         command=command(["statemachine", "compare", experiment, *sides, "--why"]) if able else None,
         emulated=next((side.reader.split()[0] for side in named.values() if side._emulated), None),
+        written=next(
+            (side.reader.split()[0] for side in named.values() if side._emulated and side._written),
+            None,
+        ),
+        unlike=next((capital(side._unlike) for side in named.values() if side._unlike), None),
         refused_too=if_true(refused),
         refused=Items([f"{capital(name)}: {why}." for name, why in refused.items()]),
         equal=_equal(result.agreements, Counter(row.subject for row in rows)),

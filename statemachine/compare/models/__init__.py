@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import os
 import platform
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from ...engines.description import urdf
 from ...engines.description.match import renamed
 from ...engines.description.records import Robot
 from ...engines.description.tree import GroupTree
-from ...errors import StateMachineError, UnsupportedError
+from ...errors import EngineWarning, StateMachineError, UnsupportedError
 from ...installed import DEFAULT
 from ...models import resolve
 from ...page import Figures
@@ -162,10 +164,16 @@ def compare(
             _mass=mass,
             _driven=bool(robot.actuators),
             _emulated=bool(engine) and room(engine_of(engine)).emulated,
+            _written=resolve(model, menagerie).suffix.lower() != ".urdf",
+            _unlike=_unlike_its_users(resolve(model, menagerie), engine),
             notes=robot.notes,
         )
-        for robot, mass, engine in zip(
-            (trees[0].robot, robots[1]), (r.mass for r in robots), engines, strict=True
+        for robot, mass, engine, model in zip(
+            (trees[0].robot, robots[1]),
+            (r.mass for r in robots),
+            engines,
+            (left, right),
+            strict=True,
         )
     ]
     rows = book.ordered()
@@ -182,3 +190,15 @@ def compare(
         skipped=tuple(skipped),
         equal=not skipped and not any(row.matters for row in rows),
     )
+
+
+def _unlike_its_users(path: Path, engine: str | None) -> str:
+    """Say what a run behind the contract has that its engine's users do not have, if anything."""
+    if not engine or not room(engine_of(engine)).emulated:
+        return ""
+    try:
+        with warnings.catch_warnings(action="ignore", category=EngineWarning):
+            model = load(path, backend=engine)
+    except StateMachineError:  # it has no such run
+        return ""
+    return "; ".join(room(engine_of(engine)).unlike_its_users(model))

@@ -28,6 +28,8 @@ TITLES: Mapping[str, str] = {
     "frictionloss": "dry friction",
     "limits": "joint limits",
     "surfaces": "surfaces",
+    "self-collision": "self-collision",
+    "equality": "joints that follow",
 }
 # Of a title the one that it needs. An engine's explicit damping does not stand without its motors,
 # and what the engine lacks, or has in another way, an adapter can give it only together with the
@@ -37,6 +39,8 @@ NEEDS: Mapping[str, str] = {
     "armature": "servo law",
     "dry friction": "servo law",
     "joint limits": "servo law",
+    "self-collision": "servo law",
+    "joints that follow": "servo law",
 }
 _FINER = 4
 
@@ -84,6 +88,8 @@ class OwnSettings:
             "armature": not self.emulated.dof_armature.any(),
             "frictionloss": not self.emulated.dof_frictionloss.any(),
             "limits": not self.emulated.jnt_limited.any(),
+            "self-collision": not dials.self_pairs,
+            "equality": self.emulated.compiled is None or not self.emulated.compiled.neq,
         }
         self.names = tuple(name for name in TITLES if not alike.get(name))
 
@@ -93,6 +99,8 @@ class OwnSettings:
         for name in self.names:
             source = self._other if name in ("gravity", "timestep") else self.emulated
             own, model = self._own_word(name), _word(name, source)
+            if name == "self-collision":
+                model = f"on, {_count(self._dials.self_pairs, 'pair')}"
             values = ((TITLES[name], *((model, own) if side else (own, model))),)
             rows.append(ModelDifference(TITLES[name], "engine", "", values))
         return rows
@@ -163,9 +171,15 @@ def _word(name: str, model: Model) -> str:
             return f"kp {_span(gains)}{idle}" if gains.size else "no servos"
         case "limits":
             return f"soft, {int(model.jnt_limited.sum())} joints"
+        case "equality" if model.compiled is not None:
+            return _count(int(model.compiled.neq), "joint")
         case "surfaces" if model.compiled is not None:
             return f"friction {_span(model.compiled.geom_friction[:, 0])}"
     return "of the file"
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def _is_driven(model: Model) -> bool:

@@ -65,17 +65,8 @@ def _parse(path: Path) -> Element:
         raise
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise ModelError(f"it is not XML: {error}") from None
-    refuse(
-        (
-            root.tag != "robot",
-            f"it is not a URDF: its root element is <{root.tag}>, not <robot>",
-        ),
-        (
-            any("xacro" in element.tag for element in root.iter()),
-            "it is a xacro: turn it into a URDF first (xacro file > file.urdf)",
-        ),
-        error=ModelError,
-    )
+    if root.tag != "robot":
+        raise ModelError(f"it is not a URDF: its root element is <{root.tag}>, not <robot>")
     return root
 
 

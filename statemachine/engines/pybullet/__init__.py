@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ...errors import UnsupportedError
 from ...installed import require
 from .. import RawEngine, function_of
 
@@ -43,8 +44,32 @@ class PybulletEngine(RawEngine):
 
         if not isinstance(model, backend.PybulletModel) or model.defaults != "engine":
             return None
+        if backend.base_stands(model):
+            raise UnsupportedError(
+                f"PyBullet makes a fixed joint of the floating joint of {model.path.name}: what "
+                "else differs from a run on @pybullet cannot be told apart from that",
+                backend=model.backend,
+                feature="causes of a gap",
+                reason="a floating joint is fixed",
+            )
         emulated = backend.load(model.path).replace(**options)
         return PybulletDials(model.replace(**options), emulated)
+
+    def unlike_its_users(self, model: Model) -> list[str]:
+        from ...backends._bullet_file import UrdfFile
+        from ...backends.pybullet_backend import PybulletModel
+
+        if not isinstance(model, PybulletModel) or model.defaults == "engine":
+            return []
+        whole = UrdfFile.is_one(model.path)
+        pairs = len(model.plan.surfaces.of_one_robot(whole))
+        if not pairs:
+            return []
+        several = f"{pairs} pairs" if pairs > 1 else "one pair"
+        return [
+            f"on {model.backend} the links of one robot can touch each other, as in MuJoCo "
+            f"({several}); PyBullet's users have that only with URDF_USE_SELF_COLLISION"
+        ]
 
     def ignored(self, model: Model) -> list[str]:
         from ...backends._bullet_scope import as_targets, ignored

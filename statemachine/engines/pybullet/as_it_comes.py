@@ -16,6 +16,7 @@ import numpy as np
 
 from ...backends._bullet_client import joint_infos, pb
 from ...backends._bullet_plan import Plan
+from ...backends._bullet_weights import weighed_as_it_comes
 from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
@@ -34,7 +35,10 @@ def _raw(model: Model, gravity: bool = True, damping: bool = True) -> closing[Wo
     if not damping:
         raw = copy.copy(plan.raw)
         raw.dof_damping[:] = 0
-        plan = Plan(raw)
+        if plan.file:
+            plan = Plan(weighed_as_it_comes(plan, raw), weighed=True)
+        else:
+            plan = Plan(raw, weighed=plan.weighed)
     world = World(plan, "engine")
     if not gravity:
         pb.setGravity(0, 0, 0, world.client)

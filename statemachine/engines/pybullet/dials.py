@@ -19,6 +19,7 @@ from ...backends._bullet_client import pb
 from ...backends._bullet_contacts import Surfaces
 from ...backends._bullet_driven import Act
 from ...backends._bullet_plan import Plan
+from ...backends._bullet_weights import weights, with_weights, with_weights_of
 from ...backends._bullet_world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
@@ -43,15 +44,31 @@ class PybulletDials(Dials):
         "limits": "hard",
         "integrator": "its own",
         "contact": "its own",
+        "self-collision": "off",
+        "equality": "none",
     }
+
+    def __init__(self, model: Model, emulated: Model) -> None:
+        """Of a Model as it comes, and of its file behind the contract."""
+        super().__init__(model, emulated)
+        own = cast("PybulletModel", model)
+        # All that is in a URDF is one robot to the engine; of an MJCF each tree is one.
+        self._whole = own.plan.file is not None or own.plan.weighed
+        surfaces = cast("PybulletModel", emulated).plan.surfaces
+        self.self_pairs = len(surfaces.of_one_robot(self._whole))
+        if own.plan.file and own.plan.file.without_inertial:
+            links = own.plan.file.without_inertial
+            which = ", ".join(links) if len(links) == 1 else f"{len(links)} links"
+            self.words = {**self.words, "inertia": f"of shapes, {which} 1 kg"}
 
     def build(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         """A Model with some dials at "model" or "off", the others as the engine comes.
 
         Args:
             dials: Of gravity, timestep, inertia, servo, armature, damping, frictionloss,
-                limits, surfaces, contact; armature and frictionloss only with the servo, whose
-                law gives the engine what it has not.
+                limits, surfaces, self-collision, equality, contact; armature, frictionloss,
+                self-collision and equality only with the servo, whose law gives the engine what
+                it has not.
             values: What gravity (3,) [m/s²], timestep (step [s], substeps), and armature,
                 damping and frictionloss (nv,) are at "model".
 
@@ -61,8 +78,11 @@ class PybulletDials(Dials):
         return (self._with_law if "servo" in dials else self._with_motors)(dials, values)
 
     def _with_motors(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
-        raw = self.model.compiled
+        raw, plan = self.model.compiled, None
         model = self.model.replace(**_world_options(dials, values))
+        if "inertia" in dials and self._whole:
+            # PyBullet moves no centre of mass: a URDF is written of the model that has them.
+            plan = Plan(with_weights_of(model.compiled, self.emulated.compiled), weighed=True)
         joint = values["damping"] if dials.get("damping") == "model" else np.zeros(raw.nv)
         acts: dict[str, Act] = {
             "inertia": partial(_set_inertias, inertias=raw.body_inertia),
@@ -73,14 +93,17 @@ class PybulletDials(Dials):
             ),
             "contact": World.set_collision_groups,  # nothing meets anything
         }
-        return _dialled(model, [act for name, act in acts.items() if name in dials])
+        if plan:
+            del acts["inertia"]
+        return _dialled(model, [act for name, act in acts.items() if name in dials], plan)
 
     def _with_law(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         own, fresh = cast("PybulletModel", self.emulated), self.model.compiled
         ways: dict[str, Act] = {
             "damping": partial(_set_damping, body=BODY_DAMPING, joint=fresh.dof_damping),
             "limits": partial(_set_limits, ranges=_ranges(self.model)),
-            "surfaces": partial(_fresh_surfaces, plan=own.plan),
+            "surfaces": partial(_fresh_surfaces, plan=own.plan, whole=self._whole),
+            "self-collision": partial(_no_self_collision, plan=own.plan, whole=self._whole),
         }
         acts = [act for name, act in ways.items() if name not in dials]
         options = {name: getattr(self.model, name) for name in ("gravity", "timestep", "substeps")}
@@ -94,12 +117,24 @@ class PybulletDials(Dials):
         # An option that changes nothing may still change the last bit of what follows from it.
         changing = {name: value for name, value in options.items() if not _has(own, name, value)}
         model = cast("PybulletModel", own.replace(**changing)) if changing else own
-        plan = None
+        raw = model.compiled
         if "inertia" not in dials:
-            raw = copy.copy(model.compiled)
-            raw.body_inertia[:] = self.shapes
-            plan = Plan(raw)
-        return _dialled(model, acts, plan)
+            raw = self._weighed_by_the_engine(raw)
+        if "equality" not in dials and self._whole and raw.neq:
+            raw = copy.copy(raw)
+            raw.eq_active0[:] = False
+        return _dialled(model, acts, Plan(raw) if raw is not model.compiled else None)
+
+    def _weighed_by_the_engine(self, compiled: Any) -> Any:
+        """Make a compiled model whose bodies weigh what the engine gives them of its own."""
+        own = cast("PybulletModel", self.model)
+        if own.plan.file:
+            return with_weights(compiled, weights(own.plan))
+        if own.plan.weighed:
+            return with_weights_of(compiled, own.compiled)
+        raw = copy.copy(compiled)
+        raw.body_inertia[:] = self.shapes
+        return raw
 
     @property
     def shapes(self) -> np.ndarray:
@@ -176,6 +211,8 @@ def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) 
 
 def _set_surfaces(world: World, surfaces: Surfaces) -> None:
     world.soften()
+    if world.reads_file:  # in which nothing can touch
+        return
     world.set_friction(surfaces.slide, surfaces.spin, surfaces.roll)
 
 
@@ -186,18 +223,27 @@ def _harden(world: World) -> None:
     )
 
 
-def _fresh_surfaces(world: World, plan: Plan) -> None:
-    """Friction and hardness of what was loaded, and links of one robot that do not meet."""
+def _fresh_surfaces(world: World, plan: Plan, whole: bool) -> None:
+    """Set the friction and hardness of what was loaded, and let all meet that are two robots."""
     _harden(world)
     solids = list(world.solids())
     none = np.zeros(len(solids))
     world.set_friction(none + FRICTION, none, none)
     for (i, j), meet in plan.surfaces.pairs.items():
+        if whole:  # there is one
+            break
         (body, link, solid), (other, other_link, other_solid) = solids[i], solids[j]
         # What never moves does not meet what never moves; of the rest, all that are two bodies.
         moves = any(plan.raw.body_weldid[s.body] for s in (solid, other_solid))
-        wanted = moves and body != other
-        if wanted != meet:
+        if moves and body != other and not meet:
             pb.setCollisionFilterPair(
-                body, other, link, other_link, int(wanted), physicsClientId=world.client
+                body, other, link, other_link, 1, physicsClientId=world.client
             )
+
+
+def _no_self_collision(world: World, plan: Plan, whole: bool) -> None:
+    """Let no two links of one robot meet."""
+    solids = list(world.solids())
+    for i, j in plan.surfaces.of_one_robot(whole):
+        (body, link, _), (other, other_link, _) = solids[i], solids[j]
+        pb.setCollisionFilterPair(body, other, link, other_link, 0, physicsClientId=world.client)

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
-from ...backends._bullet_client import joint_infos, load_urdf, pb
+from ...backends._bullet_client import joint_infos, pb
+from ...backends._bullet_file import UrdfFile
 from ...backends._bullet_urdf import UNLIMITED
 from ...installed import engine_version
 from ...interface import make_data
@@ -25,7 +26,7 @@ _SHAPES = {2: "sphere", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "caps
 
 
 def read(path: Path, name: str) -> Robot:
-    """What the engine makes of a file: of a URDF what loadURDF leaves, else what the backend loads.
+    """What the engine makes of a file in a run: of a URDF what loadURDF leaves of it.
 
     Args:
         path: The file.
@@ -35,14 +36,15 @@ def read(path: Path, name: str) -> Robot:
         MissingEngineError: It is not installed here.
         ModelError: It cannot read the file.
     """
-    if path.suffix.lower() != ".urdf":
+    file = UrdfFile.read(path)
+    if file is None:
         with make_data(load(path, backend="pybullet", defaults="engine")) as data:
             client = data.raw.client  # in which the backend adds to the robot
             bodies = [pb.getBodyUniqueId(k, client) for k in range(pb.getNumBodies(client))]
             return _description(client, bodies, name)
     urdf.read(path)  # of some bad files PyBullet makes an end of the process
     with fresh_world() as client:
-        return _description(client, [load_urdf(client, str(path), path.name)], name)
+        return _description(client, [file.load(client)], name)
 
 
 def _description(client: int, bodies: Sequence[int], name: str) -> Robot:
