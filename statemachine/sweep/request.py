@@ -21,7 +21,7 @@ from ..runs.scenarios import Scenario, scenario
 from .design import Design, Value, Vary, digest
 from .rows import columns_of
 
-MANIFEST_VERSION = 2
+MANIFEST_VERSION = 3
 # What a dataset is of, beside the experiment: cells of other values are of another sweep.
 REQUEST = ("model", "seconds", "every", "keyframe", "defaults", "spread", "moments")
 # What it may grow by.
