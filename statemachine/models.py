@@ -10,15 +10,18 @@ from __future__ import annotations
 import importlib
 import math
 import os
+import stat
 import sys
 import urllib.error
 import urllib.request
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from .errors import (
+    BadInputError,
     MissingEngineError,
     ModelError,
     ModelFileError,
@@ -169,6 +172,38 @@ def model_names() -> list[str]:
     return sorted(names, key=lambda name: (not name.startswith("so101/"), len(name), name))
 
 
+def what_is_there(path: Path) -> str:
+    """Say what a path leads to, in two words: "a file", "a folder", "a named pipe", "nothing".
+
+    To open what is neither a file nor a folder may wait for ever, or do something.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return "nothing"
+    kinds = {
+        stat.S_IFREG: "a file",
+        stat.S_IFDIR: "a folder",
+        stat.S_IFIFO: "a named pipe",
+        stat.S_IFSOCK: "a socket",
+    }
+    return kinds.get(stat.S_IFMT(mode), "a device")
+
+
+def check_is_file(path: Path, error: Callable[[str], Exception] = BadInputError) -> None:
+    """Raise an error for a path that is there and is not a file: it may not be opened.
+
+    Nothing is raised of a path that leads nowhere.
+
+    Args:
+        path: That is to be read.
+        error: Makes the error of a text.
+    """
+    kind = what_is_there(path)
+    if kind not in ("a file", "nothing"):
+        raise error(f"{path} is {kind}, not a file")
+
+
 def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
     """The file of a model.
 
@@ -202,7 +237,8 @@ def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
             return models_dir() / text  # the name as pages print it
         if menagerie is not None and (Path(menagerie).expanduser() / text).is_file():
             return (Path(menagerie).expanduser() / text).absolute()  # the same, of a menagerie
-        what = "is a folder, not a file" if path.is_dir() else "does not exist"
+        kind = what_is_there(path)
+        what = "does not exist" if kind == "nothing" else f"is {kind}, not a file"
         raise ModelFileError(f"model file {text} {what}")
     if menagerie is not None:
         return _in_menagerie(text, Path(menagerie).expanduser())
@@ -250,7 +286,20 @@ def _in_menagerie(name: str, root: Path) -> Path:
 
 
 def mesh_file(name: str, folder: Path) -> Path | None:
-    """The file of a mesh that a URDF names, or None where there is none.
+    """Return the file of a mesh that a URDF names, or None where there is none.
+
+    Args:
+        name: As the URDF has it.
+        folder: That of the URDF.
+    """
+    for place in mesh_places(name, folder):
+        if what_is_there(place) == "a file":
+            return place
+    return None
+
+
+def mesh_places(name: str, folder: Path) -> Iterator[Path]:
+    """Yield the places where a mesh that a URDF names may be.
 
     Args:
         name: As the URDF has it. A package:// is looked for in the folders above: ROS knows
@@ -258,19 +307,14 @@ def mesh_file(name: str, folder: Path) -> Path | None:
         folder: That of the URDF.
     """
     plain = name.removeprefix("file://")
-    choices = [folder / plain]
+    yield folder / plain
     if plain.startswith("package://"):
         inside = plain.removeprefix("package://")
         rest = inside.partition("/")[2]
         above = (folder, *folder.parents[:3])
-        choices = [up / part for up in above for part in (inside, rest)]
-    for choice in choices:
-        try:
-            if choice.is_file():
-                return choice
-        except (OSError, ValueError):
-            continue
-    return None
+        for up in above:
+            yield up / inside
+            yield up / rest
 
 
 def included_file(name: str, main: Path, includer: Path) -> Path | None:

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..errors import BadInputError, refuse, shown
 from ..measures.text import listed
+from ..models import check_is_file
 from ..runs.whole import replace_bytes
 from .design import Design, Vary
 from .request import MANIFEST_VERSION
@@ -86,6 +87,7 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
         BadInputError: There is none, or it is damaged, or of another schema.
     """
     path = Path(folder) / MANIFEST
+    check_is_file(path)
     try:
         content = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
