@@ -31,6 +31,7 @@ from .errors import (
     shown,
     unknown_name,
 )
+from .typed_numbers import typed_float
 
 AnyPath = str | os.PathLike[str]
 
@@ -338,7 +339,7 @@ def numbers(text: str, count: int, what: str) -> list[float]:
         ModelError: They are not so many, or no finite numbers.
     """
     try:
-        found = [float(word) for word in text.split()]
+        found = [typed_float(word) for word in text.split()]
     except ValueError:
         found = []
     if len(found) != count or not all(map(math.isfinite, found)):
