@@ -137,7 +137,7 @@ def _check_named_file(
     if special or is_folder:
         kind = special[0] if special else "a folder"
         raise ModelError(
-            f"{file}: {attribute} {shown(name)} of <{element.tag}> is {kind}, not a file"
+            f"{file.name}: {attribute} {shown(name)} of <{element.tag}> is {kind}, not a file"
         )
 
 
@@ -162,7 +162,7 @@ def _check_numbers(file: Path, element: Element, attribute: str, value: str) -> 
         name = element.get("name")
         of = f"<{element.tag}>" if name is None else f"<{element.tag} name={shown(name)}>"
         raise ModelError(
-            f"{file}: {attribute} of {of} has {shown(word)}, which is not a finite number"
+            f"{file.name}: {attribute} of {of} has {shown(word)}, which is not a finite number"
         )
 
 
@@ -176,7 +176,7 @@ def _check_memory(file: Path, element: Element) -> None:
             free = free_memory()
         if free is not None and wanted > free:
             raise ModelError(
-                f"{file}: {attribute} of <{element.tag}> asks for {wanted / 1e9:.3g} GB of "
+                f"{file.name}: {attribute} of <{element.tag}> asks for {wanted / 1e9:.3g} GB of "
                 f"memory, more than there is ({free / 1e9:.3g} GB are free)"
             )
 
