@@ -75,7 +75,7 @@ format: $(VENV)/test.stamp
 hooks: $(VENV)/test.stamp
 	@$(BIN)/pre-commit install --hook-type pre-commit --hook-type pre-push
 
-bench: $(VENV)/run.stamp
+bench: $(VENV)/bench.stamp
 	@STATEMACHINE_ENGINES=$(VENV)/engines $(BIN)/python -m benchmarks
 
 fuzz: $(VENV)/test.stamp
@@ -102,7 +102,7 @@ extras: $(VENV)/run.stamp
 	@$(PIP) $(CONSTRAINTS) -e '.[plot,render,mp4,view,sweep,parquet]'
 
 # make report       where the engines part when the arm is told one pose, and why: hold.html
-report: $(VENV)/run.stamp
+report: $(VENV)/report.stamp
 	@# 1: they differ, which is what the page is about.
 	@$(BIN)/statemachine compare hold --html hold.html >/dev/null || [ $$? -eq 1 ]
 	@echo "hold.html: open it in a browser"
@@ -114,7 +114,7 @@ robots: $(VENV)/run.stamp
 
 # make traces       record anew what the package brings of engines that may not be here
 traces: $(VENV)/run.stamp
-	@$(BIN)/python models/so101/make_traces.py
+	@STATEMACHINE_ENGINES=$(VENV)/engines $(BIN)/python models/so101/make_traces.py
 
 # make docs         the path as pages, made from runs: docs/_build/html/index.html
 docs: $(VENV)/test.stamp
@@ -145,6 +145,16 @@ $(VENV)/run.stamp: pyproject.toml constraints.txt
 	@echo "setting up $(VENV) with $(PYTHON): about a minute the first time ..."
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(PIP) $(CONSTRAINTS) -e '.[faults]'
+	@touch $@
+
+$(VENV)/bench.stamp: $(VENV)/run.stamp
+	@echo "adding what the speed budget needs ..."
+	@$(PIP) $(CONSTRAINTS) -e '.[gym]'
+	@touch $@
+
+$(VENV)/report.stamp: $(VENV)/run.stamp
+	@echo "adding what the charts of a page need ..."
+	@$(PIP) $(CONSTRAINTS) -e '.[plot]'
 	@touch $@
 
 $(VENV)/test.stamp: $(VENV)/run.stamp

@@ -6,10 +6,21 @@ The distribution python-statemachine installs an import package that is called
 
 from __future__ import annotations
 
-import importlib.util
-import os
-import signal
-import sys
+# Built into Python, as `signal` is not: while that is imported, Ctrl-C is a traceback already.
+import _signal
+
+# An interrupt while the package is imported ends the process, as it ends any program that does not
+# ask for it; from then on it is a KeyboardInterrupt, which the command answers.
+_HANDLER = _signal.getsignal(_signal.SIGINT)
+if _HANDLER is _signal.default_int_handler:
+    try:
+        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
+    except ValueError:  # imported by another thread than the main one, which takes no signals
+        _HANDLER = None
+
+import importlib.util  # noqa: E402
+import os  # noqa: E402
+import sys  # noqa: E402
 
 
 def main() -> int:
@@ -25,15 +36,14 @@ def main() -> int:
                 file=sys.stderr,
             )
             return 2
-    # An interrupt while the package is imported ends the process, as it ends any program that
-    # does not ask for it; from then on it is a KeyboardInterrupt, which the command answers.
-    handler = signal.getsignal(signal.SIGINT)
-    if handler is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
     from statemachine.cli import main as run
 
-    signal.signal(signal.SIGINT, handler)
-    return run()
+    try:
+        if _HANDLER is _signal.default_int_handler:
+            _signal.signal(_signal.SIGINT, _HANDLER)
+        return run()
+    except KeyboardInterrupt:  # just before the command answers it, or just after
+        return 130
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 
     python -m benchmarks.sweep_cost
 
+It needs what sweeps on many machines need: pip install -e '.[cluster]'.
+
 Cells are measured in processor seconds, which other work on the machine changes little; rates of
 tasks by the clock. It takes about two minutes.
 """

@@ -15,7 +15,10 @@ from __future__ import annotations
 
 import os as _os
 from importlib import import_module as _import_module
-from typing import TYPE_CHECKING, Any
+
+# As typing.TYPE_CHECKING is to type checkers. To import that takes so long that a Ctrl-C may fall
+# into it, before the command is there to answer.
+TYPE_CHECKING = False
 
 __version__ = "0.1.0"
 
@@ -28,6 +31,8 @@ if _os.path.exists(_os.path.join(_os.path.dirname(__file__), "statemachine.py"))
     )
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from .backends import load as load
     from .interface import Data as Data
     from .interface import Model as Model

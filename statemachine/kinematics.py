@@ -19,7 +19,8 @@ from .errors import BadInputError, ModelError, check_name, refuse
 from .installed import require
 from .interface import Array, Model
 from .interface.options import as_numbers, as_vector
-from .models import AnyPath, resolve
+from .model_files import checked_file
+from .models import AnyPath
 from .page import Figures
 from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz
 from .witness import Segment, read_file, read_numbers
@@ -62,7 +63,7 @@ class Kinematics:
     """
 
     def __init__(self, model: AnyPath, joint_names: Sequence[str] | None = None) -> None:
-        pin, path = require("pinocchio"), resolve(model)
+        pin, path = require("pinocchio"), checked_file(model)
         self._hold(pin, path, read_file(pin, path), joint_names)
 
     @classmethod

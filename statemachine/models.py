@@ -11,10 +11,11 @@ import importlib
 import math
 import os
 import re
+import stat
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 from types import ModuleType
@@ -22,6 +23,7 @@ from typing import Any
 from xml.parsers import expat
 
 from .errors import (
+    BadInputError,
     MissingEngineError,
     ModelError,
     ModelFileError,
@@ -31,6 +33,7 @@ from .errors import (
     shown,
     unknown_name,
 )
+from .typed_numbers import typed_float
 
 AnyPath = str | os.PathLike[str]
 
@@ -172,6 +175,38 @@ def model_names() -> list[str]:
     return sorted(names, key=lambda name: (not name.startswith("so101/"), len(name), name))
 
 
+def what_is_there(path: Path) -> str:
+    """Say what a path leads to, in two words: "a file", "a folder", "a named pipe", "nothing".
+
+    To open what is neither a file nor a folder may wait for ever, or do something.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return "nothing"
+    kinds = {
+        stat.S_IFREG: "a file",
+        stat.S_IFDIR: "a folder",
+        stat.S_IFIFO: "a named pipe",
+        stat.S_IFSOCK: "a socket",
+    }
+    return kinds.get(stat.S_IFMT(mode), "a device")
+
+
+def check_is_file(path: Path, error: Callable[[str], Exception] = BadInputError) -> None:
+    """Raise an error for a path that is there and is not a file: it may not be opened.
+
+    Nothing is raised of a path that leads nowhere.
+
+    Args:
+        path: That is to be read.
+        error: Makes the error of a text.
+    """
+    kind = what_is_there(path)
+    if kind not in ("a file", "nothing"):
+        raise error(f"{path} is {kind}, not a file")
+
+
 def resolve(name: AnyPath, menagerie: AnyPath | None = None) -> Path:
     """Find the file of a model: everything that reads one asks here.
 
@@ -213,7 +248,8 @@ def _file(name: AnyPath, menagerie: AnyPath | None) -> Path:
             return models_dir() / text  # the name as pages print it
         if menagerie is not None and (Path(menagerie).expanduser() / text).is_file():
             return (Path(menagerie).expanduser() / text).absolute()  # the same, of a menagerie
-        what = "is a folder, not a file" if path.is_dir() else "does not exist"
+        kind = what_is_there(path)
+        what = "does not exist" if kind == "nothing" else f"is {kind}, not a file"
         raise ModelFileError(f"model file {text} {what}")
     if menagerie is not None:
         return _in_menagerie(text, Path(menagerie).expanduser())
@@ -288,6 +324,8 @@ def refuse_xacro(path: Path) -> None:
     waiting, seen = [path], set[Path]()
     while waiting:
         file = waiting.pop()
+        if what_is_there(file) != "a file":  # to open a pipe would wait for ever
+            continue
         try:
             place, content = file.resolve(), file.read_bytes()
         except OSError:
@@ -372,7 +410,20 @@ def _expressions(attributes: Mapping[str, str]) -> Iterator[str]:
 
 
 def mesh_file(name: str, folder: Path) -> Path | None:
-    """The file of a mesh that a URDF names, or None where there is none.
+    """Return the file of a mesh that a URDF names, or None where there is none.
+
+    Args:
+        name: As the URDF has it.
+        folder: That of the URDF.
+    """
+    for place in mesh_places(name, folder):
+        if what_is_there(place) == "a file":
+            return place
+    return None
+
+
+def mesh_places(name: str, folder: Path) -> Iterator[Path]:
+    """Yield the places where a mesh that a URDF names may be.
 
     Args:
         name: As the URDF has it. A package:// is looked for in the folders above: ROS knows
@@ -380,19 +431,14 @@ def mesh_file(name: str, folder: Path) -> Path | None:
         folder: That of the URDF.
     """
     plain = name.removeprefix("file://")
-    choices = [folder / plain]
+    yield folder / plain
     if plain.startswith("package://"):
         inside = plain.removeprefix("package://")
         rest = inside.partition("/")[2]
         above = (folder, *folder.parents[:3])
-        choices = [up / part for up in above for part in (inside, rest)]
-    for choice in choices:
-        try:
-            if choice.is_file():
-                return choice
-        except (OSError, ValueError):
-            continue
-    return None
+        for up in above:
+            yield up / inside
+            yield up / rest
 
 
 def included_file(name: str, main: Path, includer: Path) -> Path | None:
@@ -416,7 +462,7 @@ def numbers(text: str, count: int, what: str) -> list[float]:
         ModelError: They are not so many, or no finite numbers.
     """
     try:
-        found = [float(word) for word in text.split()]
+        found = [typed_float(word) for word in text.split()]
     except ValueError:
         found = []
     if len(found) != count or not all(map(math.isfinite, found)):

@@ -12,8 +12,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -22,9 +23,16 @@ from .errors import BadInputError, EngineError, MissingEngineError, check_name, 
 from .installed import DEFAULT, ENGINES, engine_version
 from .page import Figures
 
-_NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)")
+if sys.platform == "win32":
+    fcntl = None
+else:
+    import fcntl
+
+_NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)", re.ASCII)
 _ADD = "not here: {}; to have it: statemachine engines add {}"
 _LARGE = 1e9  # [byte], more than any takes while it is made
+_SETTLING = 1.0  # [s] from the lock's file to the lock
+_JUST_MADE = 3600.0  # [s] since its last change, that a folder without a lock is left
 _EXAMPLE = f"{DEFAULT}==3.3.7"
 
 
@@ -86,7 +94,7 @@ def backends_of(versions: str) -> list[str]:
     """
     installed = engine_version(DEFAULT)
     words = {word.strip() for word in f"{versions},{installed}".split(",")}
-    ordered = sorted(words, key=lambda word: [*map(int, re.findall(r"\d+", word))])
+    ordered = sorted(words, key=lambda word: [*map(int, re.findall(r"[0-9]+", word))])
     names = [DEFAULT if word == installed else f"{DEFAULT}=={word}" for word in ordered]
     refuse((len(names) == 1, f"{versions} is installed: name another release to compare it with"))
     missing = [name for name in names if is_release(name) and not is_here(name)]
@@ -141,6 +149,7 @@ def releases() -> Iterator[Figures]:
         python: Version of its Python.
         size: Of its files [byte].
     """
+    clear_abandoned()
     for place in sorted(folder().glob("[a-z]*==*")):  # one that is being made begins with a dot
         settings = place / "pyvenv.cfg"
         text = settings.read_text(encoding="utf-8") if settings.exists() else ""
@@ -151,6 +160,50 @@ def releases() -> Iterator[Figures]:
             python=python[1] if python else "",
             size=sum(file.lstat().st_size for file in files),
         )
+
+
+_LOCK = "lock"  # in a folder that is being made: the file that its process holds
+
+
+def clear_abandoned() -> None:
+    """Remove what a process that was killed has left of an environment that it made or removed.
+
+    The folder of one that still runs is held by it, and stays.
+    """
+    for place in folder().glob(".*==*-*"):
+        with suppress(OSError):
+            # One that has just been made is not held yet.
+            is_held = _is_held(place / _LOCK)
+            if is_held is None:
+                is_held = time.time() - place.stat().st_mtime < _JUST_MADE
+            if not is_held:
+                shutil.rmtree(place, ignore_errors=True)
+
+
+@contextmanager
+def _held(place: Path) -> Iterator[None]:
+    """Hold a folder as long as this process lives, however it ends."""
+    with open(place / _LOCK, "w", encoding="utf-8") as lock:
+        if fcntl is not None:
+            with suppress(OSError):  # a filesystem without locks
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+
+
+def _is_held(lock: Path) -> bool | None:
+    """Tell whether a process holds a folder; None where that cannot be told."""
+    if fcntl is None or not lock.exists():
+        return None
+    if time.time() - lock.stat().st_mtime < _SETTLING:
+        return True
+    with open(lock, encoding="utf-8") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return None
+    return False
 
 
 def add(name: str, python: str = sys.executable, say: Callable[[str], object] = print) -> None:
@@ -171,7 +224,8 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         return
     refuse((shutil.which(python) is None, f"there is no Python {python!r} to make it with"))
     home.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=home) as made:
+    clear_abandoned()
+    with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=home) as made, _held(Path(made)):
         place = Path(made, "it")
         own = str(_python_in(place))
         say(f"making {home / name}")
@@ -258,5 +312,5 @@ def remove(name: str) -> None:
     version_of(name)
     if not os.path.lexists(folder() / name):  # one whose Python is gone can be removed, too
         raise MissingEngineError(_ADD.format(name, name), engine=name)
-    with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=folder()) as gone:
+    with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=folder()) as gone, _held(Path(gone)):
         (folder() / name).rename(Path(gone, "it"))  # at once: nobody finds a part of it

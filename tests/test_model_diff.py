@@ -413,7 +413,7 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
         (
             '<robot name="r"><link name="a"><inertial><mass value="nan"/></inertial></link>'
             "</robot>",
-            "numbers wanted: 1",
+            "value of <mass> has 'nan', which is not a finite number",
         ),
         (
             '<robot name="r"><link name="a"><inertial><mass value="-1"/></inertial></link></robot>',

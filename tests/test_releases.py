@@ -96,6 +96,8 @@ def run_of(model: Any, nstep: int = 400, call: int = 1) -> Any:
     [
         (OLD, MissingEngineError, f"statemachine engines add {OLD}"),
         ("mujoco==new", BadInputError, "type mujoco==3.3.7"),
+        ("mujoco==３.3.7", BadInputError, "is not a release of an engine"),
+        ("mujoco==3.3.7é", BadInputError, "is not a release of an engine"),
         ("mujoco==3.3", BadInputError, "three numbers: type mujoco==3.3.0"),
         ("pybullet==3.2.5", MissingEngineError, "statemachine engines add pybullet==3.2.5"),
         ("pinocchio==3.0.0", UnknownNameError, "no engine named 'pinocchio'"),
@@ -183,6 +185,27 @@ def test_ctrl_c_while_it_is_added(adding: Callable[[str], Any]) -> None:
         out, said = process.communicate()
     assert (process.returncode, out, said) == (130, "", "\n")
     assert not list(releases.folder().iterdir())
+
+
+def test_what_a_killed_add_left_is_cleared_and_what_one_that_runs_makes_is_not(
+    adding: Callable[[str], Any],
+) -> None:
+    with adding("sleep 30") as killed, adding("sleep 30") as running:
+        for process in (killed, running):
+            process.stdout.readline()
+        os.killpg(killed.pid, signal.SIGKILL)
+        killed.wait()
+        made = list(releases.folder().iterdir())
+        assert len(made) == 2
+        for place in made:
+            os.utime(place / "lock", (0, 0))  # they were made long ago
+        assert main(["engines"]) == 0
+        (left,) = releases.folder().iterdir()
+        os.killpg(running.pid, signal.SIGINT)
+        running.communicate()
+    assert left in made
+    assert not list(releases.folder().iterdir())
+    assert not releases.is_here(OLD)
 
 
 def test_two_that_add_it_at_once(adding: Callable[[str], Any]) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.backends.compiled import check_numbers
 from statemachine.errors import EngineWarning, ModelError, StateMachineError
 
 from .conftest import assert_in, in_its_own_python, opened, refused, warnings_of, written
@@ -38,24 +39,25 @@ def _key(attribute: str) -> str:
 
 # How the error names what is wrong, and the file.
 STRANGE = {
-    "timestep is nan": _model('<option timestep="nan"/>'),
+    "timestep of <option> has 'nan'": _model('<option timestep="nan"/>'),
     "timestep is 0, .* above 0": _model('<option timestep="0"/>'),
     "timestep is -1, .* above 0": _model('<option timestep="-1"/>'),
-    "gravity of the options": _model('<option gravity="0 0 inf"/>'),
-    "body_pos of body arm is NaN": _model(body=' pos="nan 0 0"'),
-    "of body arm is infinite": _model(geom=' mass="inf"'),
+    "gravity of <option> has '(nan|inf)'": _model('<option gravity="0 0 inf"/>'),
+    "pos of <body name='arm'> has 'nan'": _model(body=' pos="nan 0 0"'),
+    "mass of <geom name='part'> has 'inf'": _model(geom=' mass="inf"'),
     "inertia of body arm is infinite": _model().replace("0.1", "1e200"),
-    "geom_friction of geom part is NaN": _model(geom=' friction="nan 1 1"'),
-    "geom_solimp of geom part is NaN": _model(geom=' solimp="nan 1 1"'),
-    "jnt_range of joint lift is NaN": _model(joint=' range="nan nan" limited="true"'),
+    "friction of <geom name='part'> has 'nan'": _model(geom=' friction="nan 1 1"'),
+    "solimp of <geom name='part'> has 'nan'": _model(geom=' solimp="nan 1 1"'),
+    "range of <joint name='lift'> has 'nan'": _model(joint=' range="nan nan" limited="true"'),
     "dof_armature of joint lift is negative": _model(joint=' armature="-5"'),
     "dof_frictionloss of joint lift": _model(joint=' frictionloss="-1"'),
-    "actuator_.*prm of actuator servo is NaN": _servo('position kp="nan"'),
-    "key_qpos of key up is NaN": _key('qpos="nan"'),
-    "key_time of key up is NaN": _key('time="nan"'),
+    "kp of <position .*> has 'nan'": _servo('position kp="nan"'),
+    "qpos of <key name='up'> has 'nan'": _key('qpos="nan"'),
+    "time of <key name='up'> has 'nan'": _key('time="nan"'),
     "jnt_axis of joint lift has no direction": _model(joint=' axis="0 1e300 0"'),
     "body_quat of body arm has no direction": _model(body=' quat="1e300 0 1e300 0"'),
 }
+NAN_OF_A_USER = '<custom><numeric name="n" data="nan"/></custom>'
 # Names that a file in Latin-1 may have.
 NOT_UTF_8 = {
     "of a body": _model().replace('"arm"', '"ärm"'),
@@ -79,6 +81,34 @@ NEGATIVE = {
 def test_a_strange_number_is_refused_by_name(named: str, backend: str, tmp_path: Path) -> None:
     file = written(tmp_path / "m.xml", STRANGE[named])
     refused((ModelError, rf"m\.xml.*{named}", lambda: sm.load(file, backend=backend)))
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "says"),
+    [
+        ("opt.timestep", np.nan, "timestep is nan"),
+        ("opt.gravity", np.inf, "gravity of the options"),
+        ("body_pos", np.nan, "body_pos of body .* is NaN"),
+        ("body_mass", np.inf, "body_mass of body .* is infinite"),
+        ("geom_friction", np.nan, "geom_friction of geom part is NaN"),
+        ("jnt_range", np.nan, "jnt_range of joint lift is NaN"),
+        ("key_qpos", np.nan, "key_qpos of key up is NaN"),
+        ("key_time", np.inf, "key_time of key up is infinite"),
+        ("key_time", -1e300, "time of key up is -1e.300: no timestep is added to it"),
+    ],
+)
+def test_a_strange_number_of_a_compiled_model_is_refused_by_name(
+    field: str, value: float, says: str, tmp_path: Path
+) -> None:
+    """As of one that was written as binary, or changed in memory."""
+    model = model_of(tmp_path, _key('qpos="0"'))
+    holder, _, name = field.rpartition(".")
+    owner = getattr(model.raw, holder) if holder else model.raw
+    if isinstance(getattr(owner, name), float):
+        setattr(owner, name, value)
+    else:
+        getattr(owner, name)[...] = value
+    refused((ModelError, says, lambda: check_numbers(model.raw, "m.xml")))
 
 
 @pytest.mark.parametrize("name", NOT_UTF_8)
@@ -139,8 +169,8 @@ def test_a_message_is_cut_and_keeps_its_ends(tmp_path: Path) -> None:
 
 
 def test_what_compiling_warns_of_is_said_and_leaves_no_file(backend: str, tmp_path: Path) -> None:
-    """MuJoCo takes the density for a mass that is not a number, and says so in a log file."""
-    (tmp_path / "m.xml").write_text(_model(geom=' mass="nan"'))
+    """MuJoCo tells of the letters NaN, here in a user's own numbers, in a log file."""
+    (tmp_path / "m.xml").write_text(_model().replace("<worldbody>", f"{NAN_OF_A_USER}<worldbody>"))
     code = f"""
 import warnings
 import statemachine as sm
@@ -163,8 +193,9 @@ def test_a_load_gives_back_the_handler_of_others(tmp_path: Path) -> None:
     handler, before = Mock(), mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(handler)
     try:
+        text = _model().replace("<worldbody>", f"{NAN_OF_A_USER}<worldbody>")
         with pytest.warns(EngineWarning, match="m.xml"):
-            model_of(tmp_path, _model(geom=' mass="nan"'), backend="pybullet")
+            model_of(tmp_path, text, backend="pybullet")
         assert mujoco.get_mju_user_warning() is handler
     finally:
         mujoco.set_mju_user_warning(before)

@@ -505,20 +505,41 @@ def test_a_folder_of_something_else_and_an_extra_that_is_missing(
 
 def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> None:
     sweep = prepared(small("hold"))
-    whole = json.dumps(sweep.manifest())
     (tmp_path / "cells").mkdir()
     run, read = partial(run_sweep, sweep, tmp_path), partial(read_manifest, tmp_path)
     refused(
         (BadInputError, r"holds cells and no sweep\.json", run),
         (BadInputError, r"is not a sweep: it has no sweep\.json", read),
     )
-    for text in (
-        whole[:200],
-        '{"schema": 2}',
-        json.dumps({**json.loads(whole), "factors": [{"name": 1}]}),
-    ):
+    without_digest = json.dumps(sweep.manifest())
+    for text in ("", "[1]", "null", without_digest[:200], without_digest, '{"sha256": 1}'):
         (tmp_path / "sweep.json").write_text(text)
         refused(*((BadInputError, r"sweep\.json is damaged", use) for use in (run, read)))
+    (tmp_path / "sweep.json").write_text(json.dumps({**sweep.manifest(), "schema": 2}))
+    refused((BadInputError, r"has schema 2; this version reads 3", read))
+
+
+def test_no_changed_letter_of_a_manifest_is_another_sweep(tmp_path: Path) -> None:
+    """Letters that make other valid JSON are tried, too: a digit for a digit, a key's letter."""
+    sweep = prepared(small("hold", "damping=0.5x,1x", "qpos[elbow_flex]=0:1:3", seeds=2))
+    settle_manifest(tmp_path, sweep.manifest(), extend=False)
+    path, draw = tmp_path / "sweep.json", random.Random(1)
+    whole = path.read_bytes()
+    assert read_manifest(tmp_path) == json.loads(json.dumps(sweep.manifest()))
+    digits = [place for place, letter in enumerate(whole) if chr(letter).isdigit()]
+    changes = [(draw.randrange(len(whole)), 1 << draw.randrange(8)) for _ in range(250)]
+    changes += [(place, 1) for place in draw.sample(digits, 50)]
+    for place, bits in changes:
+        bad = bytearray(whole)
+        bad[place] ^= bits
+        path.write_bytes(bad)
+        says = rf"^{re.escape(str(path))} is damaged"
+        refused(
+            (BadInputError, says, lambda: read_manifest(tmp_path)),
+            (BadInputError, says, lambda: settle_manifest(tmp_path, sweep.manifest(), True)),
+        )
+    path.write_bytes(whole)
+    settle_manifest(tmp_path, sweep.manifest(), extend=False)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit stands in for a full disk")

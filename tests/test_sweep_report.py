@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
@@ -28,7 +27,7 @@ from statemachine.sweep.analysis_fit import fit_curves, values_within
 from statemachine.sweep.analysis_gaps import agreement_of, gap_map
 from statemachine.sweep.analysis_runs import ModelFacts, facts_of
 from statemachine.sweep.analysis_together import REFINED, brought_together
-from statemachine.sweep.folder import design_of, read_manifest
+from statemachine.sweep.folder import design_of, read_manifest, write_manifest
 from statemachine.sweep.request import MANIFEST_VERSION
 from statemachine.sweep.rows import DONE, FAILED, RowWriter, read_cells, schema_of
 
@@ -67,7 +66,7 @@ def made_up(
         },
         "factors": [{**asdict(vary), "label": vary.label} for vary in design.factors],
     }  # fmt: skip
-    (folder / "sweep.json").write_text(json.dumps(manifest))
+    write_manifest(folder, manifest)
     writer = RowWriter(folder, design.factors, {})
     sides = zip(SIDES, (left, right), strict=True)
     for (backend, tip_of), point, seed in product(sides, list(design.points()), range(seeds)):

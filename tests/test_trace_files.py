@@ -6,6 +6,7 @@ import dataclasses
 import io
 import json
 import os
+import random
 import tracemalloc
 import zipfile
 from functools import partial
@@ -255,3 +256,26 @@ def test_a_csv_and_its_contacts_are_replaced_together(
     assert table.read_bytes() == before
     assert contacts.exists()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["box.contacts.csv", "box.csv"]
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".parquet"])
+def test_no_flipped_bit_of_a_trace_is_another_trace(
+    suffix: str, box: Trace, tmp_path: Path
+) -> None:
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    path, draw = write(box, tmp_path / f"box{suffix}"), random.Random(1)
+    whole = path.read_bytes()
+    wanted, refusals = read(path), 0
+    for _ in range(250):
+        bad = bytearray(whole)
+        bad[draw.randrange(len(whole))] ^= 1 << draw.randrange(8)
+        path.write_bytes(bad)
+        try:
+            found = read(path)
+        except TraceError:
+            refusals += 1
+        else:
+            assert same(found, wanted)
+            assert found.header == wanted.header
+    assert refusals > 200

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import statemachine as sm
+from statemachine import releases
 from statemachine.lessons.hold import OLDER
 from statemachine.runs import Trace, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
@@ -42,6 +43,7 @@ def recorded(run: str) -> Trace:
 
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
+    releases.add(OLDER)
     for run in RUNS:
         trace = recorded(run)
         path = write(trace, FOLDER / f"{run}.npz")

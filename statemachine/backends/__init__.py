@@ -20,7 +20,8 @@ from ..interface import Model
 from ..interface.records import Defaults
 from ..measures import ContactNames, overlaps
 from ..measures.text import few
-from ..models import AnyPath, resolve
+from ..model_files import checked_file
+from ..models import AnyPath
 from ..releases import is_release, version_of
 from ._hidden_data import HiddenData, HiddenModel
 from ._hidden_world import HiddenWorld, Moment
@@ -148,7 +149,7 @@ def load(
     """
     place = _find(backend)
     check_name("defaults", defaults, ("model", "engine"))
-    path = resolve(model, menagerie)
+    path = checked_file(model, menagerie)
     if trust_binary and is_binary(path):
         read_binary(path, trust=True)  # the loader knows its bytes then
     if backend in ENGINES:

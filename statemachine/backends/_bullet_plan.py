@@ -22,6 +22,7 @@ from ..interface import Array
 from . import _bullet_urdf as urdf
 from ._bullet_contacts import Surfaces
 from ._bullet_file import MOST_LINKS, UrdfFile
+from .compiled import new_data
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 # Of the armature, as inertia of the stepped arm: 0.003 of the SO-101's 0.028 kg m², with
@@ -101,7 +102,7 @@ class Plan:
 
     def standing(self) -> mujoco.MjData:
         """The same, to be written into."""
-        data = mujoco.MjData(self.raw)
+        data = new_data(self.raw)
         mujoco.mj_kinematics(self.raw, data)
         return data
 
@@ -173,7 +174,7 @@ def _padding(raw: mujoco.MjModel) -> Array:
     law reckons with, M + A: the largest eigenvalue of (M + A)⁻¹·(M + padding) is kept
     below `_BEARABLE` in a sample of poses.
     """
-    share, data = _SHARE * raw.dof_armature, mujoco.MjData(raw)
+    share, data = _SHARE * raw.dof_armature, new_data(raw)
     random = np.random.default_rng(0)
     with np.errstate(over="ignore"):
         limited = raw.jnt_limited.astype(bool) & np.isfinite(np.ptp(raw.jnt_range, axis=1))

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from ..errors import one_line
+from ..errors import StateMachineError, one_line
 from ..interface import Array, Ints, Model, State
 from ..interface.options import check_vector, engine_steps, unsupported
 from ..interface.records import Errors, StateLayout
@@ -32,6 +32,7 @@ from ._mujoco_alarms import (
     pass_on,
     resets_itself,
 )
+from .compiled import ENGINE_ERRORS
 
 _STATE = mujoco.mjtState
 _NO_STAGE = int(mujoco.mjtStage.mjSTAGE_NONE)
@@ -79,7 +80,9 @@ class MujocoWorlds(Worlds):
             if varied[0] and raw.nhistory:  # the times in it are by each world's own timestep
                 batch.reset(None, -1, _NO_STAGE)
             arrays = {name: batch.bind(name) for name in (*WRITABLE, *derived)}
-        except (MemoryError, mujoco.FatalError) as error:
+        except StateMachineError:
+            raise
+        except ENGINE_ERRORS as error:
             raise gave_up(error) from error
         except ValueError as error:  # what a Batch cannot do
             raise unsupported(model, "worlds", one_line(error)) from error

@@ -12,6 +12,7 @@ For `Model.replace`, `_edits` has a copy with other options (`edited`).
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import warnings
@@ -47,6 +48,32 @@ _SELDOM_NEGATIVE = (
     *("dof_damping", "jnt_stiffness", "tendon_damping", "tendon_stiffness"),
     *("geom_friction", "pair_friction"),
 )
+
+
+# What MuJoCo raises where it gives up, beside the ValueError of a file that it cannot read. A
+# RuntimeError is one of C++ that the bindings do not know: of memory that cannot be had.
+ENGINE_ERRORS = (MemoryError, RuntimeError, mujoco.FatalError)
+_NO_MEMORY = ("could not allocate memory", "unknown exception", "bad_alloc")
+
+
+def reason_of(error: BaseException) -> str:
+    """Say in one line why MuJoCo gave up; where memory ended, that it did."""
+    text = one_line(error)
+    if isinstance(error, MemoryError) or any(sign in text.lower() for sign in _NO_MEMORY):
+        return f"it takes more memory than there is ({text})" if text else "out of memory"
+    return text or type(error).__name__
+
+
+def new_data(raw: mujoco.MjModel) -> mujoco.MjData:
+    """Make an MjData for what is computed of a compiled model.
+
+    Raises:
+        ModelError: It does not fit into memory.
+    """
+    try:
+        return mujoco.MjData(raw)
+    except ENGINE_ERRORS as error:
+        raise ModelError(f"MuJoCo cannot make a Data: {reason_of(error)}") from error
 
 
 @contextmanager
@@ -86,8 +113,8 @@ def compile_file(path: AnyPath) -> mujoco.MjModel:
         else:
             spec = spec_with_packages(Path(text))
             raw = spec.compile() if spec else mujoco.MjModel.from_xml_path(text)
-    except (ValueError, MemoryError, mujoco.FatalError) as error:
-        reason = one_line(error) or "out of memory"
+    except (ValueError, *ENGINE_ERRORS) as error:
+        reason = reason_of(error)
         if missing := re.search(r"opening file '(.*)'", reason):
             place = Path(text).absolute().parent / Path(missing[1]).parent
             reason += f"; it is looked for in {place}: copy that folder along with the model"
@@ -108,7 +135,7 @@ def contacts_at_start(raw: mujoco.MjModel) -> tuple[Ints, Array]:
                 mujoco.mj_resetDataKeyframe(raw, data, key)
             for stage in ("kinematics", "comPos", "flex", "collision"):
                 getattr(mujoco, f"mj_{stage}")(raw, data)
-    except (MemoryError, mujoco.FatalError):  # who makes a Data is told of it
+    except ENGINE_ERRORS:  # who makes a Data is told of it
         return np.empty((0, 2), np.int64), np.empty(0)
     return data.contact.geom.reshape(-1, 2).astype(np.int64), np.array(data.contact.dist)
 
@@ -170,6 +197,10 @@ def _problems(raw: mujoco.MjModel) -> Iterator[str]:
     """What of a compiled model is not a number, or has a sign that it cannot have."""
     if not raw.opt.timestep > 0:
         yield f"timestep is {raw.opt.timestep:g}, and must be above 0"
+    for key, time in enumerate(raw.key_time.tolist()):
+        if math.isfinite(time) and time + raw.opt.timestep == time:
+            name = raw.key(key).name or f"number {key}"
+            yield f"time of key {name} is {time:g}: no timestep is added to it"
     for name in dir(raw.opt):
         value = getattr(raw.opt, name)
         if not name.startswith("_") and not np.isfinite(value).all():

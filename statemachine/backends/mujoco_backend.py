@@ -15,7 +15,7 @@ from typing import Any, cast
 import mujoco
 import numpy as np
 
-from ..errors import BadInputError
+from ..errors import BadInputError, StateMachineError
 from ..interface import (
     BEHAVIOURS,
     FORCES,
@@ -39,6 +39,7 @@ from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_
 from ._release_child import constraint_part, contact_arrays
 from .binary import write_binary
 from .compiled import (
+    ENGINE_ERRORS,
     check_numbers,
     compile_file,
     compiler_warnings,
@@ -166,7 +167,9 @@ class MujocoModel(Model):
     def _make_data(self) -> MujocoData:
         try:
             return MujocoData(self)
-        except (MemoryError, mujoco.FatalError) as error:
+        except StateMachineError:
+            raise
+        except ENGINE_ERRORS as error:
             raise gave_up(error) from error
 
     def _make_worlds(
@@ -217,7 +220,9 @@ class MujocoModel(Model):
         substeps = options.get("substeps", self.substeps)
         try:
             raw = edited(self.raw, options, step_length(self.timestep, substeps, options))
-        except (MemoryError, mujoco.FatalError) as error:
+        except StateMachineError:
+            raise
+        except ENGINE_ERRORS as error:
             raise gave_up(error) from error
         if "integrator" in options:
             raw.opt.integrator = int(INTEGRATORS[options["integrator"]])

@@ -20,6 +20,7 @@ from ..errors import (
     refuse,
 )
 from ..installed import DEFAULT
+from ..typed_numbers import typed_float, typed_int
 
 PROGRAM = "statemachine"
 # Exit codes: the result says no; bad input; an engine is missing; nowhere to write.
@@ -136,13 +137,18 @@ REPEATED = {"action": "append", "default": []}
 def _numbers(text: str) -> list[float]:
     """Numbers of a list like 0,-0.6,1.2, as an option's type."""
     try:
-        return [float(part) for part in text.replace(",", " ").split()]
+        return [typed_float(part) for part in text.replace(",", " ").split()]
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 0,-0.6") from None
 
 
 # By the metavar.
-_TYPES: dict[str | None, Any] = {"N": int, "S": float, "X": float, "X,X,…": _numbers}
+_TYPES: dict[str | None, Any] = {
+    "N": typed_int,
+    "S": typed_float,
+    "X": typed_float,
+    "X,X,…": _numbers,
+}
 
 
 def file_name(text: str) -> Path:

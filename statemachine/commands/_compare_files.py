@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..errors import MissingEngineError, ModelFileError, StateMachineError, UnknownNameError
+from ..typed_numbers import is_count, typed_float
 from ._common import Row, complain, file_name
 
 
 def _size(text: str) -> tuple[int, int]:
     width, cross, height = text.lower().partition("x")
-    if not (cross and width.isdecimal() and height.isdecimal()):
+    if not (cross and is_count(width) and is_count(height)):
         raise argparse.ArgumentTypeError(f"a size reads like 640x480; got {text}")
     return int(width), int(height)
 
@@ -33,8 +34,8 @@ OF_TESTS = (
     {"type": file_name},
 )
 OF_FILM: tuple[Row, ...] = (
-    ("--fps", "N", "of the film (default 30)", {"type": float, "default": 30.0}),
-    ("--slow", "N", "of the film: N times slower", {"type": float, "default": 1.0}),
+    ("--fps", "N", "of the film (default 30)", {"type": typed_float, "default": 30.0}),
+    ("--slow", "N", "of the film: N times slower", {"type": typed_float, "default": 1.0}),
     ("--size", "WxH", "of the film (640x480)", {"type": _size, "default": (640, 480)}),
     (
         "--renderer",

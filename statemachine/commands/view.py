@@ -12,6 +12,7 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import TraceError
+from ..typed_numbers import is_count, typed_float
 from ._common import (
     ENGINE,
     PROGRAM,
@@ -50,7 +51,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             "where to start; 'default' is the default state (default: the first keyframe)",
         ),
         ("--site", "NAME", "the fingertip (default gripperframe, else the last site)"),
-        ("--speed", "X", "times real time (1)", {"type": float, "default": 1.0}),
+        ("--speed", "X", "times real time (1)", {"type": typed_float, "default": 1.0}),
         ("--paused", "", "let time stand at the start"),
         ("--port", "N", f"or the next free one ({_PORT})", {"default": _PORT}),
         (
@@ -148,7 +149,7 @@ def _keyframe(asked: str | None, model: Any) -> int | None:
             return 0 if model.keyframes else None
         case "default":
             return None
-    return model.key_id(int(asked) if asked.isdecimal() else asked)
+    return model.key_id(int(asked) if is_count(asked) else asked)
 
 
 def _serve(

@@ -26,6 +26,7 @@ from ..models import resolve
 from ..runs.controllers import function_scenario, is_function
 from ..runs.files import SUFFIXES
 from ..runs.scenarios import SCENARIOS, Scenario, scenario
+from ..typed_numbers import typed_float
 from .labels import typed_option
 from .matching import match_models
 
@@ -237,7 +238,7 @@ def _option(text: str) -> tuple[str, Any]:
     if name == "integrator":
         return name, given
     try:
-        numbers = [float(number) for number in given.split(",")]
+        numbers = [typed_float(number) for number in given.split(",")]
     except ValueError:
         raise BadInputError(
             f"{name}={shown(given)[1:-1]} is not a value: give numbers, with commas between, on or "

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
+from ..models import check_is_file
 
 # A student's predictions, as `statemachine lesson --record FILE` keeps them.
 
@@ -19,6 +20,7 @@ def answers_in(file: Path) -> dict[str, dict[str, Any]]:
     Raises:
         BadInputError: The file is no such record.
     """
+    check_is_file(file)
     try:
         record = json.loads(file.read_text(encoding="utf-8"))
         if record["kind"] != KIND:

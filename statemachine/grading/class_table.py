@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import BadInputError
+from ..models import check_is_file
 from .calls import reason
 from .exercise import LOOK
 from .judges import JUDGES, Judgement
@@ -137,6 +138,7 @@ def read(table: Path) -> dict[tuple[str, str], ClassEntry]:
     Raises:
         BadInputError: It is no such table, so that nothing of it is overwritten.
     """
+    check_is_file(table)
     try:
         with table.open(newline="", encoding="utf-8-sig") as text:  # as spreadsheets save it
             head = text.readline()

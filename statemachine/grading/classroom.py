@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import BadInputError, StateMachineError
-from ..models import AnyPath
+from ..models import AnyPath, check_is_file
 from ..processes import checked_jobs
 from ..processes.parallel import in_parallel
 from ..runs.drive import Progress, silent
@@ -173,6 +173,7 @@ def enrolled(submitted: Sequence[Submission], roster: Path) -> list[Submission]:
     Raises:
         BadInputError: The roster cannot be read.
     """
+    check_is_file(roster)
     try:
         text = roster.read_text(encoding="utf-8-sig")
         rows = csv.reader(text.splitlines(), delimiter=max(",;\t", key=text.count))

@@ -24,7 +24,7 @@ from .. import __version__, errors
 from ..backends import backend_engine
 from ..errors import BadInputError, EngineError, refuse
 from ..installed import DEFAULT, engine_version
-from ..models import AnyPath
+from ..models import AnyPath, what_is_there
 from ..page import Figures
 from ..processes.parallel import in_parallel, unwinding
 from ..releases import is_release
@@ -271,12 +271,13 @@ def _without_answers(copy: _Copy, name: str, recording: FunctionRecording) -> Ju
 def _python_file(path: Path) -> Path:
     try:
         path = path.expanduser().resolve()
-        folder, file = path.is_dir(), path.is_file()
+        kind = what_is_there(path)
     except (OSError, ValueError, RuntimeError) as error:
         raise BadInputError(f"no file can have this name: {error}") from None
     refuse(
-        (folder, f"{path.name} is a folder: name the student's file in it"),
-        (not file, f"there is no file {path.name}"),
+        (kind == "a folder", f"{path.name} is a folder: name the student's file in it"),
+        (kind == "nothing", f"there is no file {path.name}"),
+        (kind != "a file", f"{path.name} is {kind}, not a file"),
         (path.suffix != ".py", f"{path.name} is not a Python file: its name does not end in .py"),
     )
     try:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import BadInputError, UnsupportedError, check_name
 from ..interface import DERIVED, Array, Contacts, Data, Ints, Model
+from ..typed_numbers import typed_float
 from .text import few, grouped, milliseconds, rounded
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
@@ -142,7 +143,7 @@ def amount(text: str) -> tuple[float, str]:
     for suffix, factor, unit in _SUFFIXES:
         if text.endswith(suffix):
             try:
-                value = float(text.removesuffix(suffix)) * factor
+                value = typed_float(text.removesuffix(suffix)) * factor
             except ValueError:
                 break
             return (value if 0 < value < np.inf else np.nan), unit

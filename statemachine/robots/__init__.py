@@ -96,6 +96,9 @@ def find(paths: Sequence[AnyPath]) -> list[Figures]:
     ]
 
 
+_WITH_BODIES = ("body", "attach", "replicate", "composite", "flexcomp")  # elements of an MJCF
+
+
 def _below(folder: Path) -> Iterator[Path]:
     for file in sorted(folder.rglob("*")):
         parts = file.relative_to(folder).parts
@@ -110,8 +113,9 @@ def _below(folder: Path) -> Iterator[Path]:
 def _root(file: Path) -> str:
     """The name of a file's root element; of one that is not XML, what it begins to be; or ""."""
     try:
-        for _, element in ElementTree.iterparse(file, events=("start",)):
-            return element.tag
+        with file.open("rb") as content:
+            for _, element in ElementTree.iterparse(content, events=("start",)):
+                return element.tag
     except (ElementTree.ParseError, UnicodeError, ValueError):
         pass
     except OSError:
@@ -123,14 +127,17 @@ def _root(file: Path) -> str:
 
 def _has_bodies(file: Path) -> bool:
     """Whether a body is in an MJCF, or in what it includes; one that is not XML may have."""
+    # A file that `iterparse` opens itself is closed by the garbage collector, in which a Ctrl-C is
+    # printed and lost.
     try:
-        return any(
-            element.tag in ("body", "attach", "replicate", "composite", "flexcomp")
-            for part in model_files(file)
-            for _, element in ElementTree.iterparse(part, events=("start",))
-        )
+        for part in model_files(file):
+            with part.open("rb") as content:
+                for _, element in ElementTree.iterparse(content, events=("start",)):
+                    if element.tag in _WITH_BODIES:
+                        return True
     except (ElementTree.ParseError, UnicodeError, ValueError, OSError):
         return True
+    return False
 
 
 def _digest(file: Path) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
+from ..models import check_is_file
 from ..runs.whole import replace_csv, replace_text
 
 TOLERANCE = 1e-6  # of a gap without contacts [rad or m]
@@ -258,6 +259,7 @@ def read_table(target: Path) -> dict[tuple[str, str, str], ExaminedModel]:
     Raises:
         BadInputError: It is no such table, so that nothing of it is overwritten.
     """
+    check_is_file(target)
     try:
         if target.suffix.lower() == ".json":
             plain = json.loads(target.read_text(encoding="utf-8"))

@@ -17,6 +17,7 @@ from ..errors import BadInputError, did_you_mean, refuse
 from ..interface import Data, Model
 from ..interface.options import as_vector
 from ..measures.text import count, few
+from ..models import what_is_there
 from .drive import Controller
 from .scenarios import Scenario
 
@@ -206,6 +207,8 @@ def _function(path: Path, name: str) -> Function:
 def _missing(path: Path) -> BadInputError:
     if path.suffix != ".py":
         return BadInputError(f"a controller is given as FILE.py or FILE.py:NAME; got {str(path)!r}")
+    if (kind := what_is_there(path)) != "nothing":
+        return BadInputError(f"{path} is {kind}, not a controller file")
     beside = [f.name for f in path.parent.glob("*.py")] if path.parent.is_dir() else []
     hint = did_you_mean(path.name, beside, 0.6)
     return BadInputError(f"there is no controller file {path}{hint}")

@@ -24,7 +24,7 @@ from ..errors import (
     did_you_mean,
 )
 from ..interface import MOCAP, JointType
-from ..models import AnyPath, resolve
+from ..models import AnyPath, resolve, what_is_there
 from .formats import read_npz, read_parquet, write_npz, write_parquet
 from .header import COLUMNS, Header, model_digest
 from .trace import Trace
@@ -143,8 +143,8 @@ def _known(path: AnyPath) -> Path:
 def _missing(path: Path) -> TraceError:
     """The error for a file that is not there, with the nearest name beside it."""
     message = f"there is no trace {path}"
-    if path.is_dir():
-        message = f"{path} is a folder, not a trace"
+    if (kind := what_is_there(path)) != "nothing":
+        message = f"{path} is {kind}, not a trace"
     elif path.parent.is_dir():
         names = [file.name for file in path.parent.iterdir() if file.suffix in SUFFIXES]
         message += did_you_mean(path.name, names, 0.6)

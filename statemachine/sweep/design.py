@@ -21,6 +21,7 @@ from ..errors import BadInputError, refuse, shown, unknown_name
 from ..installed import require_extra
 from ..interface import Array, JointType
 from ..page import Figures
+from ..typed_numbers import typed_float
 
 Kind = Literal["model", "option", "state", "parameter"]
 Value = bool | float | str
@@ -217,7 +218,7 @@ def _value(word: str) -> tuple[Value, bool]:
         return _SWITCHES[word.lower()], False
     times = word.endswith(_TIMES)
     try:
-        number = float(word[:-1] if times else word)
+        number = typed_float(word[:-1] if times else word)
     except ValueError:
         return word, False
     refuse((not math.isfinite(number), f"{word} is not a finite number"))

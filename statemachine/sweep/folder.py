@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -12,12 +13,15 @@ from typing import Any
 
 from ..errors import BadInputError, refuse, shown
 from ..measures.text import listed
-from ..runs.whole import replace_text
+from ..models import check_is_file
+from ..runs.whole import replace_bytes
 from .design import Design, Vary
 from .request import MANIFEST_VERSION
 
 MANIFEST = "sweep.json"
 _LOCK = ".lock"
+_DIGEST = "sha256"  # the key of the digest of all other bytes of the file
+_UNKNOWN_DIGEST = "0" * (2 * hashlib.sha256().digest_size)  # what stands there while it is computed
 # What a dataset is of, whatever its design: another of these is another sweep.
 _SAME = ("request", "files", "versions")
 
@@ -72,28 +76,73 @@ def check_folder(folder: Path) -> None:
 
 
 def read_manifest(folder: str | Path) -> dict[str, Any]:
-    """What `sweep.json` says of a sweep.
+    """Read what `sweep.json` says of a sweep.
+
+    The file carries a digest of its own bytes, which is verified before anything in it is used.
+
+    Returns:
+        The manifest, without the digest.
 
     Raises:
-        BadInputError: There is none, or it is damaged, or none of this version's.
+        BadInputError: There is none, or it is damaged, or of another schema.
     """
     path = Path(folder) / MANIFEST
+    check_is_file(path)
     try:
-        manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if manifest["schema"] == MANIFEST_VERSION:
-            design_of(manifest)
+        content = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
         raise BadInputError(f"{folder} is not a sweep: it has no {MANIFEST}") from None
-    except (ValueError, KeyError, TypeError):
-        raise BadInputError(
-            f"{path} is damaged, and without it nobody knows what the cells are of: put back a "
-            "copy, or name another folder"
-        ) from None
-    if (version := manifest["schema"]) != MANIFEST_VERSION:
+    manifest = _parsed(content)
+    if manifest is None or (_DIGEST in manifest and not _is_as_written(content, manifest)):
+        raise _damaged(path)
+    if (version := manifest.get("schema")) != MANIFEST_VERSION:
         raise BadInputError(
             f"{path} has schema {shown(version)}; this version reads {MANIFEST_VERSION}"
         )
+    if _DIGEST not in manifest:
+        raise _damaged(path)
+    del manifest[_DIGEST]
     return manifest
+
+
+def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+    """Write `sweep.json`, with a digest of all its other bytes: whole or not at all.
+
+    Args:
+        folder: Of the sweep.
+        manifest: Of plain values.
+    """
+    text = json.dumps({_DIGEST: _UNKNOWN_DIGEST, **manifest}, indent=1) + "\n"
+    content = text.encode()
+    digest = hashlib.sha256(content).hexdigest()
+    # The place of the digest is the first of its kind: the key stands first.
+    sealed = content.replace(_UNKNOWN_DIGEST.encode(), digest.encode(), 1)
+    replace_bytes(folder / MANIFEST, sealed)
+
+
+def _parsed(content: bytes) -> dict[str, Any] | None:
+    """Parse a manifest; None where it is not a JSON object."""
+    try:
+        manifest = json.loads(content.decode("utf-8"))
+    except (ValueError, RecursionError):
+        return None
+    return manifest if isinstance(manifest, dict) else None
+
+
+def _is_as_written(content: bytes, manifest: Mapping[str, Any]) -> bool:
+    """Tell whether the digest that a manifest has is that of all its other bytes."""
+    digest = manifest[_DIGEST]
+    if not isinstance(digest, str) or len(digest) != len(_UNKNOWN_DIGEST):
+        return False
+    without = content.replace(digest.encode(errors="replace"), _UNKNOWN_DIGEST.encode(), 1)
+    return hashlib.sha256(without).hexdigest() == digest
+
+
+def _damaged(path: Path) -> BadInputError:
+    return BadInputError(
+        f"{path} is damaged: it is not as it was written, and without it nobody knows what the "
+        "cells are of. Put back a copy, or name another folder"
+    )
 
 
 def design_of(manifest: Mapping[str, Any]) -> Design:
@@ -146,7 +195,7 @@ def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> 
         )
         if not design:
             return
-    replace_text(path, json.dumps(wanted, indent=1) + "\n")
+    write_manifest(folder, wanted)
 
 
 def _differences(

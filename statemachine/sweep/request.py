@@ -18,10 +18,11 @@ from ..measures.text import command
 from ..runs.controllers import function_scenario, is_function
 from ..runs.robot import scalar_joint
 from ..runs.scenarios import Scenario, scenario
+from ..typed_numbers import is_count
 from .design import Design, Value, Vary, digest
 from .rows import columns_of
 
-MANIFEST_VERSION = 2
+MANIFEST_VERSION = 3
 # What a dataset is of, beside the experiment: cells of other values are of another sweep.
 REQUEST = ("model", "seconds", "every", "keyframe", "defaults", "spread", "moments")
 # What it may grow by.
@@ -234,7 +235,7 @@ def _own(model: Model, vary: Vary) -> tuple[Any, int | None]:
 
 def _place(model: Model, vary: Vary, owner: str, length: int) -> int:
     """Which number of an array is meant: by joint, body, …, axis or its own number."""
-    if vary.place.isdigit():
+    if is_count(vary.place):
         if int(vary.place) >= length:
             raise BadInputError(f"{vary.label} is beyond the {length} that {model.path.name} has")
         return int(vary.place)

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..installed import require_extra
+from ..models import check_is_file
 from ..runs.whole import replace_bytes
 from .design import Vary
 
@@ -174,6 +175,7 @@ def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
         OSError: It cannot be opened.
     """
     arrow, parquet = require_parquet()
+    check_is_file(part)
     content = part.read_bytes()
     if _sealed(content) != content:
         raise BadInputError(

@@ -29,6 +29,7 @@ from ...engines.description.records import Robot
 from ...engines.description.tree import GroupTree
 from ...errors import EngineWarning, StateMachineError, UnsupportedError
 from ...installed import DEFAULT
+from ...model_files import checked_file
 from ...models import resolve
 from ...page import Figures
 from ...releases import engine_of, is_release
@@ -62,7 +63,7 @@ def read(
         ModelError, ModelFileError: The file cannot be read.
         UnsupportedError: The engine is one of a third party, which nothing here reads.
     """
-    path = resolve(model, menagerie)
+    path = checked_file(model, menagerie)
     name = "/".join(path.parts[-2:])
     if engine is None:
         if path.suffix.lower() == ".urdf":

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import MissingEngineError, ModelError, one_line
+from ...errors import MissingEngineError, ModelError
 from ...installed import require
 from .. import RawEngine, function_of
 
@@ -57,9 +57,9 @@ class MujocoEngine(RawEngine):
                 model = mujoco.MjModel.from_binary_path(path.name, {path.name: read_binary(path)})
             else:
                 model = mujoco.MjModel.from_xml_path(str(path))
-        except ValueError:
+            data = mujoco.MjData(model)
+        except (ValueError, MemoryError, RuntimeError, mujoco.FatalError):
             return None
-        data = mujoco.MjData(model)
         if keyframe is not None:
             mujoco.mj_resetDataKeyframe(model, data, keyframe)
         rows = [np.concatenate((data.qpos, data.qvel))]
@@ -211,11 +211,15 @@ def with_parts(
             has no counterpart.
     """
     from ...backends.binary import is_binary
-    from ...backends.compiled import read_spec
+    from ...backends.compiled import ENGINE_ERRORS, read_spec, reason_of
 
     for path in filter(is_binary, (taker, giver)):
         raise ModelError(f"{path.name} is binary: no part of it can be given, or replaced")
-    to, of = read_spec(taker), read_spec(giver)
+    try:
+        to, of = read_spec(taker), read_spec(giver)
+    except (ValueError, *ENGINE_ERRORS) as error:
+        reason = reason_of(error)
+        raise ModelError(f"{taker.name} with parts of {giver.name}: {reason}") from error
     if "actuators" in parts:
         _delete(to, to.actuators)
         for actuator in of.actuators:
@@ -229,8 +233,8 @@ def with_parts(
             _copy(to.worldbody.add_geom(name=geom.name), geom)
     try:
         return to.compile()
-    except (ValueError, require("mujoco").FatalError) as error:
-        reason = one_line(error)
+    except (ValueError, *ENGINE_ERRORS) as error:
+        reason = reason_of(error)
         raise ModelError(f"{taker.name} with parts of {giver.name}: {reason}") from error
 
 

@@ -87,7 +87,7 @@ def _without_missing_meshes(path: Path, name: str) -> Robot | None:
         for mesh in missing.values():
             spec.delete(mesh)
         raw = spec.compile()
-    except (ValueError, mujoco.FatalError):
+    except (ValueError, MemoryError, RuntimeError, mujoco.FatalError):
         return None
     robot = describe(raw, name)
     files = few(sorted(mesh.file for mesh in missing.values()), 5)
