@@ -10,6 +10,7 @@ import importlib.util
 import os
 import signal
 import sys
+import traceback
 
 
 def main() -> int:
@@ -30,7 +31,12 @@ def main() -> int:
     handler = signal.getsignal(signal.SIGINT)
     if handler is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from statemachine.cli import main as run
+    try:
+        from statemachine.cli import main as run
+    except Exception:  # a broken installation; exit code 1 would be an answer
+        traceback.print_exc()
+        print("statemachine: it cannot be imported, for the reason above", file=sys.stderr)
+        return 70
 
     signal.signal(signal.SIGINT, handler)
     return run()

@@ -7,13 +7,14 @@ band of a gap in which nothing can be concluded.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, TraceError, refuse
+from ..errors import BadInputError, EngineWarning, TraceError, refuse
 from ..interface import Array, Data, Ints, JointType, Model
 from ..measures import amount, common_moments
 from ..page import Figures
@@ -128,13 +129,15 @@ def perturbed_run(
     )  # fmt: skip
     controller = nudged_controller(rerun.controller(rerun.model), draw)
     qpos, qvel = nudged_start(rerun.model, qpos, qvel, draw)
-    return rerun.record(
-        controller=controller,
-        qpos=qpos,
-        qvel=qvel,
-        derive=derive,
-        progress=progress,
-    )
+    # What an engine warns of, and what is wrong with the start, is told of the run itself.
+    with warnings.catch_warnings(action="ignore", category=EngineWarning):
+        return rerun.record(
+            controller=controller,
+            qpos=qpos,
+            qvel=qvel,
+            derive=derive,
+            progress=progress,
+        )
 
 
 def displaced(

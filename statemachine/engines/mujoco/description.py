@@ -36,7 +36,7 @@ from ._sides import inertial_of, name_of, placed
 from .differences import settings_of
 
 _FORMATS = {".mjb": "MJB", ".urdf": "URDF"}
-_ON_JOINT, _ON_JOINT_IN_PARENT = 0, 1  # mjtTrn: only of these the target of an actuator is a joint
+_ON_JOINT, _ON_JOINT_IN_PARENT, _SO3 = 0, 1, 6  # mjtTrn
 
 
 def read_file(path: Path, name: str) -> Robot:
@@ -254,7 +254,10 @@ def _effort(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> float | No
 
 def _drives_a_joint(raw: Any, i: int) -> bool:
     """Tell whether the target of an actuator is a joint."""
-    return int(raw.actuator_trntype[i]) in (_ON_JOINT, _ON_JOINT_IN_PARENT)
+    transmission = int(raw.actuator_trntype[i])
+    if transmission == _SO3:  # of a ball joint, unless it turns a site in the frame of another
+        return int(raw.actuator_trnid[i, 1]) < 0
+    return transmission in (_ON_JOINT, _ON_JOINT_IN_PARENT)
 
 
 def _most(raw: Any, i: int, drive: Actuator) -> float:
