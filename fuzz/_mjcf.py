@@ -17,6 +17,20 @@ _AXES = ("1 0 0", "0 1 0", "0 0 1", "0.6 0 0.8")
 _SOLREF = ("0.02 1", "0.005 0.7", "-100 -10")
 _TETRAHEDRON = "0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"
 _FRAMES = ("body", "xbody", "geom", "site", "camera")  # what a sensor of a frame may be of
+_ACTUATORS = (
+    *("motor", "motor", "position", "position", "velocity", "general", "general", "general body"),
+    *("damper", "intvelocity", "cylinder", "adhesion", "orientation", "pid"),
+)
+# What an actuator of a kind cannot do without.
+_GAINS: dict[str, dict[str, str]] = {
+    "position": {"kp": "5"},
+    "velocity": {"kv": "0.5"},
+    "damper": {"kv": "0.5", "ctrlrange": "0 1"},
+    "adhesion": {"ctrlrange": "0 1"},
+    "intvelocity": {"kp": "5", "actrange": "-1 1"},
+    "orientation": {"kp": "5"},
+    "pid": {"kp": "5"},
+}
 # Attributes by which an element refers to others, so that a name that is changed is changed there.
 _REFERENCES = {
     *("joint", "joint1", "joint2", "jointinparent", "body", "body1", "body2", "geom", "geom1"),
@@ -199,44 +213,53 @@ class Drawer:
             kinds += [["free"], ["freejoint"]]
         chosen = self.draw.choice(kinds)
         for kind in chosen:
-            if kind == "freejoint":
-                joint = SubElement(body, "freejoint")
-            else:
-                joint = SubElement(body, "joint", type=kind)
-                self._user(joint)
             if kind in ("free", "freejoint"):
-                self.named(joint, "free joint")
-                self.names.qpos.append("0 0 0.5 1 0 0 0")
-                self.names.nv += 6
-                continue
-            if kind == "ball":
-                self.named(joint, "ball joint")
-                self.names.qpos.append("1 0 0 0")
-                self.names.nv += 3
-                if self.chance(0.3):
-                    joint.set("range", "0 1")
+                self._free(body, kind)
             else:
-                self.named(joint, "scalar joint")
-                self.names.qpos.append("0.1")
-                self.names.nv += 1
-                joint.set("axis", self.draw.choice(_AXES))
-                if self.chance(0.4):
-                    joint.set("range", self.draw.choice(["-1 1", "0 0.5", "-0.3 2"]))
-                if self.chance(0.1):
-                    joint.attrib |= {"ref": "0.1", "springref": "0.2"}
-                if self.chance(0.1):
-                    joint.attrib |= {"actuatorfrcrange": "-3 3"}
-            if self.chance(0.3):
-                joint.set("pos", self.vector(0.1))
-            for name, value in (
-                ("damping", "0.5"),
-                ("armature", "0.01"),
-                ("frictionloss", "0.1"),
-                ("stiffness", "2"),
-            ):
-                if self.chance(0.2):
-                    joint.set(name, value)
+                self._joint(body, kind)
         return bool(chosen)
+
+    def _free(self, body: Element, kind: str) -> None:
+        """Add a free joint, written in one of the two ways."""
+        if kind == "freejoint":
+            joint = SubElement(body, "freejoint")
+        else:
+            joint = SubElement(body, "joint", type="free")
+        self.named(joint, "free joint")
+        self.names.qpos.append("0 0 0.5 1 0 0 0")
+        self.names.nv += 6
+
+    def _joint(self, body: Element, kind: str) -> None:
+        """Add a ball, a hinge or a slide."""
+        joint = SubElement(body, "joint", type=kind)
+        self._user(joint)
+        if kind == "ball":
+            self.named(joint, "ball joint")
+            self.names.qpos.append("1 0 0 0")
+            self.names.nv += 3
+            ranges = ["0 1"]
+        else:
+            self.named(joint, "scalar joint")
+            self.names.qpos.append("0.1")
+            self.names.nv += 1
+            ranges = ["-1 1", "0 0.5", "-0.3 2"]
+            joint.set("axis", self.draw.choice(_AXES))
+            if self.chance(0.1):
+                joint.attrib |= {"ref": "0.1", "springref": "0.2"}
+            if self.chance(0.1):
+                joint.set("actuatorfrcrange", "-3 3")
+        if self.chance(0.4):
+            joint.set("range", self.draw.choice(ranges))
+        if self.chance(0.3):
+            joint.set("pos", self.vector(0.1))
+        for name, value in (
+            ("damping", "0.5"),
+            ("armature", "0.01"),
+            ("frictionloss", "0.1"),
+            ("stiffness", "2"),
+        ):
+            if self.chance(0.2):
+                joint.set(name, value)
 
     def _geom(self, body: Element) -> None:
         sizes = {"sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 2, "box": 3}
@@ -349,54 +372,49 @@ class Drawer:
         return self.draw.choice(ways) if ways else {}
 
     def _actuator(self, actuators: Element) -> None:
-        way, bodies = self._transmission(), self.names.known("body")
-        kind = self.draw.choice(
-            ["motor", "motor", "position", "position", "velocity", "general", "general", "damper"]
-            + ["intvelocity", "cylinder", "adhesion", "general body", "orientation", "pid"]
-        )
-        if kind in ("adhesion", "general body"):
-            if not bodies:
-                return
-            way = {"body": self.draw.choice(bodies)}
-            kind = kind.removesuffix(" body")
-        elif kind == "orientation":
-            balls = self.names.known("ball joint")
-            if not balls:
-                return
-            way = {"joint": self.draw.choice(balls)}
-        elif not way:
+        kind = self.draw.choice(_ACTUATORS)
+        way = self._target(kind)
+        if not way:
             return
-        actuator = SubElement(actuators, kind, way)
+        actuator = SubElement(actuators, kind.removesuffix(" body"), way)
         self.named(actuator, "actuator")
         self._user(actuator)
         self.names.nu += 1
-        if kind in ("adhesion", "damper"):
-            actuator.attrib |= {"ctrlrange": "0 1"}
-        elif self.chance(0.5):
-            actuator.set("ctrlrange", self.draw.choice(["-1 1", "0 5", "-0.3 0.2"]))
-        if kind == "intvelocity":
-            actuator.set("actrange", "-1 1")
-        if kind in ("position", "intvelocity", "orientation", "pid"):
-            actuator.set("kp", self.draw.choice(["1", "5", "20"]))
-        if kind in ("velocity", "damper"):
-            actuator.set("kv", "0.5")
+        if kind == "orientation":
+            self.names.nu += 2
         if kind == "pid" and self.chance(0.5):
             actuator.set("input", "pos vel")
             self.names.nu += 1
-        if kind == "orientation":
-            self.names.nu += 2
-        if kind == "general":
-            dynamics = self.draw.choice(["none", "integrator", "filter", "filterexact"])
-            if dynamics != "none":
-                actuator.attrib |= {"dyntype": dynamics, "dynprm": "0.1"}
-            if self.chance(0.5):
-                actuator.attrib |= {"gainprm": "3", "biastype": "affine", "biasprm": "0 -3 -0.1"}
+        for name, value in _GAINS.get(kind, {}).items():
+            actuator.set(name, value)
+        if "ctrlrange" not in actuator.attrib and self.chance(0.5):
+            actuator.set("ctrlrange", self.draw.choice(["-1 1", "0 5", "-0.3 0.2"]))
+        if actuator.tag == "general":
+            self._dynamics(actuator)
         if kind != "orientation" and self.chance(0.3):
             actuator.set("forcerange", "-2 2")
         if kind in ("motor", "position") and self.chance(0.1):
             actuator.attrib |= {"delay": "0.02", "nsample": "12"}
         if self.chance(0.1):
             actuator.set("group", "1")
+
+    def _target(self, kind: str) -> dict[str, str]:
+        """Return the attributes of what an actuator of a kind acts on; none where there is none."""
+        if kind in ("adhesion", "general body"):
+            targets = self.names.known("body")
+            return {"body": self.draw.choice(targets)} if targets else {}
+        if kind == "orientation":
+            targets = self.names.known("ball joint")
+            return {"joint": self.draw.choice(targets)} if targets else {}
+        return self._transmission()
+
+    def _dynamics(self, actuator: Element) -> None:
+        """Give a general actuator a state of its own and gains, now and then."""
+        dynamics = self.draw.choice(["none", "integrator", "filter", "filterexact"])
+        if dynamics != "none":
+            actuator.attrib |= {"dyntype": dynamics, "dynprm": "0.1"}
+        if self.chance(0.5):
+            actuator.attrib |= {"gainprm": "3", "biastype": "affine", "biasprm": "0 -3 -0.1"}
 
     def _equalities(self, root: Element) -> None:
         equalities = SubElement(root, "equality")

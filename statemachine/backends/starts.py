@@ -1,4 +1,4 @@
-"""Shapes that are inside each other in the state that a run starts in, and what that state is called.
+"""Shapes inside each other in the state that a run starts in, and what that state is called.
 
 Contacts throw such a robot apart, with forces that no design meant. What is told of is the state
 that is used: another one may be free of that, or alone have it.
