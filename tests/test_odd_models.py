@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+import statemachine as sm
 from fuzz import random_models
 from statemachine.engines.mujoco.description import read
 from statemachine.sweep.analysis_runs import _joints
@@ -18,7 +19,8 @@ from .small_models import loaded, mjcf
 # A mocap body leads a free one by a weld; the file has no keyframe.
 LED = mjcf(
     '<body name="target" mocap="true" pos="0.2 0 0.6"><geom size=".01" contype="0"'
-    ' conaffinity="0"/></body><body name="hand" pos="0 0 .5"><freejoint/><geom size=".05"/><site name="tip"/></body>',
+    ' conaffinity="0"/></body>'
+    '<body name="hand" pos="0 0 .5"><freejoint/><geom size=".05"/><site name="tip"/></body>',
     '<equality><weld body1="target" body2="hand" relpose="{relpose}"/></equality>',
 )
 # More sites than joints: the number of a site is the number of no joint.
@@ -92,6 +94,20 @@ def test_a_lesson_on_runs_refuses_a_model_in_which_nothing_moves(here: Cli, tmp_
     file = written(tmp_path / "still.xml", mjcf('<body><geom size=".1"/></body>'))
     said = here("lesson", "replay", "--model", file, "--no-questions", code=2).stderr
     assert "has no joints" in said
+
+
+# Two hinges of one body about one axis: its mass matrix has no inverse.
+TWICE = mjcf(
+    '<body><joint axis="0 1 0"/><joint axis="0 1 0"/><geom size=".1" pos=".1 0 0"/></body>'
+    '<body pos="0 1 0"><joint axis="0 1 0" armature=".1"/><geom size=".1" pos=".1 0 0"/></body>'
+)
+
+
+def test_two_joints_about_one_axis_are_loaded_by_pybullet(tmp_path: Path) -> None:
+    pytest.importorskip("pybullet")
+    file = written(tmp_path / "m.xml", TWICE)
+    with sm.make_data(sm.load(file, backend="pybullet")) as data:
+        assert data.qpos.tolist() == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("seed", range(12))
