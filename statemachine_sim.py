@@ -21,6 +21,7 @@ if _HANDLER is _signal.default_int_handler:
 import importlib.util  # noqa: E402
 import os  # noqa: E402
 import sys  # noqa: E402
+import traceback  # noqa: E402
 
 
 def main() -> int:
@@ -36,7 +37,12 @@ def main() -> int:
                 file=sys.stderr,
             )
             return 2
-    from statemachine.cli import main as run
+    try:
+        from statemachine.cli import main as run
+    except Exception:  # a broken installation; exit code 1 would be an answer
+        traceback.print_exc()
+        print("statemachine: it cannot be imported, for the reason above", file=sys.stderr)
+        return 70
 
     try:
         if _HANDLER is _signal.default_int_handler:

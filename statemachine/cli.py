@@ -8,6 +8,7 @@ import importlib
 import io
 import os
 import sys
+import traceback
 import warnings
 from collections.abc import Collection, Sequence
 from contextlib import suppress
@@ -15,7 +16,15 @@ from typing import Any, NoReturn
 
 from . import __version__
 from .commands import COMMANDS, FIRST
-from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, check_rules, complain
+from .commands._common import (
+    BAD_INPUT,
+    FAULT,
+    MISSING,
+    NO_OUTPUT,
+    PROGRAM,
+    check_rules,
+    complain,
+)
 from .errors import EngineWarning, MissingEngineError, StateMachineError, did_you_mean
 from .installed import raise_if_interrupted
 from .report.terminal import spelled
@@ -94,7 +103,12 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return its exit code: 0 well, 1 the result says no, 2 bad input."""
+    """Run a command and return its exit code.
+
+    0: well. 1: the result says no. 2: bad input. 3: an engine is missing. 70: a fault of this
+    program, with a traceback. 74: nowhere to write. 130: interrupted. 141: the reader of a pipe
+    left.
+    """
     # Closed by the caller, as by >&- or 2>&-.
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
@@ -133,7 +147,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise_if_interrupted(error)
         except KeyboardInterrupt:  # while something was imported, which made that fail
             return 130
-        raise
+        return _report_fault(error)
+
+
+def _report_fault(error: Exception) -> int:
+    """Print an exception that nobody meant to raise, with its traceback, for a report.
+
+    Its exit code is one of its own: 1 is an answer, such as that two sides differ.
+    """
+    traceback.print_exception(error, file=sys.stderr)
+    text = (
+        f"this is a fault of {PROGRAM}, and no answer; please report it, with the lines above and "
+        "the files that you gave"
+    )
+    return complain(text, FAULT)
 
 
 def _options(words: list[str]) -> argparse.Namespace:

@@ -25,6 +25,7 @@ import pytest
 from statemachine import backends, load, releases
 from statemachine.backends import backend_engine, backend_names
 from statemachine.cli import main
+from statemachine.commands._common import FAULT
 from statemachine.errors import EngineWarning, MissingEngineError, StateMachineError
 from statemachine.installed import ENGINES, engine_version, require
 from statemachine.interface import Data, Model, forward, make_data, reset, step
@@ -503,6 +504,7 @@ def here(
             words, ended, *capsys.readouterr()
         )
         assert code in (None, ended), done.stderr
+        assert ended != FAULT or code == FAULT, done.stderr
         return done
 
     return run

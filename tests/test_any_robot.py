@@ -423,12 +423,54 @@ def test_shapes_inside_each_other_at_the_start_are_told(model: Any) -> None:
     raw = mujoco.MjData(robot.raw)
     mujoco.mj_forward(robot.raw, raw)
     assert raw.contact.dist.tolist() == pytest.approx([-0.15])
-    run = record_scenario(SCENARIOS["hold"], robot, seconds=0.02)
+    with pytest.warns(errors.EngineWarning, match="in the default state: lower on upper by 150"):
+        run = record_scenario(SCENARIOS["hold"], robot, seconds=0.02)
     assert sum("lower on upper by 150 mm" in note for note in compare(run, run).notes) == 2
     row = examine(robot.path, ExaminedModel("robot.xml", "", ""), True, 0, lambda *_: None)
     assert row.inside == ("lower on upper by 150 mm",)
     survey = Survey("mujoco", [row, row], [], "")
     assert "2 of 2: robot.xml, lower on upper by 150 mm" in words(survey_page(survey))
+
+
+# At rest 150 mm of the one are in the other, at home 100 mm; the first keyframe has them apart.
+TOLD_OF = INSIDE.format(
+    rest='<keyframe><key name="apart" qpos="0 1"/><key name="home" qpos="0 .05"/></keyframe>'
+).replace("motor", "position")
+HOME_INSIDE = "inside each other in the keyframe 'home': lower on upper by 100 mm"
+AT_REST_INSIDE = "inside each other in the default state: lower on upper by 150 mm"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("compare hold a.xml", HOME_INSIDE),
+        ("compare idle.py:idle a.xml", AT_REST_INSIDE),
+        ("compare idle.py:idle a.xml --keyframe apart", ""),
+        ("compare fall a.xml", ""),  # nothing can touch
+        ("trace record hold a.xml", HOME_INSIDE),
+        ("trace record idle.py:idle a.xml --keyframe apart", ""),
+        ("trace record idle.py:idle a.xml --keyframe home", HOME_INSIDE),
+        ("lesson gravity --model a.xml", HOME_INSIDE),
+    ],
+)
+def test_the_state_that_is_told_of_is_the_one_that_a_run_starts_in(
+    words: str, told: str, here: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("statemachine.cli._SAID", set())
+    written(tmp_path / "a.xml", TOLD_OF)
+    written(tmp_path / "idle.py", "def idle(model, data): return None")
+    if "compare" in words:
+        words += " timestep=.001 a.xml timestep=.002"
+    said = here(*words.split(), "--seconds", "0.02").stderr
+    assert said.count("inside each other") == bool(told), said
+    assert told in said
+
+
+def test_load_and_robots_name_and_test_the_usual_start(model: Any) -> None:
+    with pytest.warns(errors.EngineWarning, match=HOME_INSIDE):
+        robot = model(TOLD_OF)
+    row = examine(robot.path, ExaminedModel("robot.xml", "", ""), True, 0, lambda *_: None)
+    assert row.inside == ("lower on upper by 100 mm",)
 
 
 @pytest.mark.parametrize(

@@ -359,3 +359,11 @@ def test_seeds_may_be_an_array_of_numbers() -> None:
     with closing(_make_vec(REACH, "mujoco", 2)) as envs:
         listed, as_array = (envs.reset(seed=seed)[0] for seed in ([3, 4], np.array([3, 4])))
         assert np.array_equal(listed, as_array)
+
+
+def test_another_model_and_an_unknown_option_are_refused() -> None:
+    for make in (partial(_make, REACH, "mujoco"), partial(_make_vec, REACH, "mujoco", 2)):
+        refused(
+            (BadInputError, "take no other model", lambda make=make: make(model="so101")),
+            (UnknownNameError, "frame_skip", lambda make=make: make(frame_skp=2)),
+        )

@@ -202,6 +202,28 @@ def test_what_no_command_expects_is_one_line(
     one_line(here("doctor"), says, code)
 
 
+def test_an_exception_that_nobody_meant_has_an_exit_code_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, here: Cli
+) -> None:
+    """Never 1, which is an answer; with the traceback, and a line that says whose fault it is."""
+    fault = Mock(side_effect=IndexError("index 1 is out of bounds"))
+    monkeypatch.setattr("statemachine.commands.doctor.run", fault)
+    lines = here("doctor", code=70).stderr.splitlines()
+    assert lines[0] == "Traceback (most recent call last):"
+    assert lines[-2] == "IndexError: index 1 is out of bounds"
+    assert lines[-1].startswith("statemachine: this is a fault of statemachine")
+
+
+def test_a_package_that_cannot_be_imported_is_no_answer_either() -> None:
+    done = of_python(
+        "-c",
+        "import sys, statemachine; sys.modules['statemachine.cli'] = None\n"
+        "import statemachine_sim; sys.exit(statemachine_sim.main())",
+    )
+    assert done.returncode == 70
+    assert "Traceback" in done.stderr
+
+
 def test_an_import_that_an_interrupt_broke_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(_options: object) -> int:
         try:

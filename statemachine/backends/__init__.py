@@ -11,6 +11,7 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable
+from contextvars import ContextVar
 from functools import partial
 from typing import Any, Protocol, cast
 
@@ -18,14 +19,13 @@ from ..errors import BadInputError, EngineWarning, MissingEngineError, check_nam
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
 from ..interface.records import Defaults
-from ..measures import ContactNames, overlaps
-from ..measures.text import few
 from ..model_files import checked_file
 from ..models import AnyPath
 from ..releases import is_release, version_of
 from ._hidden_data import HiddenData, HiddenModel
 from ._hidden_world import HiddenWorld, Moment
 from .binary import is_binary, read_binary
+from .starts import overlap_warning, places_in, usual_start
 
 __all__ = [
     "HiddenData",
@@ -37,8 +37,8 @@ __all__ = [
     "backend_names",
     "check_backend",
     "load",
+    "load_to_run",
     "loaders",
-    "overlaps_at_start",
     "register",
 ]
 
@@ -125,8 +125,9 @@ def load(
 ) -> Model:
     """Compile a model's file into a Model. The slow part, done once.
 
-    Shapes that are more than 1 mm inside each other at the start are an EngineWarning, unless
-    contacts are off.
+    Shapes that are more than 1 mm inside each other at the usual start are an EngineWarning that
+    names this state: the keyframe "home" if there is one, else the default state. Where contacts
+    are off nothing is said.
 
     Args:
         model: A name ("so101/scene_box") or a path; see `models.resolve`.
@@ -169,23 +170,30 @@ def load(
     loaded = loader(path, defaults=defaults, **early)
     if options and not takes_options:
         loaded = loaded.replace(**options)
-    if options.get("contacts", True) and (pairs := few(overlaps_at_start(loaded))):
-        text = f"{path.name}: shapes are inside each other in the default state: {pairs}"
+    if not _TOLD_BY_THE_RUN.get() and (text := _of_usual_start(loaded)):
         warnings.warn(text, EngineWarning, stacklevel=2)
     return loaded
 
 
-def overlaps_at_start(model: Model) -> list[str]:
-    """Shapes that start inside each other, as `measures.overlaps` has them.
+def _of_usual_start(model: Model) -> str:
+    return overlap_warning(model, places_in(model, usual_start(model)))
 
-    The start is that of all experiments: the keyframe "home" if there is one, else the default
-    state. Nothing is said of a Model that does not start from a compiled one.
+
+# Whether `load` leaves it to its caller to tell of shapes inside each other.
+_TOLD_BY_THE_RUN: ContextVar[bool] = ContextVar("told by the run", default=False)
+
+
+def load_to_run(model: AnyPath, backend: str = DEFAULT, **arguments: Any) -> Model:
+    """Load a Model as `load` does, and say nothing of shapes inside each other.
+
+    It is for what knows in which state its run starts, and tells of that state itself: the usual
+    start, of which `load` tells, may be another one.
     """
-    if model.compiled is None:
-        return []
-    from .compiled import contacts_at_start
-
-    return overlaps(ContactNames.of(model), *contacts_at_start(model.compiled))
+    token = _TOLD_BY_THE_RUN.set(True)
+    try:
+        return load(model, backend, **arguments)
+    finally:
+        _TOLD_BY_THE_RUN.reset(token)
 
 
 def on_default(model: Model) -> Model:

@@ -193,9 +193,14 @@ def _padding(raw: mujoco.MjModel) -> Array:
         mass = np.zeros((raw.nv, raw.nv))
         mujoco.mj_fullM(raw, data, mass)
         bare = mass - np.diag(raw.dof_armature)
-        # In halves, until this pose bears it too.
-        while _worst(mass, bare + _padding_at(raw, data, share)) > _BEARABLE:
-            share = share / 2
+        try:
+            # In halves, until this pose bears it too.
+            while _worst(mass, bare + _padding_at(raw, data, share)) > _BEARABLE:
+                share = share / 2
+        except np.linalg.LinAlgError:
+            # Two joints that turn about one axis here: no engine can step from such a pose, and
+            # whether it would bear more inertia has no answer.
+            continue
     return share
 
 

@@ -16,7 +16,7 @@ import math
 import os
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -125,14 +125,22 @@ def compile_file(path: AnyPath) -> mujoco.MjModel:
     return raw
 
 
-def contacts_at_start(raw: mujoco.MjModel) -> tuple[Ints, Array]:
-    """Geoms (n, 2) and distances (n,) [m] of contacts in the keyframe "home", or at first."""
+def contacts_in(raw: mujoco.MjModel, inputs: Mapping[str, Array]) -> tuple[Ints, Array]:
+    """Find the contacts in a state, in which nothing has been stepped yet.
+
+    Args:
+        raw: The compiled model.
+        inputs: "qpos" (nq,), "mocap_pos" (nmocap, 3) and "mocap_quat" (nmocap, 4) of the state;
+            what is not given is as in the default state.
+
+    Returns:
+        Geoms (n, 2) and distances (n,) [m].
+    """
     try:
         with compiler_warnings():
             data = mujoco.MjData(raw)
-            key = mujoco.mj_name2id(raw, mujoco.mjtObj.mjOBJ_KEY, "home")
-            if key >= 0:
-                mujoco.mj_resetDataKeyframe(raw, data, key)
+            for name, values in inputs.items():
+                getattr(data, name)[:] = values
             for stage in ("kinematics", "comPos", "flex", "collision"):
                 getattr(mujoco, f"mj_{stage}")(raw, data)
     except ENGINE_ERRORS:  # who makes a Data is told of it

@@ -23,8 +23,9 @@ from ..installed import DEFAULT
 from ..typed_numbers import typed_float, typed_int
 
 PROGRAM = "statemachine"
-# Exit codes: the result says no; bad input; an engine is missing; nowhere to write.
-SAYS_NO, BAD_INPUT, MISSING, NO_OUTPUT = 1, 2, 3, 74
+# Exit codes: the result says no; bad input; an engine is missing; a fault of this program; nowhere
+# to write. The last two are those of sysexits.h.
+SAYS_NO, BAD_INPUT, MISSING, FAULT, NO_OUTPUT = 1, 2, 3, 70, 74
 
 
 def complain(error: Exception | str, code: int) -> int:
@@ -228,7 +229,7 @@ def on_each_backend(
         model: A model's name or file.
         run: Called with the Model, the backend's name and what is told the fraction that is done.
     """
-    from ..backends import backend_names, load
+    from ..backends import backend_names, load_to_run
     from ..report.terminal import progress
 
     everyone = options.backend == "all"
@@ -236,7 +237,7 @@ def on_each_backend(
     missing: list[StateMachineError] = []
     for backend in backend_names() if everyone else [options.backend]:
         try:
-            loaded = load(model, backend=backend, menagerie=options.menagerie)
+            loaded = load_to_run(model, backend=backend, menagerie=options.menagerie)
         except (MissingEngineError, ModelError, UnsupportedError) as error:
             if not everyone:
                 raise

@@ -105,7 +105,7 @@ def run_record(options: argparse.Namespace) -> int:
             f"record what? An experiment ({', '.join(EXPERIMENTS)}) or FILE.py:FUNCTION",
         )
     )
-    from ..backends import load
+    from ..backends import load_to_run
     from ..compare import Request
     from ..report.terminal import progress
     from ..runs import record_scenario
@@ -114,7 +114,7 @@ def run_record(options: argparse.Namespace) -> int:
     asked = Request((options.what,), keyframe=options.keyframe).scenario()
     name = function_file(options.what).stem
     target = _target(options.output, f"{name}.{options.backend}.npz")
-    model = load(
+    model = load_to_run(
         options.model or asked.model or "so101/scene",
         backend=options.backend,
         defaults=options.defaults,
@@ -136,7 +136,7 @@ def run_record(options: argparse.Namespace) -> int:
 
 def run_play(options: argparse.Namespace) -> int:
     """Play a trace's commands on an engine, and write what came of it."""
-    from ..backends import load
+    from ..backends import load_to_run
     from ..report.terminal import progress
     from ..runs import model_file, play, read
 
@@ -147,7 +147,7 @@ def run_play(options: argparse.Namespace) -> int:
         if options.model
         else model_file(trace.header, options.menagerie, options.file)
     )
-    model = load(
+    model = load_to_run(
         file,
         backend=options.backend,
         defaults=options.defaults,

@@ -94,14 +94,19 @@ def run(options: argparse.Namespace) -> int:
 
 def _simulate(options: argparse.Namespace, name: str, port: int) -> int:
     """A session on one engine or two."""
-    from ..backends import load
+    from ..backends import load_to_run
+    from ..backends.starts import overlap_warning, places_in
     from ..drawing import drawing_of
     from ..releases import engine_of
     from ..view.session import LiveSession
 
     backends = [name for name in (options.backend, options.ghost) if name]
-    models = [load(name, backend=backend, menagerie=options.menagerie) for backend in backends]
+    models = [
+        load_to_run(name, backend=backend, menagerie=options.menagerie) for backend in backends
+    ]
     keyframe = _keyframe(options.keyframe, models[0])
+    if text := overlap_warning(models[0], places_in(models[0], keyframe)):
+        complain(text, 0)
     engines = " and ".join(f"{engine_of(model.backend)} {model.engine_version}" for model in models)
     with LiveSession(models, keyframe, options.site) as session:
         _serve(options, session, drawing_of(models[0]), keyframe, port, f"{name} on {engines}")

@@ -9,6 +9,7 @@ chance; a gap above three times the floor is more than that; between the two nob
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -16,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import BadInputError, EngineError, TraceError, refuse
+from ..errors import BadInputError, EngineError, EngineWarning, TraceError, refuse
 from ..interface import Array, Data, Ints, JointType, Model
 from ..measures import amount, common_moments, same_pairs
 from ..processes.parallel import forks_for, in_forks
@@ -153,13 +154,15 @@ def perturbed_run(
     )  # fmt: skip
     controller = nudged_controller(rerun.controller(rerun.model), draw)
     qpos, qvel = nudged_start(rerun.model, qpos, qvel, draw)
-    return rerun.record(
-        controller=controller,
-        qpos=qpos,
-        qvel=qvel,
-        derive=derive,
-        progress=progress,
-    )
+    # What an engine warns of, and what is wrong with the start, is told of the run itself.
+    with warnings.catch_warnings(action="ignore", category=EngineWarning):
+        return rerun.record(
+            controller=controller,
+            qpos=qpos,
+            qvel=qvel,
+            derive=derive,
+            progress=progress,
+        )
 
 
 def displaced(

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..backends import backend_names, check_backend, load
+from ..backends import backend_names, check_backend, load_to_run
 from ..engines import room
 from ..errors import BadInputError, StateMachineError, check_name, refuse, shown, unknown_name
 from ..installed import DEFAULT, PAIR
@@ -76,7 +76,7 @@ class Side:
         """
         options |= self.options
         load_it = partial(
-            load,
+            load_to_run,
             self.file,
             backend=self.engine,
             defaults=self.defaults,
@@ -112,7 +112,7 @@ class TakenParts:
         Raises:
             StateMachineError: It cannot be made.
         """
-        giver = load(self.of.file, menagerie=self.of.menagerie)
+        giver = load_to_run(self.of.file, menagerie=self.of.menagerie)
         matched = match_models(giver, model, self.names)
         pairs = {"joint": matched.joints, "body": matched.bodies, "site": matched.sites}
         names = {

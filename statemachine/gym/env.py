@@ -17,7 +17,7 @@ from ..engines.pictures import LivePictures, renderer_here
 from ..errors import BadInputError, ClosedDataError, DivergedError, EngineError, check_name
 from ..installed import DEFAULT
 from ..interface import Array, forward, make_data, reset, step
-from .tasks import Task, make_task
+from .tasks import Task, make_task, refuse_unknown
 
 RENDER_MODES = ("rgb_array",)
 SIZE = (480, 360)  # pixels
@@ -118,6 +118,7 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
         backend: str = DEFAULT,
         frame_skip: int = FRAME_SKIP,
         render_mode: str | None = None,
+        **unknown: Any,
     ) -> None:
         """Load the model and make one Data.
 
@@ -126,12 +127,14 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
             backend: The engine to run it on.
             frame_skip: Timesteps of a control step.
             render_mode: "rgb_array" or None.
+            **unknown: Is refused: a task has no further options, and no other model.
 
         Raises:
-            UnknownNameError: There is no such task, backend or render mode.
+            UnknownNameError: There is no such task, backend, render mode or option.
             MissingEngineError: The engine is not installed here.
             BadInputError: `frame_skip` is not a whole number of at least 1.
         """
+        refuse_unknown(unknown, ("backend", "frame_skip", "render_mode"))
         self.task = make_task(task, backend, frame_skip)
         self.model, self.data = self.task.model, make_data(self.task.model)
         self.render_mode = render_mode

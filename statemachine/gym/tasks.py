@@ -7,13 +7,14 @@ and many worlds get the same bits.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..backends import load
-from ..errors import check_name
+from ..errors import BadInputError, check_name
 from ..interface import Array, Model, forward, make_data
 from ..interface.options import as_count, as_vector
 from ..page import Figures
@@ -215,6 +216,26 @@ class HeldBox(Task):
 
 
 TASKS: dict[str, type[Task]] = {task.name: task for task in (Reach, HeldBox)}
+
+
+def refuse_unknown(given: Mapping[str, object], known: Sequence[str]) -> None:
+    """Refuse an option that the environments do not have.
+
+    Args:
+        given: What was given beyond their options, by name.
+        known: Names of their options.
+
+    Raises:
+        BadInputError: It is another model.
+        UnknownNameError: It is another option.
+    """
+    if "model" in given:
+        raise BadInputError(
+            "the tasks are of the SO-101 with its scenes, and take no other model; write an Env of "
+            "your own on sm.load, sm.reset and sm.step"
+        )
+    for name in given:
+        check_name("option", name, known)
 
 
 def make_task(name: str, backend: str, frame_skip: int) -> Task:

@@ -20,7 +20,7 @@ from ..interface import Array
 from ..interface.options import as_count
 from ..worlds import forward, make_worlds, reset, step
 from .env import FRAME_SKIP, TaskPictures, metadata_of
-from .tasks import make_task
+from .tasks import make_task, refuse_unknown
 
 _SEEN = "site_xpos"
 Flags = NDArray[np.bool_]
@@ -48,6 +48,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         workers: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
+        **unknown: Any,
     ) -> None:
         """Load the model and make the worlds.
 
@@ -61,12 +62,15 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
             autoreset_mode: When a world that ended starts anew: in the next step, in the same
                 one, or when `reset` is called with options["reset_mask"].
             render_mode: "rgb_array" or None.
+            **unknown: Is refused: a task has no further options, and no other model.
 
         Raises:
-            UnknownNameError: There is no such task, backend, mode of reset or of rendering.
+            UnknownNameError: There is no such task, backend, mode of reset or of rendering, option.
             MissingEngineError: The engine is not installed here.
             BadInputError: A number is not a whole number of at least 1.
         """
+        options = ("backend", "frame_skip", "workers", "autoreset_mode", "render_mode")
+        refuse_unknown(unknown, options)
         modes = [mode.value for mode in AutoresetMode]
         if not isinstance(autoreset_mode, AutoresetMode):
             check_name("autoreset mode", autoreset_mode, modes)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..engines import room
-from ..errors import UnsupportedError, check_name
+from ..errors import BadInputError, UnsupportedError, check_name
 from ..interface import Array, JointType, Model, get_state
 from ..interface.options import as_count
 from ..measures import largest
@@ -21,6 +21,17 @@ from ..runs.robot import body_pairs, command, is_the_arm
 from ._two_runs import BREAKS, broken, broken_table, growth, of_its_own, through_us, ways_back
 from .session import CodeRun, Options
 from .template import Results, by_engine, differences
+
+
+def fit(model: Model, options: Options) -> dict[str, Any]:
+    """Return the options of this lesson as they are.
+
+    Raises:
+        BadInputError: Nothing of the Model can move: there is no run that could be the same.
+    """
+    if not model.nq:
+        raise BadInputError(f"{model.path.name} has no joints, and this lesson compares their runs")
+    return dict(options)
 
 
 def code(model: Model, options: Options, load: str) -> str:

@@ -123,7 +123,7 @@ class CodeRun(ExitStack):
 
         def note(data: Data) -> None:
             if data not in courses:
-                warn_of_start(data.model, data.qpos)
+                warn_of_start(data.model, data)
                 courses[data] = Figures(ctrl=data.ctrl.copy(), time=[], qpos=[], looks=[])
             courses[data].time.append(data.time)
             courses[data].qpos.append(data.qpos.copy())

@@ -14,7 +14,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..backends import backend_names, load, overlaps_at_start
+from ..backends import backend_names, load_to_run
+from ..backends.starts import overlaps_in
 from ..engines import room
 from ..engines.auditing import SavePoint
 from ..errors import (
@@ -124,7 +125,7 @@ class _Examination:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
                 try:
-                    models[backend] = load(self.path, backend, **options)
+                    models[backend] = load_to_run(self.path, backend, **options)
                 except MissingEngineError:
                     raise
                 except StateMachineError as error:
@@ -153,7 +154,8 @@ class _Examination:
 
     def _sizes(self, model: Model) -> None:
         sizes = {name: int(getattr(model, name)) for name in ("nq", "nv", "nu", "nbody", "ngeom")}
-        self.row = replace(self.row, inside=tuple(overlaps_at_start(model)), **sizes)
+        inside = overlaps_in(model, gaps.keyframe_of(model))
+        self.row = replace(self.row, inside=tuple(inside), **sizes)
 
     def _equals_engine(self, model: Model) -> bool | None:
         own = room(model.backend)

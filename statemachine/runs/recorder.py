@@ -106,7 +106,7 @@ def record(
     share = 0.3 if derive else 1.0
     with make_data(model) as data:
         begin(model, data)
-        warn_of_start(model, data.qpos)
+        warn_of_start(model, data)
         inputs, ended = _run(model, data, controller, total, part_of(progress, 0.0, share))
     columns: dict[str, Any] = dict(inputs)
     rewritten, energy_by = 0, ""

@@ -9,8 +9,19 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..backends.starts import overlap_warning, usual_start
 from ..errors import BadInputError, EngineWarning, UnsupportedError
-from ..interface import Array, Contacts, JointType, Model, forward, make_data, reset
+from ..interface import (
+    MOCAP,
+    Array,
+    Contacts,
+    Data,
+    JointType,
+    Model,
+    forward,
+    make_data,
+    reset,
+)
 from ..interface.options import check_entries
 from ..measures import ContactNames
 from ..measures.text import few
@@ -121,13 +132,23 @@ _NO_FORCE = 1e-9  # N·m or N; less is rounding
 _DIGITS = 4  # of what is computed, so that it can be typed and is the same on every engine
 
 
-def warn_of_start(model: Model, qpos: Array) -> None:
-    """Issue an EngineWarning if a run starts outside of the limits of hinges or slides.
+def warn_of_start(model: Model, data: Data) -> None:
+    """Issue an EngineWarning of what is wrong with the state that a run starts in.
+
+    That is a hinge or a slide outside of its limits, and shapes inside each other.
 
     Args:
         model: What is run.
-        qpos: (nq,) where it starts.
+        data: In the state that it starts in.
     """
+    places = {name: getattr(data, name) for name in ("qpos", *MOCAP)}
+    if text := overlap_warning(model, places):
+        warnings.warn(text, EngineWarning, stacklevel=3)
+    _warn_of_limits(model, data.qpos)
+
+
+def _warn_of_limits(model: Model, qpos: Array) -> None:
+    """Warn of hinges and slides that are outside of their limits; `qpos` (nq,)."""
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     joints = np.flatnonzero(scalar & model.jnt_limited)
     starts = np.array([qpos, *(frame.qpos for frame in model.keyframes)])
@@ -143,12 +164,12 @@ def warn_of_start(model: Model, qpos: Array) -> None:
         names = [f.name for f, beyond in frames if f.name and beyond.max() <= _OUTSIDE]
         inside = _INSIDE.format(names=few(names, 3, " or ")) * bool(names)
         text = _START.format(joints=few(outside, 1), inside=inside)
-        warnings.warn(text, EngineWarning, stacklevel=3)
+        warnings.warn(text, EngineWarning, stacklevel=4)
 
 
 def home(model: Model) -> str | None:
     """The keyframe "home" if there is one, as is the custom; None for the default state."""
-    return "home" if any(frame.name == "home" for frame in model.keyframes) else None
+    return usual_start(model)
 
 
 def start_keyframe(model: Model) -> str | None:

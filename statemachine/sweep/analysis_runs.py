@@ -217,7 +217,7 @@ def facts_of(
 
 def _joints(model: Model, vary: Vary) -> set[int]:
     """The types of the joints that a factor is of."""
-    if vary.place in model.joint_names:
+    if vary.place and vary.place in model.joint_names:  # some joints have no name
         return {int(model.jnt_type[model.joint_id(vary.place)])}
     return set(model.jnt_type.tolist())
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import __version__
 from ..backends import backend_names, check_backend
+from ..backends.starts import overlap_warning, places_in
 from ..compare.perturbed import EXACT, parse_uncertainty
 from ..errors import MissingEngineError, StateMachineError, refuse
 from ..installed import require_extra
@@ -114,6 +115,7 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     chosen |= {v.name: v.extremes[0] for v in factors if v.kind == "parameter"}
     asked = sweep.scenario(chosen)
     _refused(models, lambda model: _check_run(asked, factors, model))
+    said += _overlaps_at_start(asked, models)
     return PreparedSweep(
         sweep,
         design,
@@ -209,6 +211,20 @@ def _check_run(scenario: Scenario, factors: Sequence[Vary], model: Model) -> Non
     variants = [model.replace(**options_at(model, [pair])) for pair in timesteps]
     for variant in variants or [model]:
         check_length(variant, scenario.seconds)
+
+
+def _overlaps_at_start(scenario: Scenario, models: Sequence[Model]) -> list[str]:
+    """Return a line for each file whose shapes are inside each other where its runs start."""
+    lines: list[str] = []
+    for model in models:
+        try:
+            keyframe = scenario.on(model).keyframe
+            line = overlap_warning(model, places_in(model, keyframe))
+        except StateMachineError:  # the cells of this model say so
+            continue
+        if line and line not in lines:
+            lines.append(line)
+    return lines
 
 
 def _cost(model: Model, seconds: float) -> float:

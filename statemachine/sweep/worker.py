@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .. import __version__
-from ..backends import load, on_default
+from ..backends import load_to_run, on_default
 from ..compare.perturbed import nudged_controller, nudged_start
 from ..errors import BadInputError, StateMachineError, TimedOutError, one_line
 from ..installed import DEFAULT, silence
@@ -183,7 +183,7 @@ def _model(
 def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, Any]) -> Model:
     """A model of a sweep as all of its cells load it."""
     defaults, menagerie = sweep.defaults, sweep.menagerie
-    return load(place, backend=backend, defaults=defaults, menagerie=menagerie, **options)
+    return load_to_run(place, backend=backend, defaults=defaults, menagerie=menagerie, **options)
 
 
 _LATEST: dict[str, Any] = {}

@@ -180,6 +180,7 @@ _ITS_OWN = {
 _TARGETS = {  # a transmission, and the kind of element that it acts on
     "mjTRN_JOINT": "joint",
     "mjTRN_JOINTINPARENT": "joint",
+    "mjTRN_SLIDERCRANK": "site",
     "mjTRN_SITE": "site",
     "mjTRN_BODY": "body",
 }
@@ -257,7 +258,7 @@ def _copy(to: Any, of: Any) -> None:
 def _act(to: Any, of: Any, names: Mapping[str, Mapping[str, str]]) -> None:
     """Copy an actuator, so that it acts on the counterpart of what it acts on."""
     _copy(to, of)
-    kinds = {"target": _TARGETS.get(of.trntype.name, ""), "refsite": "site"}
+    kinds = {"target": _TARGETS.get(of.trntype.name, ""), "refsite": "site", "slidersite": "site"}
     for end, kind in kinds.items():
         name = getattr(of, end)
         there = names.get(kind, {}).get(name, "")

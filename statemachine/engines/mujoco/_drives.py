@@ -24,6 +24,7 @@ _DRIVES = {
     4: ("site", "site"),
     5: ("body",),
 }
+_SO3 = 6  # mjtTrn: of a ball joint, or of a site in the frame of another
 # Where the law of an actuator's own state is another, these are one thing with it.
 _OF_A_LAW = ("gains", "dynamics", "range of its activation", "length range")
 _STILL = (
@@ -107,7 +108,11 @@ def _targets(sides: Sides, side: int, k: int) -> tuple[tuple[int, ...], str]:
     """What an actuator acts on and from which site it measures: ids of the second model, words."""
     raw = sides.raws[side]
     kind, ids = int(raw.actuator_trntype[k]), raw.actuator_trnid[k].tolist()
-    targets = list(zip(_DRIVES.get(kind, ()), ids, strict=False))
+    if kind == _SO3:
+        kinds = ("joint",) if ids[1] < 0 else ("site", "site")
+    else:
+        kinds = _DRIVES.get(kind, ())
+    targets = list(zip(kinds, ids, strict=False))
     names = [name_of(raw, target, i) for target, i in targets if i >= 0]
     word = require("mujoco").mjtTrn(kind).name.removeprefix("mjTRN_").lower()
     ids[: len(targets)] = [sides.there(side, target, i) for target, i in targets]

@@ -135,8 +135,9 @@ class Solids:
     def _stays(self, body: int) -> bool:
         """Whether no keyframe has a mocap body elsewhere, and nothing moves on it."""
         raw, number = self.raw, self.raw.body_mocapid[body]
-        places = raw.key_mpos.reshape(raw.nkey, -1, 3)[:, number]
-        turns = raw.key_mquat.reshape(raw.nkey, -1, 4)[:, number]
+        # Of a file without a keyframe these are empty, and reshape could not tell -1 from them.
+        places = raw.key_mpos.reshape(raw.nkey, raw.nmocap, 3)[:, number]
+        turns = raw.key_mquat.reshape(raw.nkey, raw.nmocap, 4)[:, number]
         stays = (places == raw.body_pos[body]).all() and (turns == raw.body_quat[body]).all()
         return bool(stays and not raw.body_dofnum[raw.body_rootid == body].any())
 

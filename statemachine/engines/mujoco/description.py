@@ -36,6 +36,7 @@ from ._sides import inertial_of, name_of, placed
 from .differences import settings_of
 
 _FORMATS = {".mjb": "MJB", ".urdf": "URDF"}
+_ON_JOINT, _ON_JOINT_IN_PARENT, _SO3 = 0, 1, 6  # mjtTrn
 
 
 def read_file(path: Path, name: str) -> Robot:
@@ -192,7 +193,7 @@ def _follows(raw: Any, joint: int) -> Follows | None:
     for i in np.flatnonzero(of_joints & (raw.eq_obj1id == joint)).tolist():
         offset, factor, *rest = map(float, raw.eq_data[i, :5])
         if not any(rest):
-            other = raw.joint(int(raw.eq_obj2id[i])).name
+            other = name_of(raw, "joint", int(raw.eq_obj2id[i]))
             return Follows(other, factor, offset, name_of(raw, "equality", i))
     return None
 
@@ -214,18 +215,22 @@ def _notes(raw: Any, links: list[Link], actuators: tuple[Actuator, ...]) -> list
 
 def _beyond(raw: Any, i: int, drive: Actuator) -> str:
     """A servo that may be commanded to where its joint cannot go."""
-    joint, ends = int(raw.actuator_trnid[i, 0]), drive.ctrlrange
+    ends = drive.ctrlrange
     kp, bias = raw.actuator_gainprm[i, 0], raw.actuator_biasprm[i, 1]
-    servo = raw.actuator_trntype[i] == 0 and kp and bias == -kp and drive.gear == 1
-    hinge = raw.jnt_limited[joint] and raw.jnt_type[joint] == JointType.HINGE
-    if not servo or ends is None or not hinge:
+    if not kp or bias != -kp or drive.gear != 1 or ends is None:
+        return ""
+    # Of another transmission the target is a site, a tendon or a body, and no joint.
+    if int(raw.actuator_trntype[i]) != _ON_JOINT:
+        return ""
+    joint = int(raw.actuator_trnid[i, 0])
+    if not raw.jnt_limited[joint] or raw.jnt_type[joint] != JointType.HINGE:
         return ""
     low, high = raw.jnt_range[joint]
     passed = max(low - ends[0], ends[1] - high)
     if passed <= 1e-5 * (high - low):
         return ""
     return (
-        f"the ctrlrange of {raw.actuator(i).name!r} goes beyond the range of its joint by "
+        f"the ctrlrange of {drive.name!r} goes beyond the range of its joint by "
         f"{math.degrees(passed):.3g}°"
     )
 
@@ -239,12 +244,20 @@ def _effort(raw: Any, joint: int, actuators: tuple[Actuator, ...]) -> float | No
     drives = [
         _most(raw, i, drive) * abs(drive.gear)
         for i, drive in enumerate(actuators)
-        if raw.actuator_trntype[i] in (0, 1) and raw.actuator_trnid[i, 0] == joint
+        if _drives_a_joint(raw, i) and raw.actuator_trnid[i, 0] == joint
     ]
     most = [sum(drives)] if drives else []
     if raw.jnt_actfrclimited[joint]:
         most.append(float(np.abs(raw.jnt_actfrcrange[joint]).max()))
     return min(most, default=None)
+
+
+def _drives_a_joint(raw: Any, i: int) -> bool:
+    """Tell whether the target of an actuator is a joint."""
+    transmission = int(raw.actuator_trntype[i])
+    if transmission == _SO3:  # of a ball joint, unless it turns a site in the frame of another
+        return int(raw.actuator_trnid[i, 1]) < 0
+    return transmission in (_ON_JOINT, _ON_JOINT_IN_PARENT)
 
 
 def _most(raw: Any, i: int, drive: Actuator) -> float:
@@ -266,11 +279,12 @@ def _actuator(raw: Any, i: int) -> Actuator:
         "velocity": form == 1 and not bias[:2].any() and bias[2] == -gain[0],
     }
     kind = next((kind for kind, holds in kinds.items() if holds), "general")
-    on_joint, position = raw.actuator_trntype[i] in (0, 1), kind == "position"
+    position = kind == "position"
+    joint = name_of(raw, "joint", int(raw.actuator_trnid[i, 0])) if _drives_a_joint(raw, i) else ""
     control = raw.actuator_ctrladr[i]  # the first of several
     return Actuator(
         name=raw.actuator(i).name or f"actuator {i}",
-        joint=raw.joint(int(raw.actuator_trnid[i, 0])).name if on_joint else "",
+        joint=joint,
         kind=kind,
         kp=float(gain[0]) if position else None,
         kv=float(-bias[2]) if position else None,
