@@ -7,6 +7,7 @@ import gc
 import io
 import linecache
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -47,12 +48,24 @@ QUICK = {
 }
 
 
+_ESTIMATE = re.compile(r"^.*: may take \d+ s\n", re.MULTILINE)
+
+
+def without_estimates(stderr: str) -> str:
+    """Return standard error without the line that says how long a slow command may take.
+
+    A command prints that line where it takes longer than 20 s, which on a busy machine any may.
+    """
+    return _ESTIMATE.sub("", stderr)
+
+
 def of_python(
     *words: object, folder: Path = ROOT, code: int | None = None, **environment: str
 ) -> subprocess.CompletedProcess[str]:
     """Python with such words in a process of its own, which has this checkout.
 
-    `code` is the exit code that it must have, if that is all that is asked of it.
+    `code` is the exit code that it must have, if that is all that is asked of it. Its standard
+    error is without the line that depends on speed (`without_estimates`).
     """
     done = subprocess.run(
         [sys.executable, *map(str, words)],
@@ -63,6 +76,7 @@ def of_python(
         env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
         check=False,
     )
+    done.stderr = without_estimates(done.stderr)
     assert code in (None, done.returncode), done.stdout + done.stderr
     return done
 
@@ -499,8 +513,9 @@ def here(
             ended = main()
         except SystemExit as end:  # of argparse
             ended = int(end.code or 0)
+        stdout, stderr = capsys.readouterr()
         done: subprocess.CompletedProcess[str] = subprocess.CompletedProcess(
-            words, ended, *capsys.readouterr()
+            words, ended, stdout, without_estimates(stderr)
         )
         assert code in (None, ended), done.stderr
         return done
