@@ -38,6 +38,11 @@ from statemachine.report import terminal
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 T = TypeVar("T")
+# Of a test whose model has shapes that start inside each other on purpose: `load` warns of them,
+# and what it says is tested elsewhere.
+overlapping = pytest.mark.filterwarnings(
+    "ignore:.*shapes are inside each other:statemachine.errors.EngineWarning"
+)
 REQUIRED = set(filter(None, os.environ.get("STATEMACHINE_REQUIRE", "").split(",")))
 # Options with which a lesson of many steps is a short one.
 QUICK = {
@@ -366,6 +371,13 @@ def pytest_configure(config: pytest.Config) -> None:
     unknown = REQUIRED - set(ENGINES) - {"render", "shared", "browser"}
     if unknown:
         raise pytest.UsageError(f"STATEMACHINE_REQUIRE names no engine: {sorted(unknown)}")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.get_closest_marker("slow"):
+            marker = pytest.mark.filterwarnings("default::statemachine.errors.EngineWarning")
+            item.own_markers.insert(0, marker.mark)  # those of its own come later and count
 
 
 @pytest.fixture(autouse=True)
