@@ -119,7 +119,10 @@ DEFAULT = Tolerance(_RELATIVE, _ABSOLUTE)
 
 
 def tolerance_of(key: str) -> Tolerance:
-    """Return the tolerance of a figure: that of the first rule whose pattern is in its key."""
+    """Return the tolerance of a figure by its key: "group | case | figure".
+
+    It is that of the first rule whose pattern is in the key.
+    """
     for rule in _RULES:
         if re.search(rule["keys"], key):
             return Tolerance(
@@ -193,13 +196,17 @@ def _is_rounding(key: str, figures: Figures) -> bool:
 
 
 def differences(
-    old: Mapping[str, Figures], new: Mapping[str, Figures], bits: bool = False
+    old: Mapping[str, Figures],
+    new: Mapping[str, Figures],
+    group: str = "",
+    bits: bool = False,
 ) -> list[str]:
     """Return a line for each key that came or went, and for each figure that changed.
 
     Args:
         old: Figures by key, of each case.
         new: The same, computed now.
+        group: Of which they are: a tolerance may hold for one group alone.
         bits: Whether every bit is compared, which is for two runs on one machine; otherwise
             figures are compared within the tolerance of each key.
     """
@@ -214,7 +221,7 @@ def differences(
             if key not in before:
                 lines.append(f"new: {name}, which is {after[key]}")
                 continue
-            tolerance = BITS if bits else tolerance_of(name)
+            tolerance = BITS if bits else tolerance_of(f"{group} | {name}")
             if not tolerance.compared:
                 continue
             if not bits and _is_rounding(key, before) and _is_rounding(key, after):

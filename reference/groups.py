@@ -135,7 +135,7 @@ def changes(
         bits: Whether every bit is compared: those before are of this machine.
     """
     then = json.loads(kept(group, folder).read_text("utf-8"))
-    return differences(then["figures"], now, bits)
+    return differences(then["figures"], now, group, bits)
 
 
 def write(group: str, now: dict[str, Figures], folder: Path = KEPT) -> list[str]:

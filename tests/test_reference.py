@@ -39,13 +39,13 @@ def test_every_group_has_figures() -> None:
 @pytest.mark.parametrize("bits", [True, False])
 def test_what_changed_came_or_went_is_told(bits: bool) -> None:
     old = json.loads(kept("pair contact, radius").read_text("utf-8"))["figures"]
-    assert differences(old, old, bits) == []
+    assert differences(old, old, bits=bits) == []
     new = deepcopy(old)
     new["runs"]["hip | largest"] *= 1.2
     new["runs"]["hip | verdict"] = "unclear"
     del new["causes"]["gap"]
     new["causes"]["another gap"] = 1.0
-    lines = differences(old, new, bits)
+    lines = differences(old, new, bits=bits)
     assert [line.split(":")[0] for line in lines] == ["new", "gone", "changed", "changed"]
 
 
@@ -67,15 +67,16 @@ def test_an_eighth_digit_is_a_change_and_a_tenth_another_processor(group: str) -
     for case, figures in stored.items():
         for key, figure in figures.items():
             old = {case: {key: figure}}
-            assert differences(old, {case: {key: _scaled(figure, 1 + 1e-10)}}) == []
+            assert differences(old, {case: {key: _scaled(figure, 1 + 1e-10)}}, group) == []
             eighth = _scaled(figure, 1 + 1e-8)
             numbers = figure["rows"] if isinstance(figure, dict) else figure
             if eighth == figure or largest_number(numbers) < 1e-5:
                 continue  # no number, or one whose eighth digit is rounding
             with_numbers += 1
-            lines = differences(old, {case: {key: eighth}})
+            lines = differences(old, {case: {key: eighth}}, group)
             told += len(lines)
-            assert lines or tolerance_of(f"{case} | {key}") != DEFAULT, f"{case} | {key}"
+            name = f"{group} | {case} | {key}"
+            assert lines or tolerance_of(name) != DEFAULT, name
     assert told >= 0.95 * with_numbers  # few figures have a tolerance of their own
 
 
@@ -127,7 +128,7 @@ def test_every_bit_counts_between_two_runs_on_one_machine() -> None:
     new = deepcopy(old)
     new["runs"]["elbow | largest"] = 0.25 + 2**-52
     new["runs"]["elbow | path"]["digest"] = "b"
-    assert [len(differences(old, new, bits)) for bits in (True, False)] == [2, 0]
+    assert [len(differences(old, new, bits=bits)) for bits in (True, False)] == [2, 0]
 
 
 def test_figures_are_made_into_a_folder_and_compared_bit_by_bit(tmp_path: Path) -> None:
