@@ -561,7 +561,7 @@ def _at_a_terminal(
         preexec_fn=begin,  # noqa: PLW1509
     )  # fmt: skip
     os.close(theirs)
-    seen, answered, waiting, deadline = "", 0, list(typed), time.monotonic() + 60
+    seen, answered, waiting, deadline = "", 0, list(typed), time.monotonic() + 600
     try:
         while time.monotonic() < deadline:
             if select.select([ours], [], [], 0.2)[0]:

@@ -221,7 +221,7 @@ def test_files_are_named_too(folder: Path) -> None:
 def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path: Path) -> None:
     written_all(folder, dict.fromkeys(("crash.xml", "hang.xml", "memory.xml"), GOOD))
     table = tmp_path / "table.json"
-    survey = examine_all(find([folder]), quick=True, seconds=25, jobs=3, table=table)
+    survey = examine_all(find([folder]), quick=True, seconds=60, jobs=3, table=table)
     rows = {row.file: row for row in survey.models}
     assert list(rows) == [
         "arm.urdf", "broken.xml", "crash.xml", "good.xml", "hang.xml", "memory.xml", "scene.xml",
@@ -243,7 +243,7 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
     assert rows["arm.urdf"].nv == 1
     ends = {
         "crash.xml": "it crashed the process (SIGABRT)",
-        "hang.xml": "it took longer than 25 s",
+        "hang.xml": "it took longer than 60 s",
         "memory.xml": "it asks for more memory",
     }
     for name, says in ends.items():
@@ -253,7 +253,7 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
     # Typed again: only what ended otherwise than it should is tried again, and what is new.
     sabotage.write_text("")
     (folder / "good.xml").write_text(GOOD.replace("0.05", "0.06"))
-    again = examine_all(find([folder]), quick=True, seconds=26, jobs=3, table=table)
+    again = examine_all(find([folder]), quick=True, seconds=61, jobs=3, table=table)
     assert sabotage.read_text().split() == ["good.xml"]
     kept = {row.file: row for row in again.models}
     assert list(kept) == list(rows)
