@@ -106,7 +106,8 @@ class Tolerance:
     Attributes:
         relative: Share of the figure, or of the largest number of its list.
         absolute: In the unit of the figure.
-        compared: Whether it is compared at all; words and counts are compared as they are.
+        compared: Whether it is compared at all. Words and counts are compared as they are, and so
+            is whether there is such a figure.
     """
 
     relative: float
@@ -215,14 +216,14 @@ def differences(
         before, after = old.get(case, {}), new.get(case, {})
         for key in sorted(before.keys() | after.keys()):
             name = f"{case} | {key}"
+            tolerance = BITS if bits else tolerance_of(f"{group} | {name}")
+            if not tolerance.compared:
+                continue
             if key not in after:
                 lines.append(f"gone: {name}, which was {before[key]}")
                 continue
             if key not in before:
                 lines.append(f"new: {name}, which is {after[key]}")
-                continue
-            tolerance = BITS if bits else tolerance_of(f"{group} | {name}")
-            if not tolerance.compared:
                 continue
             if not bits and _is_rounding(key, before) and _is_rounding(key, after):
                 continue
