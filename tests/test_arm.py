@@ -152,7 +152,9 @@ def test_the_committed_file_is_what_the_script_writes(tmp_path: Path) -> None:
     number = re.compile(r"(?<=[ \"])-?\d[\d.e+-]*")
     assert number.sub("#", text) == number.sub("#", committed)
     new, old = (np.array(number.findall(each), dtype=float) for each in (text, committed))
-    np.testing.assert_allclose(new, old, rtol=1e-9, atol=1e-14)
+    # Half a turn forward is half a turn back: last bits choose which is written.
+    turned = np.isclose(np.abs(new - old), 2 * np.pi, rtol=1e-12, atol=0)
+    np.testing.assert_allclose(new[~turned], old[~turned], rtol=1e-9, atol=1e-14)
 
 
 def test_every_kind_of_joint(zoo: Any, zoo_urdf: Path, pinocchio: None) -> None:
