@@ -6,9 +6,11 @@ import argparse
 import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
+from pathlib import Path
 
-from .groups import GROUPS, QUICK, absent, changes, figures, write
+from .groups import GROUPS, KEPT, QUICK, absent, changes, figures, write
 
 
 def main() -> int:
@@ -17,10 +19,24 @@ def main() -> int:
     parser.add_argument("action", choices=("make", "compare"))
     parser.add_argument("groups", nargs="*", metavar="GROUP", help=", ".join(GROUPS))
     parser.add_argument("--quick", action="store_true", help="only the groups of `make test`")
+    parser.add_argument(
+        "--folder", type=Path, default=KEPT, help="where figures are kept; reference/figures"
+    )
+    parser.add_argument(
+        "--bits",
+        action="store_true",
+        help="compare every bit with figures that this machine made: needs --folder",
+    )
     options = parser.parse_args()
+    if options.bits and options.folder == KEPT:
+        parser.error("--bits compares with figures of this machine: give their --folder")
     chosen = options.groups or (QUICK if options.quick else tuple(GROUPS))
     asked = [group for group in chosen if not absent(group)]
-    done, changed = write if options.action == "make" else changes, 0
+    if options.action == "make":
+        done = partial(write, folder=options.folder)
+    else:
+        done = partial(changes, folder=options.folder, bits=options.bits)
+    changed = 0
     # A process for each group: what one engine keeps for a process reaches no other group.
     with ProcessPoolExecutor(
         os.cpu_count(), mp_context=get_context("spawn"), max_tasks_per_child=1

@@ -29,7 +29,7 @@ _BACKENDS = ("mujoco", "pybullet")
 
 
 def machine() -> dict[str, str]:
-    """Wheels and kind of processor, on which the figures are the same to the bit."""
+    """Return the wheels and the kind of processor that figures were made on, to be read."""
     features = np._core._multiarray_umath.__cpu_features__  # pyright: ignore[reportAttributeAccessIssue]
     vectors = [name for name in ("AVX2", "AVX512F", "AVX512_SPR", "ASIMD") if features.get(name)]
     kind = " ".join((platform.system(), platform.machine(), *vectors))
@@ -118,19 +118,29 @@ def figures(group: str) -> dict[str, Figures]:
             os.chdir(here)
 
 
-def kept(group: str) -> Path:
-    """Where the figures of a group are kept."""
-    return KEPT / f"{group.replace(',', '').replace(' ', '_')}.json"
+def kept(group: str, folder: Path = KEPT) -> Path:
+    """Return the file of a group's figures."""
+    return folder / f"{group.replace(',', '').replace(' ', '_')}.json"
 
 
-def changes(group: str, now: dict[str, Figures]) -> list[str]:
-    """What has changed in a group since its figures were written."""
-    then = json.loads(kept(group).read_text("utf-8"))
-    return differences(then["figures"], now, exact=then["made on"] == machine())
+def changes(
+    group: str, now: dict[str, Figures], folder: Path = KEPT, bits: bool = False
+) -> list[str]:
+    """Return what has changed in a group since its figures were written.
+
+    Args:
+        group: Name of the group.
+        now: Its figures, computed now.
+        folder: Where those before are kept.
+        bits: Whether every bit is compared: those before are of this machine.
+    """
+    then = json.loads(kept(group, folder).read_text("utf-8"))
+    return differences(then["figures"], now, group, bits)
 
 
-def write(group: str, now: dict[str, Figures]) -> list[str]:
-    KEPT.mkdir(exist_ok=True)
+def write(group: str, now: dict[str, Figures], folder: Path = KEPT) -> list[str]:
+    """Write the figures of a group, computed now, into a folder; returns no changes."""
+    folder.mkdir(parents=True, exist_ok=True)
     cases = [
         f"{json.dumps(case, ensure_ascii=False)}: {{\n"
         + ",\n".join(
@@ -141,7 +151,7 @@ def write(group: str, now: dict[str, Figures]) -> list[str]:
         for case, found in now.items()
     ]
     text = f'{{"made on": {json.dumps(machine())},\n"figures": {{\n' + ",\n".join(cases) + "\n}}"
-    place = kept(group)
+    place = kept(group, folder)
     place.with_suffix(".new").write_text(text + "\n", "utf-8")
     place.with_suffix(".new").replace(place)
     return []

@@ -17,6 +17,7 @@ from statemachine.errors import EngineError, EngineWarning
 
 from .hidden_world import ExampleModel, ExampleWorld
 
+STUCK_FOR = 600.0  # seconds that a world which is stuck hears nothing
 RAISE, CRASH, NOISE, SLOW, STUCK, DIVERGE = (0.101, 0.102, 0.103, 0.104, 0.105, 0.106)
 MOST = 16  # worlds that a process can hold: those of Data, and of each Model one with a look-ahead
 
@@ -55,7 +56,7 @@ class FaultyWorld(ExampleWorld):
             time.sleep(0.001)
         elif what == STUCK:
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-            time.sleep(60)
+            time.sleep(STUCK_FOR)
         elif what == DIVERGE:
             self.raw.qpos[1] = float("nan")
         super().step()

@@ -13,7 +13,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -38,6 +37,7 @@ from .conftest import (
     processes_with,
     refused,
     soon,
+    without_estimates,
     written,
     written_all,
 )
@@ -289,9 +289,7 @@ def test_a_file_that_sleeps_is_ended_by_the_clock(tmp_path: Path) -> None:
         "import ctypes, threading, time, signal as sig\nLOCK = threading.Lock(); LOCK.acquire()\n"
         + "".join(waits.format(*pair) for pair in zip(JUDGES, calls, strict=True)),
     )
-    before = time.monotonic()
     grade = exercise.run(file, time_limit=1.0, wall_limit=4.0)
-    assert time.monotonic() - before < 60
     for line, judgement in zip((4, 6, 8, 10), grade.functions, strict=True):
         assert not judgement.judged
         says = rf"^line {line}: nothing could be judged: it took .*longer than 12 s on the clock"
@@ -316,17 +314,17 @@ def test_a_right_answer_passes_on_a_busy_machine() -> None:
 def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) -> None:
     here = tmp_path / "temporary"
     here.mkdir()
-    waits = "def {0}(*_):\n    open('begun', 'w').close()\n    time.sleep(60)\n"
+    waits = "def {0}(*_):\n    open('begun', 'w').close()\n    time.sleep(600)\n"
     file = written(tmp_path / "student.py", "import time\n" + "".join(map(waits.format, JUDGES)))
     with subprocess.Popen(
         [sys.executable, "-m", "statemachine", "check", str(file)],
         env={**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(here)},
         stderr=subprocess.PIPE,
     ) as process:
-        assert soon(lambda: len(list(here.glob("*/*/*/scratch/begun"))) >= len(JUDGES), 60)
+        assert soon(lambda: len(list(here.glob("*/*/*/scratch/begun"))) >= len(JUDGES))
         assert len(processes_with(here)) >= len(JUDGES)
         process.send_signal(number)
-        process.communicate(timeout=60)
+        process.communicate(timeout=300)
     assert process.returncode in (-number, 128 + number)
     assert (list(here.iterdir()), processes_with(here)) == ([], [])
 
@@ -456,7 +454,7 @@ def test_the_exercise_runs_as_a_program(
         with pytest.raises(SystemExit) as ended:
             runpy.run_path(str(file), run_name="__main__")
         printed = capsys.readouterr()
-        assert printed.err == ""
+        assert without_estimates(printed.err) == ""
         lines = printed.out.splitlines()
         assert ended.value.code == 2 or max(map(len, lines)) <= 80
         return int(ended.value.code or 0), lines

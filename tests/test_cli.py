@@ -19,7 +19,16 @@ from rich.cells import cell_len
 from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import QUICK, ROOT, Cli, assert_has, assert_in, assert_not_in, written
+from .conftest import (
+    QUICK,
+    ROOT,
+    Cli,
+    assert_has,
+    assert_in,
+    assert_not_in,
+    without_estimates,
+    written,
+)
 from .explained import with_changes
 from .small_models import mjcf
 
@@ -119,13 +128,15 @@ def test_alone_it_lists_the_lessons_in_order(here: Cli) -> None:
 
 def in_a_shell(command: str) -> subprocess.CompletedProcess[str]:
     """What becomes of a command of ours with something behind it."""
-    return subprocess.run(
+    done = subprocess.run(
         ["sh", "-c", f"{sys.executable} -m statemachine {command}"],
         capture_output=True,
         text=True,
         cwd=ROOT,
         check=False,
     )
+    done.stderr = without_estimates(done.stderr)
+    return done
 
 
 def test_a_pipe_that_closes_early_is_no_error() -> None:

@@ -317,6 +317,10 @@ def test_a_function_is_asked_every_so_many_steps_and_starts_anew_on_each_side(fi
     assert np.array_equal(run.left.ctrl, run.right.ctrl)
 
 
+# The limits of these arms are of no concern here, and the start is told them.
+@pytest.mark.filterwarnings(
+    "ignore:the run starts outside of joint limits:statemachine.errors.EngineWarning"
+)
 def test_a_function_starts_at_a_keyframe_and_the_right_without_it_where_the_left_does(
     files: Path,
 ) -> None:
@@ -401,6 +405,10 @@ def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
     assert largest(compare(run.left, run.right)) > 0.01
 
 
+# The limits of these arms are of no concern here, and the start is told them.
+@pytest.mark.filterwarnings(
+    "ignore:the run starts outside of joint limits:statemachine.errors.EngineWarning"
+)
 def test_a_recorded_run_is_played_on_both(files: Path, here: Cli) -> None:
     model = sm.load(files / "arm.xml")
     run = record(model, lambda time, data: [0.3, -0.2], 0.2, qpos=[0.1, 0.2])

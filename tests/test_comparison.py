@@ -24,7 +24,10 @@ from statemachine.measures import (
 from statemachine.runs import record, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import Cli
+from .conftest import (
+    Cli,
+    overlapping,
+)
 from .small_models import HALF_NAMELESS, WALL_AND_FLOOR, model_of
 
 
@@ -33,6 +36,7 @@ def test_a_recorded_trace_has_the_same_names(mujoco_scene: sm.Model) -> None:
     assert set(shipped("hold", "pybullet").touches()) == set(trace.touches())
 
 
+@overlapping
 def test_who_comes_first_and_what_has_no_name(tmp_path: Path) -> None:
     names = ContactNames.of(model_of(tmp_path, HALF_NAMELESS))
     floor, below, top, ball, other, _arm, hand = range(7)
@@ -43,6 +47,7 @@ def test_who_comes_first_and_what_has_no_name(tmp_path: Path) -> None:
     assert names.pair(below, other) == "body 2 on world"
 
 
+@overlapping
 def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
     trace = record(model_of(tmp_path, WALL_AND_FLOOR), seconds=0.05)
     pairs = trace.contact_pairs

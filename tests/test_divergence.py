@@ -19,7 +19,14 @@ from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.options import HUGE
 from statemachine.report import compare as report
 
-from .conftest import after, need_engine, opened, refused, written
+from .conftest import (
+    after,
+    need_engine,
+    opened,
+    overlapping,
+    refused,
+    written,
+)
 from .small_models import ROTOR, STUCK_POST
 
 
@@ -88,6 +95,7 @@ def explode(model: sm.Model) -> DivergedError:
     return error
 
 
+@overlapping
 def test_an_explosion_is_raised_early(tmp_path: Path) -> None:
     model = loaded(tmp_path, STUCK_POST)
     # Set lower it raises before; set as high as positions may be, later.
@@ -155,6 +163,10 @@ def test_a_comparison_in_which_a_side_diverges_says_that(
 
 
 @pytest.mark.usefixtures("bullet")
+# Such a motor is what diverges.
+@pytest.mark.filterwarnings(
+    "ignore:.*kv of actuator number 0 is negative:statemachine.errors.EngineWarning"
+)
 def test_both_sides_may_diverge(tmp_path: Path) -> None:
     """A motor that pushes the faster, the faster its wheel turns."""
     path = written(

@@ -16,7 +16,11 @@ from statemachine.drawing import Drawing, Part, Surface, drawing_of
 from statemachine.drawing import _drawing as shapes
 from statemachine.drawing.scene import Camera
 
-from .conftest import refused, written
+from .conftest import (
+    overlapping,
+    refused,
+    written,
+)
 from .small_models import CLOTH, EVERY_SHAPE, TOUCHING_ONLY, model_of
 
 
@@ -193,6 +197,7 @@ def test_the_eye_is_where_the_engines_camera_is(mujoco_box: sm.Model) -> None:
     )
 
 
+@overlapping
 def test_what_only_touches_is_drawn_where_nothing_else_is(tmp_path: Path) -> None:
     drawing = drawing_of(model_of(tmp_path, TOUCHING_ONLY))
     assert [part.kind for part in drawing.parts] == ["plane", "box"]

@@ -22,7 +22,7 @@ from statemachine.errors import BadInputError
 from statemachine.processes.parallel import forks_for, in_forks
 from statemachine.report.as_json import dumps
 
-from .conftest import ROOT, lives, refused, soon, written, written_all
+from .conftest import ROOT, lives, refused, soon, without_estimates, written, written_all
 from .explained import ALONE, ARM, SWING, changed, explained
 
 forks = pytest.mark.skipif(forks_for(2, 1.0, 2) == 1, reason="no forks here")
@@ -214,6 +214,7 @@ def test_no_fork_stays(tmp_path: Path, number: int) -> None:
     )
     assert soon(lambda: len(list(tmp_path.glob("*.pid"))) >= 3)
     (os.killpg if number == signal.SIGINT else os.kill)(run.pid, number)
-    _, err = run.communicate(timeout=30)
-    assert (run.returncode, err.strip()) == (130 if number == signal.SIGINT else -number, b"")
+    _, err = run.communicate(timeout=300)
+    assert run.returncode == (130 if number == signal.SIGINT else -number)
+    assert without_estimates(err.decode()).strip() == ""
     assert soon(lambda: not any(lives(int(each.stem)) for each in tmp_path.glob("*.pid")))

@@ -33,6 +33,7 @@ from .conftest import (
     assert_in,
     bits,
     opened,
+    overlapping,
     refused,
     runs_in_silence,
     started,
@@ -181,6 +182,7 @@ def test_a_body_that_turns(backend: str, integrator: str, centre: str, tmp_path:
 
 
 @pytest.mark.parametrize("name", ["qacc", "qfrc_bias"])
+@overlapping
 def test_a_vector_counts_by_its_length(tmp_path: Path, name: str) -> None:
     """As a position does; two joints without a name are not one vector."""
     model = loaded(

@@ -71,7 +71,7 @@ class Other:
     def begin(self) -> None:
         """Begin a step: it is inside afterwards, or was refused."""
         self._go.release()
-        assert self._done.acquire(timeout=10)
+        assert self._done.acquire(timeout=300)
 
     def end(self) -> None:
         """End the step, if it is inside one."""

@@ -66,6 +66,7 @@ from .conftest import (
     of_python,
     refused,
     with_figures,
+    without_estimates,
     written,
 )
 
@@ -560,7 +561,7 @@ def _at_a_terminal(
         preexec_fn=begin,  # noqa: PLW1509
     )  # fmt: skip
     os.close(theirs)
-    seen, answered, waiting, deadline = "", 0, list(typed), time.monotonic() + 60
+    seen, answered, waiting, deadline = "", 0, list(typed), time.monotonic() + 600
     try:
         while time.monotonic() < deadline:
             if select.select([ours], [], [], 0.2)[0]:
@@ -739,6 +740,32 @@ def test_a_bar_of_progress_takes_nothing_of_what_is_printed(
             print("hello")
         report(1.0)
     assert printed.getvalue() == "hello\n"
+
+
+class Clock:
+    """Stands for a clock: each look at it is five seconds after the one before."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def monotonic(self) -> float:
+        self.now += 5.0
+        return self.now
+
+
+def test_a_long_wait_is_said_once_where_nobody_sees_a_bar(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(bar, "time", Clock())
+    with bar.progress("questions on mujoco") as report:
+        for done in (0.1, 0.2, 0.3, 0.4):
+            report(done)
+    said = capsys.readouterr().err
+    assert said == "questions on mujoco: may take 50 s\n"
+    # A test that asks for silence does not hear of it, and of all else it does.
+    assert without_estimates("statemachine: a\n" + said + "b: may take long\n") == (
+        "statemachine: a\nb: may take long\n"
+    )
 
 
 def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:

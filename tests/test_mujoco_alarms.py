@@ -19,7 +19,13 @@ from statemachine import worlds
 from statemachine.backends import _mujoco_alarms, compiled, mujoco_backend
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
-from .conftest import assert_has, opened, refused, runs_in_silence
+from .conftest import (
+    assert_has,
+    opened,
+    overlapping,
+    refused,
+    runs_in_silence,
+)
 from .small_models import SLIDE, TWO_SLIDES, crowded, loaded, model_of
 
 
@@ -158,6 +164,7 @@ def test_three_threads_that_diverge_at_once_each_hear_of_their_own(mujoco_box: s
         assert list(pool.map(diverge, ("qpos", "ctrl", "qvel"))) == [None] * 3
 
 
+@overlapping
 def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) -> None:
     model, calm = crowded(tmp_path, 18, "300K"), sm.load("so101/scene")
     with sm.make_data(model) as data, sm.make_data(calm) as other:

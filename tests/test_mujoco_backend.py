@@ -17,7 +17,14 @@ from statemachine.errors import (
     UnknownNameError,
 )
 
-from .conftest import ROOT, after, in_its_own_python, opened, refused
+from .conftest import (
+    ROOT,
+    after,
+    in_its_own_python,
+    opened,
+    overlapping,
+    refused,
+)
 from .small_models import GEOM, loaded
 
 
@@ -61,6 +68,7 @@ def test_a_replaced_model_is_what_a_file_would_have_given(tmp_path: Path) -> Non
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
 @pytest.mark.parametrize("jacobian", ["dense", "sparse"])
 @pytest.mark.parametrize("solver", ["Newton", "CG", "PGS"])
+@overlapping
 def test_parts_of_the_constraint_force_add_up(
     tmp_path: Path, cone: str, jacobian: str, solver: str
 ) -> None:

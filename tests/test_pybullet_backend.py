@@ -32,6 +32,7 @@ from .conftest import (
     assert_in,
     bullet_clients,
     opened,
+    overlapping,
     path,
     refused,
     runs_in_silence,
@@ -219,6 +220,7 @@ NAMED = {
 
 
 @pytest.mark.parametrize("feature", REFUSED)
+@overlapping
 def test_what_it_cannot_do_is_refused_by_name(feature: str, tmp_path: Path) -> None:
     file = mjcf(tmp_path, REFUSED[feature])
     sm.load(file)  # MuJoCo takes it

@@ -12,7 +12,16 @@ import pytest
 import statemachine as sm
 from statemachine.errors import UnsupportedError
 
-from .conftest import after, assert_in, opened, path, refused, started, warnings_of
+from .conftest import (
+    after,
+    assert_in,
+    opened,
+    overlapping,
+    path,
+    refused,
+    started,
+    warnings_of,
+)
 from .small_models import both, on_both
 
 FLOOR = '<geom name="floor" type="plane" size="1 1 .1"/>'
@@ -239,6 +248,7 @@ def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.filterwarnings("ignore:PyBullet. ellipsoids")
+@overlapping
 def test_a_hull_is_as_large_as_its_shape(
     tmp_path: Path, geom: str, joint: str, beside: str
 ) -> None:
@@ -281,6 +291,7 @@ OVERLAP = """{floor}<body name="post" pos="0 0 .095"><joint name="turn" axis="0 
 @pytest.mark.parametrize(
     "shape", ['type="box" size=".1 .1 .1"', 'type="mesh" mesh="bare" euler="1 1 0"']
 )
+@overlapping
 def test_a_contact_that_no_joint_can_yield_to_does_not_explode(tmp_path: Path, shape: str) -> None:
     """A post that turns about the vertical stands 5 mm deep in the floor: nothing can lift it."""
     ends = []

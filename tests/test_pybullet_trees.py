@@ -217,6 +217,10 @@ def test_what_acts_on_each_body(tmp_path: Path, medium: str, base: str) -> None:
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
+# MuJoCo would have the masses written out; to say how much all weigh is what the test is about.
+@pytest.mark.filterwarnings(
+    "ignore:.*settotalmass. is deprecated:statemachine.errors.EngineWarning"
+)
 def test_a_tree_of_milligrams(tmp_path: Path, base: str) -> None:
     """What the engine's base weighs does not count, whatever the tree weighs."""
     laws = r'(armature|damping|stiffness|frictionloss)="[^"]*"'

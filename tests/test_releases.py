@@ -485,7 +485,7 @@ class TestReleases:
         pid = os.fork()
         if not pid:
             os._exit(0)
-        ended = soon(lambda: not lives(pid), 10)
+        ended = soon(lambda: not lives(pid))
         thread.join()
         assert ended
         os.waitpid(pid, 0)
@@ -524,7 +524,7 @@ class TestReleases:
             assert parent.stdout is not None
             pid = int(parent.stdout.readline())
             parent.kill()
-        assert soon(lambda: not lives(pid), 5)
+        assert soon(lambda: not lives(pid))
 
     def test_a_file_that_changed_is_not_another_robot(self, tmp_path: Path) -> None:
         model: Any = model_of(tmp_path, LINKS_AND_BALL, backend=OLD)

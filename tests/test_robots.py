@@ -181,9 +181,13 @@ def chaos(links: int = 5) -> str:
 
 
 def test_a_gap_of_rounding_is_no_gap_of_engines(tmp_path: Path) -> None:
-    """Gravity that differs by its last digit: what comes of that is the chaos of the robot."""
-    model = load(written(tmp_path / "chaos.xml", chaos()))
-    same = model.replace(gravity=[0, 0, np.nextafter(-9.81, -10)])
+    """Gravity that differs by its thirteenth digit: what comes of that is the chaos of the robot.
+
+    Three links are not yet as far apart as they can be: there gap and floor would be two numbers of
+    one size, and the last bits of a processor would say which is larger.
+    """
+    model = load(written(tmp_path / "chaos.xml", chaos(3)))
+    same = model.replace(gravity=[0, 0, -9.81 * (1 + 1e-13)])
     gap = gaps.run_gap(model, same, 0, halve=True)
     assert gap.largest > 1e-3
     raw = [mujoco.MjData(model.raw) for _ in range(2)]
@@ -191,6 +195,7 @@ def test_a_gap_of_rounding_is_no_gap_of_engines(tmp_path: Path) -> None:
     for data in raw:
         mujoco.mj_step(model.raw, data, gaps.STEPS)
     assert np.abs(raw[0].qpos - raw[1].qpos).max() > 1e-3  # MuJoCo alone
+    assert gap.largest < 0.1 * gap.floor
     assert_has(gap, is_rounding=True, shrinks=None)
     assert not BackendRow(without_contacts=gap).unexplained
     # One link is calm, and what is more than rounding stays a gap.
@@ -216,7 +221,7 @@ def test_files_are_named_too(folder: Path) -> None:
 def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path: Path) -> None:
     written_all(folder, dict.fromkeys(("crash.xml", "hang.xml", "memory.xml"), GOOD))
     table = tmp_path / "table.json"
-    survey = examine_all(find([folder]), quick=True, seconds=25, jobs=3, table=table)
+    survey = examine_all(find([folder]), quick=True, seconds=60, jobs=3, table=table)
     rows = {row.file: row for row in survey.models}
     assert list(rows) == [
         "arm.urdf", "broken.xml", "crash.xml", "good.xml", "hang.xml", "memory.xml", "scene.xml",
@@ -238,7 +243,7 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
     assert rows["arm.urdf"].nv == 1
     ends = {
         "crash.xml": "it crashed the process (SIGABRT)",
-        "hang.xml": "it took longer than 25 s",
+        "hang.xml": "it took longer than 60 s",
         "memory.xml": "it asks for more memory",
     }
     for name, says in ends.items():
@@ -248,7 +253,7 @@ def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path
     # Typed again: only what ended otherwise than it should is tried again, and what is new.
     sabotage.write_text("")
     (folder / "good.xml").write_text(GOOD.replace("0.05", "0.06"))
-    again = examine_all(find([folder]), quick=True, seconds=26, jobs=3, table=table)
+    again = examine_all(find([folder]), quick=True, seconds=61, jobs=3, table=table)
     assert sabotage.read_text().split() == ["good.xml"]
     kept = {row.file: row for row in again.models}
     assert list(kept) == list(rows)

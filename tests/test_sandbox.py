@@ -41,9 +41,9 @@ def test_nothing_is_read_from_us() -> None:
 
 
 def test_the_time_until_it_is_ready_does_not_count(tmp_path: Path) -> None:
-    code = "import time; time.sleep(1.5); open('ready', 'w').close(); time.sleep(0.2)"
+    code = "import time; time.sleep(3.0); open('ready', 'w').close(); time.sleep(0.2)"
     ready = (tmp_path / "ready").exists
-    done = _python(code, wall=1.0, start=100.0, started=ready, cwd=tmp_path)
+    done = _python(code, wall=2.5, start=100.0, started=ready, cwd=tmp_path)
     assert_has(done, started=True, end="code", code=0)
     never = _python("import time; time.sleep(60)", start=0.5, started=lambda: False)
     assert_has(never, started=False, end="clock")
@@ -220,4 +220,4 @@ def test_a_worker_that_ends_loses_nothing_of_another() -> None:
     with worker_processes(2) as (first, second):
         waits = second(time.sleep, 1.0)
         refused((BrokenProcessPool, "", first(os._exit, 1).result))
-        assert (first(abs, -1).result(60), waits.result(60)) == (1, None)
+        assert (first(abs, -1).result(300), waits.result(300)) == (1, None)

@@ -415,9 +415,12 @@ def test_each_scenario_was_recorded_with_both_defaults() -> None:
 def test_a_recorded_trace_is_what_the_engine_does_here(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On any processor, Python and distribution of PyBullet: recorded with its own, on 3.11."""
+    """On any processor, Python and distribution of PyBullet, to nine digits.
+
+    Whether a compiler for another kind of processor stays within them was not measured.
+    """
     if (sys.platform, platform.machine()) != ("linux", "x86_64"):
-        pytest.skip("recorded on Linux x86-64: another compiler gives other bits")
+        pytest.skip("recorded on Linux x86-64: what another compiler gives was not measured")
     _is_as_recorded(name, monkeypatch)
 
 
@@ -431,7 +434,10 @@ def test_the_recorded_run_of_an_older_release_is_what_it_does(
     here = take(LESSONS["hold"], mujoco_scene, "mujoco", {}).result.older
     monkeypatch.setenv("STATEMACHINE_ENGINES", "nowhere")
     recorded = vars(take(LESSONS["hold"], mujoco_scene, "mujoco", {}).result.older)
-    assert recorded | {"recorded": False} == vars(here)
+    assert recorded["recorded"]
+    for name, value in vars(here).items():
+        if name != "recorded":
+            assert recorded[name] == pytest.approx(value, rel=1e-6, abs=1e-6), name
     assert np.degrees(here.gap) == pytest.approx(6.12, abs=0.01)
 
 
@@ -442,7 +448,8 @@ def _is_as_recorded(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(make_traces.RUNS) == set(shipped_names())
     trace, kept = make_traces.recorded(name), read(make_traces.FOLDER / f"{name}.npz")
     assert kept.header.provenance.model_sha256 == trace.header.provenance.model_sha256
-    assert same(trace, kept, INPUTS)
+    for column in INPUTS:
+        np.testing.assert_allclose(trace[column], kept[column], rtol=1e-9, atol=1e-9)
     for column in set(trace.columns) - set(INPUTS):  # kept in single precision
         rounded = trace[column].astype(np.float32)
         np.testing.assert_allclose(rounded, kept[column], rtol=1e-6, atol=1e-6)

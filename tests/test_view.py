@@ -460,7 +460,7 @@ class Viewer:
     def end(self) -> str:
         """The rest of what it said; it ended well, and complained of nothing."""
         rest = self.process.stdout.read()
-        code = self.process.wait(timeout=30)
+        code = self.process.wait(timeout=300)
         self._said.seek(0)
         assert (code, self._said.read()) == (0, "")
         return rest
@@ -499,12 +499,14 @@ def test_it_listens_on_loopback_alone_and_ctrl_c_ends_it(tmp_path: Path) -> None
         viewer.line()
         assert f"ssh -L {port}:localhost:{port}" in viewer.line()
         # Who connects and says nothing leaves no trace in the terminal.
-        with socket.create_connection(("127.0.0.1", port), timeout=5):
+        with socket.create_connection(("127.0.0.1", port), timeout=60):
             pass
         if sys.platform == "linux":
             assert _listening(viewer.process.pid) == {f"0100007F:{port:04X}"}
             # Who listens everywhere listens here too.
-            refused((OSError, "", lambda: socket.create_connection(("127.0.0.2", port), timeout=5)))
+            refused(
+                (OSError, "", lambda: socket.create_connection(("127.0.0.2", port), timeout=60))
+            )
         viewer.process.send_signal(signal.SIGINT)
         assert viewer.end() == ""
     with socket.socket() as again:

@@ -27,7 +27,7 @@ class Served:
 
     def get(self, path: str, host: str | None = None, **headers: str) -> http.client.HTTPResponse:
         """Ask for a page, under a name."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=10)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         connection.putrequest("GET", path, skip_host=True)
         connection.putheader("Host", host or self.own)
         for name, value in headers.items():

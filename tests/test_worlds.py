@@ -29,7 +29,16 @@ from statemachine.errors import (
     UnsupportedError,
 )
 
-from .conftest import ROOT, SHARED, opened, refused, runs_in_silence, shared, started
+from .conftest import (
+    ROOT,
+    SHARED,
+    opened,
+    overlapping,
+    refused,
+    runs_in_silence,
+    shared,
+    started,
+)
 from .lives import equal, live
 from .small_models import RICH, loaded, model_of
 from .test_turns import meanwhile
@@ -407,6 +416,7 @@ def test_a_python_callback_is_refused() -> None:
         assert worlds.time.all()
 
 
+@overlapping
 def test_a_record_goes_on_past_a_warning_that_ends_nothing(tmp_path: Path) -> None:
     """The engine's own rollout stops a world at any warning."""
     balls = "".join(

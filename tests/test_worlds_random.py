@@ -203,10 +203,10 @@ def test_the_numbers_of_a_seed_stay_those() -> None:
     """A seed that a paper names gives these numbers in every version."""
     drawn = draw(sm.load("so101"), 2, seed=0, latency=(0.0, 1.0), damping=LogUniform(0.5, 2.0))
     np.testing.assert_allclose(
-        drawn["latency"][:, 0], (0.04236974312728847, 0.022566133945349676), rtol=0, atol=1e-15
+        drawn["latency"][:, 0], (0.04236974312728847, 0.022566133945349676), rtol=1e-9
     )
     np.testing.assert_allclose(
-        drawn["damping"][:, 0] / 0.6, (0.6496135874063642, 0.5931352164359404), rtol=1e-15
+        drawn["damping"][:, 0] / 0.6, (0.6496135874063642, 0.5931352164359404), rtol=1e-9
     )
 
 
