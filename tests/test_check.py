@@ -23,11 +23,11 @@ import pytest
 
 from statemachine.errors import MissingEngineError
 from statemachine.grading import exercise, recording
-from statemachine.grading.answers import Answer, OtherValue, decode, encode
-from statemachine.grading.calls import FaultError, answers_of, answers_of_file
+from statemachine.grading.inside.answers import Answer, OtherValue, decode, encode
+from statemachine.grading.inside.calls import FaultError, answers_of, answers_of_file
+from statemachine.grading.inside.watch import EngineRun, Inputs, engine_watched
+from statemachine.grading.inside.worlds import ExerciseWorld, Scenes, worlds_of
 from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
-from statemachine.grading.watch import EngineRun, Inputs, engine_watched
-from statemachine.grading.worlds import ExerciseWorld, Scenes
 
 from .conftest import (
     ROOT,
@@ -50,7 +50,7 @@ def _verdict(attempt: Attempt, prepared: Prepared) -> Judgement:
     worlds, rights = prepared
     if attempt.raw:  # which may leave the engine's own model changed
         with tempfile.TemporaryDirectory() as folder:
-            worlds = judge_of(attempt.solves).worlds(Scenes("mujoco", Path(folder)))
+            worlds = worlds_of(attempt.solves, Scenes("mujoco", Path(folder)))
     with engine_watched(worlds[0].model.backend):
         answers = (
             answer
@@ -69,7 +69,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], P
     @functools.cache
     def prepare(name: str, backend: str) -> Prepared:
         need_engine(backend)
-        worlds = judge_of(name).worlds(Scenes(backend, tmp_path_factory.mktemp(name)))
+        worlds = worlds_of(name, Scenes(backend, tmp_path_factory.mktemp(name)))
         return worlds, [*map(judge_of(name).right, worlds)]
 
     return prepare

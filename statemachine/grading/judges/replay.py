@@ -6,43 +6,14 @@ import numpy as np
 
 from ...interface import Array, make_data, reset
 from ...measures.text import count
-from ...page import Figures
-from ..answers import Answer, kind
-from ..calls import first_of, reason
-from ..watch import EngineRun, Inputs, inputs_of
-from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from . import address, grain, listed, near, numbers, parts, same_bits, short_float
+from ..inside.answers import Answer, kind
+from ..inside.calls import first_of, reason
+from ..inside.watch import EngineRun, Inputs, inputs_of
+from ..inside.worlds import ExerciseWorld
+from . import grain, listed, near, numbers, parts, same_bits, short_float
 
-SCENE = "so101/scene_box"
-_CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
-_OTHER = (-0.2, -0.5, 0.4, 1.5, 1.5, 0.28)
-_STEPS = 100  # of the runs that are made to end apart
 _COUNT = ("first", "second")
 _START = 1e-9  # a keyframe's quaternion may be normalised
-
-
-def worlds(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; fewer steps with a crate before the arm; runs that do end apart."""
-    course = scenes.ordinary(SCENE)
-    crowded = scenes.crowded(SCENE).replace(timestep=0.004)
-    return [
-        ExerciseWorld("", course, (np.array(_CTRL), 600)),
-        ExerciseWorld(ELSEWHERE, crowded, (np.array(_OTHER), 150)),
-        # One bit, in the middle and upwards, at the end and downwards: nearly equal, equal in
-        # part, equal in sum and not smaller all pass for equal in one of the two.
-        *(
-            ExerciseWorld(
-                f"with {what} of the second run one bit off",
-                course,
-                (np.array(_CTRL), _STEPS),
-                Figures(place=place, towards=towards, after=_STEPS),
-            )
-            for what, place, towards in (
-                ("a joint", address(course, "elbow_flex"), np.inf),
-                ("the box", course.nq - 1, -np.inf),
-            )
-        ),
-    ]
 
 
 def right(world: ExerciseWorld) -> Inputs:
