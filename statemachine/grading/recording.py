@@ -20,12 +20,12 @@ from typing import Any
 from ..errors import BadInputError
 from ..page import Figures
 from ..processes import ALONE, sandbox
-from ..processes.places import package_folders
+from ..processes.places import python_path
 from .inside.answers import Answer, decode
 from .inside.calls import FaultError
 from .judges import JUDGES
 from .links import leads_out, links_out, refusal_of
-from .shown import view_of
+from .shown import modules_of, view_of
 
 START = 60.0  # [s] on the clock for Python, the engine and the worlds to get ready
 _MEMORY_MOST = 2 * sandbox.GB
@@ -113,7 +113,7 @@ def record(
         start=START,
         start_cpu=START,
         cwd=scratch,
-        env=environment(),
+        env=environment(backend),
         writable=folder,
         view=view_of(backend, [own]),
         memory_most=_MEMORY_MOST,
@@ -130,7 +130,7 @@ def record(
     return recording
 
 
-def environment() -> dict[str, str]:
+def environment(backend: str) -> dict[str, str]:
     """Return the environment of a student's process: of ours what a program needs to start.
 
     Where it is shut in, it is told of no folder that it is not shown.
@@ -138,10 +138,8 @@ def environment() -> dict[str, str]:
     names = _KEPT if sandbox.shut_in() else (*_KEPT, "PATH", "PYTHONPATH")
     kept = {name: os.environ[name] for name in names if name in os.environ}
     if sandbox.shut_in():
-        on_path = map(os.path.abspath, filter(None, os.environ.get("PYTHONPATH", "").split(":")))
-        folders = map(str, package_folders())
         kept["PATH"] = os.defpath
-        kept["PYTHONPATH"] = os.pathsep.join(set(folders) & set(on_path))
+        kept["PYTHONPATH"] = os.pathsep.join(python_path(modules_of(backend)))
     return {**kept, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
 

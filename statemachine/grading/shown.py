@@ -7,6 +7,7 @@ but its models: neither the course's solutions nor what others handed in.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -24,16 +25,16 @@ _FAULTS = "faults"  # of `grading`: what puts a fault into an arm, for tests
 
 
 @cache
-def _of_machine(backend: str) -> View:
+def _of_machine(backend: str, _python_path: str | None) -> View:
     """Return what every process on a backend is shown; it is the same for all of a class."""
     rooms = [_PACKAGE / "__init__.py"]
     for name in ROOMS:
         rooms += [place for place in (_PACKAGE / name, _PACKAGE / f"{name}.py") if place.exists()]
     rooms += [_PACKAGE / "grading" / name for name in _INSIDE]
-    return python_view(_modules_of(backend)).with_more([*rooms, models_dir()])
+    return python_view(modules_of(backend)).with_more([*rooms, models_dir()])
 
 
-def _modules_of(backend: str) -> tuple[str, ...]:
+def modules_of(backend: str) -> tuple[str, ...]:
     """Return the modules without which nothing runs on a backend, wherever they are installed."""
     engine = ENGINES.get(backend)
     own = engine.module if engine else type(room(backend)).__module__.partition(".")[0]
@@ -49,4 +50,5 @@ def view_of(backend: str, own: Iterable[Path], faults: bool = False) -> View:
         faults: Whether it runs tests on arms with faults, and so needs what makes these.
     """
     more = [_PACKAGE / "grading" / _FAULTS] if faults else []
-    return _of_machine(backend).with_more([*own, *more])
+    machine = _of_machine(backend, os.environ.get("PYTHONPATH"))
+    return machine.with_more([*own, *more])

@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 _LIBRARIES = (
@@ -91,7 +92,7 @@ def _steps_to(place: Path) -> Iterator[Path]:
             return
 
 
-def python_view(needed: tuple[str, ...] = ()) -> View:
+def python_view(needed: Iterable[str] = ()) -> View:
     """Return where Python is, with its packages and the libraries that it needs.
 
     Args:
@@ -140,10 +141,28 @@ def package_folders() -> Iterator[Path]:
             yield Path(path)
 
 
+def python_path(needed: Iterable[str]) -> list[str]:
+    """Return those folders of $PYTHONPATH that hold packages that were installed, or these modules.
+
+    A command that is shown nothing else has no use for the others.
+    """
+    packages = set(map(str, package_folders()))
+    listed = [os.path.abspath(path) for path in os.environ.get("PYTHONPATH", "").split(os.pathsep)
+              if path]  # fmt: skip
+    names = list(needed)
+    return [
+        path
+        for path in dict.fromkeys(listed)
+        if path in packages or any(PathFinder.find_spec(name, [path]) for name in names)
+    ]
+
+
 def _files_of(name: str) -> Iterator[Path]:
-    """Give the folder or the file of a module; nothing where it is not found."""
+    """Give the folder or the file of a module, as a Python of its own finds it; or nothing."""
+    listed = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     try:
-        spec = importlib.util.find_spec(name)
+        spec = PathFinder.find_spec(name, [os.path.abspath(path) for path in listed if path])
+        spec = spec or importlib.util.find_spec(name)
     except (ImportError, ValueError):
         return
     if spec is None:

@@ -231,7 +231,9 @@ def _run(
             *([] if sandbox.shut_in() else ["--watched"]),
             os.path.join(os.curdir, path.name),  # brackets in a whole path confuse pytest
         ]
-        env = _environment() | ({FAULT: fault} if fault else {})  # where no test looks for it
+        env = _environment(backend) | (
+            {FAULT: fault} if fault else {}
+        )  # where no test looks for it
         outcome = sandbox.run(
             command,
             cpu=seconds,
@@ -246,9 +248,9 @@ def _run(
         return _read(record, outcome, path.name)
 
 
-def _environment() -> dict[str, str]:
+def _environment(backend: str) -> dict[str, str]:
     """Return that of a student's process, with this package to be found, for one pytest alone."""
-    env = environment()
+    env = environment(backend)
     home = str(Path(__file__).resolve().parents[3])
     paths = [home, *filter(None, [env.get("PYTHONPATH")])]
     return {

@@ -182,7 +182,8 @@ class Guard:
             room = rest.partition(".")[0]
             private = room and (room not in PUBLIC or any(p[:1] == "_" for p in rest.split(".")))
             if top == _PACKAGE.name and private:
-                raise self._refusal(f"it imports {name}", "import", ImportError)
+                what = f"it imports {name}, which is not of the public interface"
+                raise self._refusal(what, "import", ImportError)
             if name == "_posixsubprocess":
                 raise self._refusal(f"it imports {name}", "import", ImportError)
             compiled = isinstance(file, str) and (os.path.realpath(file)).startswith(
