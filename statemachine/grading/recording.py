@@ -286,13 +286,15 @@ def copied_to(folder: Path, file: Path, own: Mapping[str, Path]) -> Path:
         file: The student's.
         own: All files that belong to it, by their names in the folder.
     """
-    if file.resolve() not in map(Path.resolve, own.values()):  # hidden, or one of very many
-        own = {file.name: file}
+    real = file.resolve()
+    names = [name for name, each in own.items() if each.resolve() == real]
+    if not names:  # a hidden file, or one of very many
+        names, own = [file.name], {file.name: file}
     for name, each in own.items():
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(start_of(each))
-    return folder / next(name for name, each in own.items() if each.resolve() == file.resolve())
+    return folder / min(names, key=lambda name: own[name].is_symlink())  # not a link to it
 
 
 def digest(files: Mapping[str, Path]) -> str:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
-from ...interface import Array, make_data, reset
+from ...interface import Array, make_data, reset, step
 from ...measures.text import count
 from ..inside.answers import Answer, kind
 from ..inside.calls import first_of, reason
@@ -14,16 +17,44 @@ from . import grain, listed, near, numbers, parts, same_bits, short_float
 
 _COUNT = ("first", "second")
 _START = 1e-9  # a keyframe's quaternion may be normalised
+_END = (
+    1e-6  # [rad, m]: steps taken one by one, or by the engine's own functions, may round otherwise
+)
 
 
-def right(world: ExerciseWorld) -> Inputs:
-    """Where both runs begin, with the keyframe's own time and ctrl."""
+@dataclass(frozen=True)
+class TwoRuns:
+    """What the two runs on a world are, worked out by us.
+
+    Attributes:
+        start: Where both begin, with the keyframe's own time and ctrl.
+        ends: (nq,) qpos at the end of the first, and of the second.
+    """
+
+    start: Inputs
+    ends: tuple[Array, Array]
+
+
+def right(world: ExerciseWorld) -> TwoRuns:
+    """Run once; the second run ends in the same bits, but for the one that the world changes."""
+    ctrl, nstep = world.arguments
     with make_data(world.model) as data:
         reset(world.model, data, keyframe=0)
-        return inputs_of(0, data)
+        start = inputs_of(0, data)
+        data.time = 0.0
+        data.ctrl[:] = ctrl
+        step(world.model, data, nstep)
+        first = data.qpos.copy()
+    second = first.copy()
+    if world.nudge is not None:
+        place = world.nudge.place
+        second[place] = np.nextafter(second[place], world.nudge.towards)
+    return TwoRuns(start, (first, second))
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) -> list[str] | str:
+def judge(
+    answer: Answer, world: ExerciseWorld, right: TwoRuns, _course: TwoRuns
+) -> list[str] | str:
     """Two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")
@@ -42,7 +73,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) 
         numbers(end_copy, (world.model.nq,), f"{name}, qpos at the end")
         for name, end_copy in zip(_COUNT, copies, strict=True)
     ]
-    remarks += _runs(answer.runs, world, right)
+    remarks += _runs(answer.runs, world, right.start)
     if remarks:
         return remarks
     first, second = answer.runs
@@ -54,6 +85,8 @@ def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) 
                 "of the first was left over. sm.reset clears all, or use a new Data"
             )
         ]
+    if remarks := _elsewhere(answer.runs, right, nstep):
+        return remarks
     if bool(same) != same_bits(first.end.qpos, second.end.qpos):
         unlike = (
             f"the two runs ended {apart:.1e} apart and you call them equal: nearly is not "
@@ -65,6 +98,19 @@ def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) 
     if remarks := _ends(ends, (first, second)):
         return remarks
     return f"two runs of {nstep} steps end in the same bits"
+
+
+def _elsewhere(runs: Sequence[EngineRun], right: TwoRuns, nstep: int) -> list[str]:
+    """Whether a run ended where such a run does not end; a record may have been made up."""
+    for name, run, end in zip(_COUNT, runs, right.ends, strict=True):
+        if run.end.qpos.shape != end.shape or not near(run.end.qpos, end, _END):
+            return [
+                (
+                    f"{name} run: it did not end where {count(nstep, 'step')} of this command take "
+                    "this arm: nothing but ctrl may act on it"
+                )
+            ]
+    return []
 
 
 def _memory(answer: Answer) -> list[str]:
