@@ -28,7 +28,10 @@ _FAULTS = "faults"  # of `grading`: what puts a fault into an arm, for tests
 def _of_machine(backend: str, _python_path: str | None) -> View:
     """Return what every process on a backend is shown; it is the same for all of a class."""
     rooms = [_PACKAGE / "__init__.py"]
+    compiled = _PACKAGE / "__pycache__"
+    rooms += compiled.glob("__init__.*.pyc")
     for name in ROOMS:
+        rooms += compiled.glob(f"{name}.*.pyc")
         rooms += [place for place in (_PACKAGE / name, _PACKAGE / f"{name}.py") if place.exists()]
     rooms += [_PACKAGE / "grading" / name for name in _INSIDE]
     return python_view(modules_of(backend)).with_more([*rooms, models_dir()])

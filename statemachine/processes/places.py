@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from importlib.machinery import PathFinder
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 
 _LIBRARIES = (
@@ -153,8 +153,13 @@ def python_path(needed: Iterable[str]) -> list[str]:
     return [
         path
         for path in dict.fromkeys(listed)
-        if path in packages or any(PathFinder.find_spec(name, [path]) for name in names)
+        if path in packages or any(_is_module(PathFinder.find_spec(name, [path])) for name in names)
     ]
+
+
+def _is_module(spec: ModuleSpec | None) -> bool:
+    """Return whether a module was found that has a file; a folder of its name alone is none."""
+    return spec is not None and spec.origin is not None
 
 
 def _files_of(name: str) -> Iterator[Path]:
@@ -162,10 +167,10 @@ def _files_of(name: str) -> Iterator[Path]:
     listed = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     try:
         spec = PathFinder.find_spec(name, [os.path.abspath(path) for path in listed if path])
-        spec = spec or importlib.util.find_spec(name)
+        spec = spec if _is_module(spec) else importlib.util.find_spec(name)
     except (ImportError, ValueError):
         return
-    if spec is None:
+    if spec is None or not _is_module(spec):
         return
     if spec.submodule_search_locations:
         yield from map(Path, spec.submodule_search_locations)

@@ -60,7 +60,7 @@ def pytest_configure(config: pytest.Config) -> None:
             tests.parent,
             Path(path).parent,
             lambda _kind, _text: None,
-            alone=config.getoption("watched"),
+            alone=bool(config.getoption("watched")),
             faults=True,
         )
 

@@ -75,7 +75,7 @@ def main(job_file: str) -> None:
 
 def _forget_the_judge() -> None:
     """Leave nothing of `grading` to be had by its name: an import of it is then heard."""
-    parent = sys.modules[__package__.partition(".")[0]]
+    parent = sys.modules[__name__.partition(".")[0]]
     for name in [name for name in sys.modules if name.startswith(f"{parent.__name__}.grading")]:
         del sys.modules[name]
     vars(parent).pop("grading", None)

@@ -8,6 +8,7 @@ code in C is not heard, nor is code that passes for that of an installed package
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import site
@@ -16,7 +17,7 @@ import sysconfig
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import FrameType
+from types import FrameType, SimpleNamespace
 from typing import Any, Literal
 
 from ...models import models_dir
@@ -65,8 +66,22 @@ _INTO_PROCESSES = re.compile(
     r"(?:root|cwd|fd|exe|mem|environ|maps|smaps|map_files|cmdline|pagemap)(?:/|$)"
 )
 _PACKAGE = Path(__file__).resolve().parents[2]
-_PACKAGE_FOLDERS = ("site-packages", "dist-packages")
-_MOST_TOLD = 200  # of what is told: a loop may try every name
+_FOLDERS = {"site-packages", "dist-packages"}  # into which packages are installed
+_MOST_TOLD = 20  # of what is told: a loop may try every name
+
+
+def _own_copy(module: Any) -> Any:
+    """Return `os.path` for the guard alone: a student's code may replace functions of Python's."""
+    spec = importlib.util.find_spec(module.__name__)
+    if spec is None or spec.loader is None:
+        return module
+    copied = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(copied)
+    vars(copied)["os"] = SimpleNamespace(**vars(os))
+    return copied
+
+
+_PATH: Any = _own_copy(os.path)
 
 Who = Literal["student", "package", "ours"]
 
@@ -100,13 +115,15 @@ class Guard:
             *sysconfig.get_paths().values(), *site.getsitepackages(), site.getusersitepackages(),
             os.environ.get("SYSTEMROOT", own),
         )  # fmt: skip
-        self._open = tuple(os.path.realpath(place) + os.sep for place in places)
+        self._open = tuple(_PATH.realpath(place) + os.sep for place in places)
         self._file, self._tell, self._alone = file, tell, alone
-        self._own, self._here = (os.path.realpath(place) + os.sep for place in (own, here))
-        self._standard = tuple(
-            {os.path.realpath(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")}
-        )
+        self._own, self._here = (_PATH.realpath(place) + os.sep for place in (own, here))
+        # As files of code are named: past links or not.
+        standard = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
+        self._standard = (*standard, *map(_PATH.realpath, standard))
         self._package = str(_PACKAGE) + os.sep
+        self._inside = str(Path(__file__).parent) + os.sep
+        self._ours = (self._package, str(Path(__file__).parents[2]) + os.sep)
         inside = ("inside", "faults") if faults else ("inside",)
         self._rooms = tuple(
             str(_PACKAGE / room) for room in (*ROOMS, *(f"grading/{name}" for name in inside))
@@ -136,6 +153,9 @@ class Guard:
             raise self._refusal(_REFUSED[event], event)
         if event == "open":
             self._hear_open(*arguments)
+        elif event == "sqlite3.connect":
+            if (text := _exact(arguments[0])) not in (None, "", ":memory:"):
+                self._look_at(text or "")
         elif event in ("os.link", "os.rename", "os.symlink"):
             self._hear_link(event, *arguments)
         elif event == "import":
@@ -144,17 +164,20 @@ class Guard:
             raise self._refusal("it calls C code", event)
 
     def _hear_open(self, name: Any, mode: str | None, flags: int) -> None:
-        try:
-            text = os.fsdecode(name)
-        except TypeError:  # the number of an open file
+        if isinstance(name, int):  # an open file
+            return
+        text = _exact(name)
+        if text is None:
+            if self._who() == "student":  # an object that may name another file when asked again
+                raise self._refusal("it opens a file by an object", "open")
             return
         if self._who() == "student":
-            if _INTO_PROCESSES.match(os.path.normpath(os.path.join(os.getcwd(), text))):
+            if _INTO_PROCESSES.match(_PATH.normpath(_PATH.join(os.getcwd(), text))):
                 raise self._refusal(f"it opens {text}", "/proc")
             if mode is None:  # os.open, which may go out from any folder that is open
-                real = os.path.realpath(text) + os.sep
-                outside = os.path.isdir(text) and not real.startswith((self._own, self._here))
-                upwards = not os.path.isabs(text) and os.pardir in Path(text).parts
+                real = _PATH.realpath(text) + os.sep
+                outside = _PATH.isdir(text) and not real.startswith((self._own, self._here))
+                upwards = not _PATH.isabs(text) and os.pardir in Path(text).parts
                 if outside or upwards or flags & getattr(os, "O_PATH", 0):
                     raise self._refusal(f"it opens the folder or file {text!r}", "os.open")
         self._look_at(text)
@@ -162,14 +185,11 @@ class Guard:
     def _hear_link(
         self, event: str, source: Any, target: Any, folder: int = -1, other: int = -1
     ) -> None:
-        try:
-            names = os.fsdecode(source), os.fsdecode(target)
-        except TypeError:
-            return
+        names = _exact(source) or "", _exact(target) or ""
         if self._who() == "student":
             if event == "os.symlink":
-                goal = os.path.join(os.path.dirname(os.path.abspath(names[1])), names[0])
-                if not (os.path.realpath(goal) + os.sep).startswith((self._own, self._here)):
+                goal = _PATH.join(_PATH.dirname(_PATH.abspath(names[1])), names[0])
+                if not (_PATH.realpath(goal) + os.sep).startswith((self._own, self._here)):
                     raise self._refusal(f"it makes a link to {names[0]}", event)
             if folder != -1 or other != -1:
                 raise self._refusal("it makes a link by an open folder", event)
@@ -186,7 +206,7 @@ class Guard:
                 raise self._refusal(what, "import", ImportError)
             if name == "_posixsubprocess":
                 raise self._refusal(f"it imports {name}", "import", ImportError)
-            compiled = isinstance(file, str) and (os.path.realpath(file)).startswith(
+            compiled = isinstance(file, str) and (_PATH.realpath(file)).startswith(
                 (self._own, self._here)
             )
             if self._alone and compiled:
@@ -201,22 +221,24 @@ class Guard:
             PermissionError: It is not the student's, and he asks for it.
         """
         with suppress(ValueError):  # no name at all
-            path = os.path.realpath(name)
+            path = _PATH.realpath(name)
             inside = path + os.sep
             if inside.startswith(self._own):
-                if not os.path.exists(path) and "__pycache__" not in path:
+                if not _PATH.exists(path) and "__pycache__" not in path:
                     self._once("reads", path)
                 return
             student = self._who() == "student"
             if inside.startswith(self._package) and not path.startswith(self._rooms):
-                if student and os.path.dirname(path) != str(_PACKAGE):
-                    raise self._refusal(f"it opens {os.path.basename(path)} of the judges", "open")
+                beside = _PATH.dirname(path) in (str(_PACKAGE), str(_PACKAGE / "__pycache__"))
+                if not beside:  # no room that is shown needs it, whoever asks
+                    raise self._refusal(f"it opens {_PATH.basename(path)} of the judges", "open")
                 return
             if inside.startswith((self._package, *self._open)):
                 return
-            if student or os.path.exists(path):
+            there = _PATH.exists(path)
+            if student or there:
                 self._once("reads", path)
-            if student and self._alone:
+            if self._alone and (student or there):  # a package may open it for the student
                 raise PermissionError(f"{path} is not its own: not here")
 
     def _refusal(self, what: str, event: str, kind: type[Exception] = PermissionError) -> Exception:
@@ -239,17 +261,27 @@ class Guard:
             if name == __file__ or name.startswith(("<frozen ", "<__array_function__")):
                 frame = frame.f_back
                 continue
-            folders = name.split(os.sep)
-            if any(folder in folders for folder in _PACKAGE_FOLDERS):
-                # This package may itself be installed there.
-                return "ours" if name.startswith(self._package) else "package"
-            if name.startswith(self._package):
-                return "ours"
+            module = sys.modules.get(str(frame.f_globals.get("__name__")))
+            genuine = module is not None and vars(module) is frame.f_globals
+            if name.startswith(self._ours):
+                # Its own modules are there no more by name; see `child`.
+                return "ours" if genuine or name.startswith(self._inside) else "student"
+            if genuine and not _FOLDERS.isdisjoint(name.split(os.sep)):
+                return "package"
             if name.startswith(self._standard):
                 frame = frame.f_back
                 continue
             return "student"
         return "ours"
+
+
+def _exact(name: Any) -> str | None:
+    """Return the name of a file as a plain text, whatever a class of the student's says of it."""
+    if isinstance(name, str):
+        return str.__str__(name)
+    if isinstance(name, bytes):
+        return os.fsdecode(bytes.__getitem__(name, slice(None)))
+    return None
 
 
 def _line_in(frame: Any, path: Path) -> str | None:
