@@ -148,6 +148,46 @@ SEEN_BY_THE_WATCH: Attacks = {
         "thread.start(); thread.join()\nreturn ('GOT', found) if found else 1",
         "it reads {secret}",
     ),
+    "by an object that has two names": (
+        "import io\nnames = iter([{secret!r}, 'mine.txt'])\n"
+        "class Both:\n    def __fspath__(self): return next(names)\n"
+        "return 'GOT', io.FileIO(Both()).read()",
+        r"it opens a file by an object \(open\)",
+    ),
+    "by a text that lies": (
+        "class Text(str):\n    def startswith(self, *_): return True\n"
+        "    def partition(self, *_): return '', '', ''\n"
+        "return 'GOT', open(Text({secret!r})).read()",
+        "it reads {secret}",
+    ),
+    "with functions of os.path replaced": (
+        "import os\nos.path.realpath = os.path.abspath = lambda name, **_: '/usr/lib'\n"
+        "return 'GOT', open({secret!r}).read()",
+        "it reads {secret}",
+    ),
+    "as if by a package": (
+        "text = 'def read(name): return open(name).read()'\n"
+        "code = compile(text, '/site-packages/x.py', 'exec')\n"
+        "names = {{}}\nexec(code, names)\nreturn 'GOT', names['read']({secret!r})",
+        "it reads {secret}",
+    ),
+    "by a function of this package": (
+        "import statemachine.models as own\n"
+        "exec(compile('def get():\\n import statemachine.grading.judges as j; return j',"
+        " own.__file__, 'exec'), vars(own))\nreturn 'GOT', own.get()",
+        "of the judges|No module named 'statemachine.grading.judges'",
+    ),
+    "as a database": (
+        "import sqlite3\nfile = sqlite3.connect({secret!r})\n"
+        "return 'GOT', file.execute('select 1').fetchall()",
+        "it reads {secret}",
+    ),
+    "everything in /proc": (
+        "import glob\nfound = []\nfor name in glob.glob('/proc/[0-9]*/environ'):\n"
+        "    try: found.append(open(name).read())\n    except OSError: pass\n"
+        "return ('GOT', found) if found else 1",
+        "it opens /proc/1/environ",
+    ),
 }
 # What Python does not tell of: only a process that is shut in is kept from it.
 SHUT_IN_ONLY: Attacks = {
@@ -310,6 +350,38 @@ def test_what_a_submission_needs_is_there(
 
 def test_the_public_interface_is_what_the_package_tells() -> None:
     assert {*sm._MODULES, "interface", "worlds"} == set(PUBLIC)
+
+
+@pytest.mark.parametrize("way", ["shut_in", "watched"])
+def test_tests_on_arms_with_faults_read_nothing_either(
+    way: str, tmp_path: Path, secret: Path, request: pytest.FixtureRequest
+) -> None:
+    request.getfixturevalue(way)
+    names = [str(secret), str(JUDGE), str(SOLUTION), str(tmp_path / "bob" / "test_arm.py")]
+    text = (
+        "import helper\n"
+        "def test_files():\n"
+        f"    for name in {names}:\n"
+        "        try: open(name).read()\n"
+        "        except OSError: continue\n"
+        "        raise AssertionError(name)\n"
+        "def test_judges():\n"
+        "    try: import statemachine.grading.judges.gravity\n"
+        "    except (OSError, ImportError): return\n"
+        "    raise AssertionError('it is there')\n"
+        "def test_help(): assert helper.ONE == 1\n"
+    )
+    written_all(
+        tmp_path,
+        {
+            "ann/test_arm.py": text,
+            "ann/helper.py": "ONE = 1\n",
+            "bob/test_arm.py": "def test_x(): pass\n",
+        },
+    )
+    found = examine(tmp_path / "ann" / "test_arm.py", only=["xyzw"])
+    assert found.failures == ()
+    assert found.tests == ("test_files", "test_judges", "test_help")
 
 
 # A record that is made up.
