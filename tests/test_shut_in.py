@@ -97,9 +97,9 @@ SEEN_BY_THE_WATCH: Attacks = {
         r"it opens the folder or file '\.\./.* \(os\.open\)",
     ),
     "a program by fork_exec": (
-        "import os, _posixsubprocess\nread, write = os.pipe()\n_, error = os.pipe()\n"
+        "import os, _posixsubprocess\nread, write = os.pipe()\nsaid, error = os.pipe()\n"
         "_posixsubprocess.fork_exec([b'/bin/cat', {secret!r}.encode()], [b'/bin/cat'], True,"
-        " (error,), None, None, -1, -1, -1, write, -1, -1, -1, error, False, False, -1, None, None,"
+        " (error,), None, None, -1, -1, -1, write, -1, -1, said, error, False, False, -1, None, None,"
         " None, -1, None, False)\n"
         "os.close(write)\nreturn 'GOT', os.read(read, 99)",
         r"it starts another program \(fork_exec\)",
