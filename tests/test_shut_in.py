@@ -98,9 +98,9 @@ SEEN_BY_THE_WATCH: Attacks = {
     ),
     "a program by fork_exec": (
         "import os, _posixsubprocess\nread, write = os.pipe()\nsaid, error = os.pipe()\n"
-        "_posixsubprocess.fork_exec([b'/bin/cat', {secret!r}.encode()], [b'/bin/cat'], True,"
-        " (error,), None, None, -1, -1, -1, write, -1, -1, said, error, False, False, -1, None, None,"
-        " None, -1, None, False)\n"
+        "words = [b'/bin/cat', {secret!r}.encode()]\n"
+        "_posixsubprocess.fork_exec(words, words[:1], True, (error,), None, None, -1, -1,"
+        " -1, write, -1, -1, said, error, False, False, -1, None, None, None, -1, None, False)\n"
         "os.close(write)\nreturn 'GOT', os.read(read, 99)",
         r"it starts another program \(fork_exec\)",
     ),
