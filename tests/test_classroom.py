@@ -273,7 +273,8 @@ def test_tests_and_predictions_are_in_the_same_table(
 ) -> None:
     ran: list[Path] = []
 
-    def examined(file: Path, backend: str) -> Figures:
+    def examined(file: Path, backend: str, own: dict[str, Path]) -> Figures:
+        assert own[file.name] == file
         ran.append(file)
         caught = (Figures(test="test_x", why="no"),)
         trials = tuple(

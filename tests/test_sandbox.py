@@ -15,8 +15,9 @@ import pytest
 
 from statemachine.processes import sandbox
 from statemachine.processes.parallel import worker_processes
+from statemachine.processes.places import View, bare_python
 
-from .conftest import assert_has, lives, processes_with, refused
+from .conftest import ROOT, assert_has, lives, processes_with, refused, written_all
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="limits and sessions are POSIX")
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
@@ -207,9 +208,106 @@ def test_signals_and_limits_are_told_alike(shut_in: bool, request: pytest.Fixtur
 
 
 @LINUX
-def test_where_it_cannot_be_shut_in_it_runs_all_the_same(tmp_path: Path) -> None:
-    done = _python("import os; print(os.getpid() > 2)", writable=tmp_path / "nowhere", cwd=tmp_path)
+def test_where_it_cannot_be_shut_in_it_runs_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sandbox, "shut_in", lambda: False)
+    done = _python("import os; print(os.getpid() > 2)", writable=tmp_path, cwd=tmp_path)
     assert_has(done, code=0, stdout="True\n")
+
+
+def test_where_it_was_to_be_shut_in_and_is_not_it_does_not_run(folder: Path) -> None:
+    done = _python("print('it runs')", writable=folder / "nowhere", cwd=folder)
+    assert_has(done, code=1, stdout="")
+    assert "it cannot be shut in" in done.stderr
+
+
+def test_what_is_asked_of_the_system_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    tries: list[int] = []
+    monkeypatch.setattr(sandbox, "_answers", {})
+    monkeypatch.setattr(sandbox, "_tried", lambda: not tries.append(1))
+    if sys.platform == "linux":
+        assert [sandbox.shut_in() for _ in range(3)] == [True] * 3
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert not sandbox.shut_in()
+    assert len(tries) <= 1
+
+
+@LINUX
+def test_a_system_that_permits_no_namespaces_is_known_by_trying(folder: Path) -> None:
+    # Within one user namespace the system is told to make no other.
+    code = (
+        "from statemachine.processes import sandbox\n"
+        "open('/proc/sys/user/max_user_namespaces', 'w').write('0')\n"
+        "print(sandbox.shut_in())"
+    )
+    done = subprocess.run(
+        ["unshare", "-U", "-r", sys.executable, "-c", code],
+        capture_output=True, text=True, check=False, cwd=ROOT,
+    )  # fmt: skip
+    if "Permission denied" in done.stderr or done.returncode == 127:
+        pytest.skip("there is no unshare here, or no way to forbid namespaces")
+    assert done.stdout == "False\n", done.stderr
+
+
+# What it sees of the files of this machine.
+
+
+def _seen(folder: Path, code: str, *shown: Path) -> sandbox.ProcessOutcome:
+    return _shut_in(folder, code, view=bare_python().with_more(shown))
+
+
+def test_with_a_view_it_sees_python_and_what_is_shown(folder: Path) -> None:
+    written_all(folder.parent, {"shown/a.txt": "a", "hidden/b.txt": "b", "link/c.txt": "c"})
+    (folder.parent / "shown" / "out").symlink_to(folder.parent / "hidden" / "b.txt")
+    done = _seen(
+        folder,
+        "import json, os\n"
+        f"os.chdir({str(folder.parent)!r})\n"
+        "print(sorted(os.listdir()), sorted(os.listdir('shown')), os.path.exists('shown/out'))\n"
+        "print(sorted(set(os.listdir('/etc')) - {'ld.so.cache', 'alternatives'}))\n"
+        "print(os.path.exists('/home'), os.path.exists('/var'), os.path.exists('/sys'))\n"
+        "open('shown/new', 'w')",
+        folder.parent / "shown",
+    )
+    first, etc, others = done.stdout.splitlines()
+    assert first == "['inside', 'shown'] ['a.txt', 'out'] False"
+    assert (etc, others) == ("[]", "False False False")
+    assert "Read-only file system" in done.stderr
+
+
+def test_with_a_view_there_is_no_way_back(folder: Path) -> None:
+    secret = folder.parent / "secret.txt"
+    secret.write_text("SECRET")
+    done = _seen(
+        folder,
+        "import ctypes, glob, os\n"
+        f"name = {str(secret)!r}\n"
+        "tries = [name, '/proc/self/root' + name, '/proc/1/root' + name, '/proc/self/cwd' + name,\n"
+        "         *(f'{link}/..{name}' for link in glob.glob('/proc/self/fd/*')),\n"
+        "         *(f'/proc/{n}/root{name}' for n in range(20)), '/../../..' + name]\n"
+        "print([t for t in tries if os.path.exists(t)])\n"
+        "c = ctypes.CDLL(None, use_errno=True)\n"
+        "print([c.unshare(f) for f in (0x10000000, 0x20000, 0x10020000)])\n"
+        "print(c.umount2(b'/usr/lib', 2), c.mount(b'none', b'/', b'tmpfs', 0, None))\n"
+        "print(c.ptrace(16, 1, 0, 0), len(os.listdir('/proc/self/fd')) <= 4)",
+    )
+    assert done.stdout == "[]\n[-1, -1, -1]\n-1 -1\n-1 True\n", done.stderr
+
+
+def test_a_view_follows_links_to_what_it_shows(folder: Path) -> None:
+    far = written_all(folder.parent, {"far/real/a.txt": "a"}) / "far"
+    (far / "link").symlink_to("real")
+    (folder.parent / "way").symlink_to(far / "link")
+    place = folder.parent / "way" / "a.txt"
+    assert _seen(folder, f"print(open({str(place)!r}).read())", place).stdout == "a\n"
+
+
+def test_a_view_is_written_outside_in(tmp_path: Path) -> None:
+    written_all(tmp_path, {"a/b/c/d.txt": "", "a/e.txt": ""})
+    a, b = tmp_path / "a", tmp_path / "a" / "b"
+    lines = View((b / "c" / "d.txt", a, a / "e.txt", tmp_path / "nowhere"), (b,)).lines()
+    assert lines == [f"show {a}", f"empty {b}", f"show {b / 'c' / 'd.txt'}"]
 
 
 # What processes share

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from ..errors import BadInputError
 from ..models import check_is_file
-from .calls import reason
 from .exercise import LOOK
+from .inside.calls import reason
 from .judges import JUDGES, Judgement
 
 _HEAD = (
@@ -19,6 +19,8 @@ _HEAD = (
     "alike", "details", "sha256", "made_with",
 )  # fmt: skip
 NOTHING = "handed in nothing"
+# In `made_with`, where what a student's code reads is only watched.
+WATCHED = "reading only watched"
 _FEW = 120  # characters of a remark
 _WORDS = {"right", "wrong", "not written", "not judged"}
 
@@ -63,6 +65,11 @@ class ClassEntry:
         """Whether there is a verdict on each function, or nothing to judge."""
         complete = bool(self.functions) and all(judgement.judged for judgement in self.functions)
         return complete or self.refusal == NOTHING
+
+    @property
+    def watched(self) -> bool:
+        """Whether it was judged where what a student's code reads is only watched."""
+        return self.made_with.endswith(WATCHED)
 
     @property
     def looks(self) -> tuple[str, ...]:

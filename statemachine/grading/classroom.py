@@ -11,16 +11,25 @@ from pathlib import Path
 
 from ..errors import BadInputError, StateMachineError
 from ..models import AnyPath, check_is_file
-from ..processes import checked_jobs
+from ..processes import checked_jobs, sandbox
 from ..processes.parallel import in_parallel
 from ..runs.drive import Progress, silent
 from ..runs.whole import replace_csv
 from . import score
-from .calls import reason
-from .class_table import NOTHING, ClassEntry, read, rows_of
+from .class_table import NOTHING, WATCHED, ClassEntry, read, rows_of
 from .exercise import TIME_LIMIT, ExerciseJudge
 from .faults.run import examine
-from .recording import code_of, digest, has_functions, in_folder, likeness, shape_of
+from .inside.calls import reason
+from .links import leads_out, refusal_of
+from .recording import (
+    code_of,
+    digest,
+    has_functions,
+    in_folder,
+    likeness,
+    refused_links,
+    shape_of,
+)
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
 _PREDICTIONS = "lesson.json"
@@ -72,7 +81,7 @@ def submissions(paths: Sequence[AnyPath]) -> list[Submission]:
     for path in map(Path, paths):
         if is_one_students(path):
             name = path.resolve().name if len(paths) == 1 else path.as_posix()
-            by_place[path] = replace(_in_entry(path)[0], name=name)
+            by_place[path] = replace(_in_folder_of_one(path)[0], name=name)
         elif path.is_dir():
             before = "" if len(paths) == 1 else f"{path.as_posix()}/"
             for entry in sorted(path.iterdir()):
@@ -81,6 +90,9 @@ def submissions(paths: Sequence[AnyPath]) -> list[Submission]:
                         by_place.setdefault(
                             entry, replace(submission, name=before + submission.name)
                         )
+        elif path.is_symlink():  # as those of a class are named by a shell
+            refusal = refusal_of(path, path.name)
+            by_place.setdefault(path, Submission(path.as_posix(), None, refusal))
         elif path.is_file():
             by_place.setdefault(path, Submission(path.as_posix(), path))
         else:
@@ -113,6 +125,7 @@ def is_one_students(folder: Path) -> bool:
         for entry in folder.iterdir()
         if not _skipped(entry) and entry.name not in _NAMES
         for file in (entry.rglob("*.py") if entry.is_dir() else [entry])
+        if not leads_out(file, folder)
     )
 
 
@@ -129,17 +142,28 @@ def submission_in(folder: Path) -> Path:
     Raises:
         BadInputError: There is none, or more than one.
     """
-    (submission,) = _in_entry(folder)
+    (submission,) = _in_folder_of_one(folder)
     if submission.path is None:
         raise BadInputError(submission.refusal)
     return submission.path
 
 
 def _in_entry(entry: Path) -> list[Submission]:
+    """What an entry of a class's folder is; one of no interest is none."""
+    if entry.is_symlink():  # out of what this student handed in, wherever it leads
+        to_nothing = not entry.exists() and not entry.is_dir()
+        refusal = "a link to nothing" if to_nothing else refusal_of(entry, entry.name)
+        is_python = entry.suffix.lower() == ".py" and entry.name != "conftest.py"
+        of_interest = is_python or entry.suffix.lower() in _UNREAD or entry.is_dir()
+        return [Submission(entry.name, None, refusal)] * of_interest
+    return _in_folder_of_one(entry)
+
+
+def _in_folder_of_one(entry: Path) -> list[Submission]:
+    """The same of one that is no link."""
     if not entry.is_dir():
         refusal = reason(
             (entry.is_file(), _UNREAD.get(entry.suffix.lower(), "")),
-            (entry.is_symlink(), "a link to nothing"),
             (True, "a pipe or a device, and no file"),
         )
         is_module = entry.is_file() and entry.suffix.lower() == ".py"
@@ -147,6 +171,8 @@ def _in_entry(entry: Path) -> list[Submission]:
         return [Submission(entry.name, entry if python else None, refusal)] * bool(
             python or refusal
         )
+    if refusal := refused_links(entry):
+        return [Submission(entry.name, None, refusal)]
     files = [file for file in sorted(entry.rglob("*.py")) if has_functions(file)]
     files = [file for file in files if file.name == _NAMES[0]] or files
     if len(files) == 1:
@@ -241,6 +267,8 @@ def judge_all(
     with ExerciseJudge(backend, time_limit) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
         made_with = f"{backend}, {versions}, {time_limit:g} s"
+        if not sandbox.shut_in():
+            made_with += f", {WATCHED}"
         work: dict[str, Callable[[], ClassEntry]] = {}
         for submission in submitted:
             content = digest(submission.own)
@@ -292,14 +320,14 @@ def _entry(
             entry = replace(entry, refusal=str(error))
     file = submission.named(_NAMES[1])
     if tests and file is not None and not entry.tests:
-        entry = replace(entry, tests=_caught(file, judge.backend))
+        entry = replace(entry, tests=_caught(file, judge.backend, submission.own))
     return entry
 
 
-def _caught(file: Path, backend: str) -> str:
+def _caught(file: Path, backend: str, own: Mapping[str, Path]) -> str:
     """How many faults a student's tests catch, and which they do not."""
     try:
-        examination = examine(file, backend)
+        examination = examine(file, backend, own=own)
     except StateMachineError as error:
         return str(error)
     if examination.failures:

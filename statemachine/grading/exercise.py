@@ -26,20 +26,24 @@ from ..errors import BadInputError, EngineError, refuse
 from ..installed import DEFAULT, engine_version
 from ..models import AnyPath, what_is_there
 from ..page import Figures
+from ..processes import sandbox
 from ..processes.parallel import in_parallel, unwinding
 from ..releases import is_release
 from ..runs.drive import Progress, silent
+from .inside.worlds import ExerciseWorld, Scenes, worlds_of
 from .judges import JUDGES, Judgement, judge_of, judged
+from .links import refusal_of
 from .recording import (
     LARGEST,
     FunctionRecording,
+    copied_to,
     digest,
     has_solutions,
     in_folder,
     named_by,
     record,
+    refused_links,
 )
-from .worlds import ExerciseWorld, Scenes
 
 LOOK = "please look at this"
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
@@ -74,7 +78,8 @@ def grade_of(
         wall_limit: See cpu_limit.
 
     Returns:
-        The same; right: how many functions do what they should; passed: whether all do.
+        The same; right: how many functions do what they should; passed: whether all do;
+        _watched: whether what the student's code reads is only watched.
     """
     right = sum(judgement.passed for judgement in functions)
     return Figures(
@@ -87,6 +92,7 @@ def grade_of(
         wall_limit=wall_limit,
         right=right,
         passed=right == len(functions),
+        _watched=not sandbox.shut_in(),
     )
 
 
@@ -115,6 +121,8 @@ def run(
         UnknownNameError: There is no such backend.
         MissingEngineError: Its engine is not installed here.
     """
+    if folder is not None and (refusal := refused_links(folder)):
+        raise BadInputError(refusal)
     with ExerciseJudge(backend, time_limit, wall_limit) as judge:
         return judge.judge(file, progress, None if folder is None else in_folder(folder))
 
@@ -177,8 +185,10 @@ class ExerciseJudge(ExitStack):
                 names beside it.
 
         Raises:
-            BadInputError: There is no such file, or it is not a Python file.
+            BadInputError: There is no such file, it is not a Python file, or a link to one.
         """
+        if own is None and Path(file).is_symlink():
+            raise BadInputError(refusal_of(Path(file), Path(file).name))
         path = _python_file(Path(file))
         folder = Path(tempfile.mkdtemp(dir=self._folder))
         copy = _copied(path, own or named_by(path), folder / "own")
@@ -219,7 +229,7 @@ class ExerciseJudge(ExitStack):
         with self._lock:
             if not self._key:
                 scenes = Scenes(self.backend, Path(tempfile.mkdtemp(dir=self._folder)))
-                worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
+                worlds = {name: worlds_of(name, scenes) for name in JUDGES}
                 self._key = {n: (w, [*map(judge_of(n).right, w)]) for n, w in worlds.items()}
 
     def _judgement(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
@@ -321,12 +331,7 @@ class _Copy:
 
 
 def _copied(path: Path, own: Mapping[str, Path], folder: Path) -> _Copy:
-    if path not in map(Path.resolve, own.values()):  # a hidden file, or one of very many
-        own = {path.name: path}
-    for name, file in own.items():
-        target = folder / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(file, target)
-    name = next(name for name, file in own.items() if file.resolve() == path)
+    folder.mkdir()
     folder = folder.resolve()
-    return _Copy(folder / name, folder, path.parents[name.count("/")])
+    copy = copied_to(folder, path, own)
+    return _Copy(copy, folder, path.parents[len(copy.relative_to(folder).parts) - 1])

@@ -12,16 +12,20 @@ import stat
 import sys
 import threading
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..errors import BadInputError
 from ..page import Figures
 from ..processes import ALONE, sandbox
-from .answers import Answer, decode
-from .calls import FaultError
+from ..processes.places import python_path
+from .inside.answers import Answer, decode
+from .inside.calls import FaultError
 from .judges import JUDGES
+from .links import leads_out, links_out, refusal_of
+from .shown import modules_of, view_of
 
 START = 60.0  # [s] on the clock for Python, the engine and the worlds to get ready
 _MEMORY_MOST = 2 * sandbox.GB
@@ -30,12 +34,12 @@ _TEXT_MOST = 2000  # characters
 _PACKAGES = Path(__file__).resolve().parents[2]
 _CHILD = (
     "import sys; sys.path.insert(0, sys.argv[2]); "
-    "from statemachine.grading.guard import main; main(sys.argv[1])"
+    "from statemachine.grading.inside.child import main; main(sys.argv[1])"
 )
 # What a program needs to start; the rest does not concern a student.
 _KEPT = (
-    "PATH", "SYSTEMROOT", "LANG", "LC_ALL",
-    "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHOME", "CONDA_PREFIX",
+    "SYSTEMROOT", "LANG", "LC_ALL",
+    "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONHOME", "CONDA_PREFIX",
 )  # fmt: skip
 
 
@@ -98,10 +102,9 @@ def record(
         "answers": str(answers),
         "trace": str(trace),
         "nonce": nonce,
+        "alone": not sandbox.shut_in(),
     }
     job.write_text(json.dumps(facts), encoding="utf-8")
-    passed_on = {name: os.environ[name] for name in _KEPT if name in os.environ}
-    environment = {**passed_on, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     outcome = sandbox.run(
         [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
         cpu=limits.cpu,
@@ -110,8 +113,9 @@ def record(
         start=START,
         start_cpu=START,
         cwd=scratch,
-        env=environment,
+        env=environment(backend),
         writable=folder,
+        view=view_of(backend, [own]),
         memory_most=_MEMORY_MOST,
         stop=stop,
     )
@@ -124,6 +128,19 @@ def record(
     if outcome.started and not (recording.began or recording.refusal):
         recording.broken = recording.broken or "it is gone"
     return recording
+
+
+def environment(backend: str) -> dict[str, str]:
+    """Return the environment of a student's process: of ours what a program needs to start.
+
+    Where it is shut in, it is told of no folder that it is not shown.
+    """
+    names = _KEPT if sandbox.shut_in() else (*_KEPT, "PATH", "PYTHONPATH")
+    kept = {name: os.environ[name] for name in names if name in os.environ}
+    if sandbox.shut_in():
+        kept["PATH"] = os.defpath
+        kept["PYTHONPATH"] = os.pathsep.join(python_path(modules_of(backend)))
+    return {**kept, **ALONE, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
 
 def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
@@ -196,37 +213,88 @@ def start_of(file: Path) -> bytes:
 
 
 def in_folder(folder: Path) -> dict[str, Path]:
-    """All that one student handed in, by name within the folder; not what tools left there."""
-    return {file.relative_to(folder).as_posix(): file for file in sorted(_plain(folder))[:_MOST]}
+    """Return all that one student handed in, by name within the folder; not what tools left there.
+
+    A link that leads out of the folder is no part of it.
+    """
+    found = {}
+    for file in sorted(_walked(folder)):
+        outside = file.is_symlink() and leads_out(file, folder)
+        if not outside and file.is_file() and file.stat().st_size <= LARGEST:
+            found[file.relative_to(folder).as_posix()] = file
+            if len(found) == _MOST:
+                break
+    return found
 
 
-def _plain(folder: Path) -> Iterator[Path]:
+def refused_links(folder: Path) -> str:
+    """Return why a folder is refused for a link in it that leads out; "" where there is none."""
+    for link in sorted(links_out(folder, _walked(folder, folders_too=True))):
+        return refusal_of(link, link.relative_to(folder).as_posix())
+    return ""
+
+
+def _walked(folder: Path, folders_too: bool = False) -> Iterator[Path]:
+    """Give what is in a folder and its folders, less what tools leave; links are not followed."""
     for place, folders, names in os.walk(folder):
-        environment = "pyvenv.cfg" in names
-        folders[:] = [
-            name for name in folders if not (environment or name.startswith((".", "__pycache__")))
-        ]
-        for name in () if environment else names:
-            file = Path(place, name)
-            if not name.startswith(".") and file.is_file() and file.stat().st_size <= LARGEST:
-                yield file
+        if "pyvenv.cfg" in names:  # an environment
+            folders[:] = []
+            continue
+        folders[:] = [name for name in folders if not name.startswith((".", "__pycache__"))]
+        kept = [name for name in names if not name.startswith(".")]
+        yield from (Path(place, name) for name in kept + (folders if folders_too else []))
 
 
-def named_by(file: Path) -> dict[str, Path]:
-    """A file and what it names beside it, but for files that hold somebody's functions."""
+def named_by(file: Path, somebody_elses: Callable[[Path], bool] | None = None) -> dict[str, Path]:
+    """Return a file and what it names beside it, but for what is somebody else's.
+
+    Args:
+        file: The student's.
+        somebody_elses: Tells that; without, a file is that holds functions of the exercise.
+
+    Raises:
+        BadInputError: It names a link that leads out of the folder.
+    """
+    is_others = somebody_elses or has_solutions
     own, waiting = {file.name: file}, [file]
     beside = [entry for entry in file.parent.iterdir() if not entry.name.startswith(".")]
     while waiting:
         words = set(re.findall(r"\w+", start_of(waiting.pop()).decode("utf-8", "replace")))
         for entry in (entry for entry in beside if entry.stem in words):
-            package = in_folder(entry) if (entry / "__init__.py").is_file() else {}
+            is_package = (entry / "__init__.py").is_file()
+            if entry != file and entry.is_symlink() and leads_out(entry, file.parent):
+                if is_package or entry.is_file():
+                    raise BadInputError(refusal_of(entry, entry.name))
+                continue
+            package = in_folder(entry) if is_package else {}
+            if package and (refusal := refused_links(entry)):
+                raise BadInputError(refusal)
             files = {f"{entry.name}/{name}": inside for name, inside in package.items()}
             for name, other in (files or {entry.name: entry}).items():
                 fits = other.is_file() and other.stat().st_size <= LARGEST
-                if name not in own and fits and not has_solutions(other):
+                if name not in own and fits and not is_others(other):
                     own[name] = other
                     waiting.append(other)
     return own
+
+
+def copied_to(folder: Path, file: Path, own: Mapping[str, Path]) -> Path:
+    """Copy a student's file and what belongs to it into a folder; return the copy of the file.
+
+    Args:
+        folder: A new one.
+        file: The student's.
+        own: All files that belong to it, by their names in the folder.
+    """
+    real = file.resolve()
+    names = [name for name, each in own.items() if each.resolve() == real]
+    if not names:  # a hidden file, or one of very many
+        names, own = [file.name], {file.name: file}
+    for name, each in own.items():
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(start_of(each))
+    return folder / min(names, key=lambda name: own[name].is_symlink())  # not a link to it
 
 
 def digest(files: Mapping[str, Path]) -> str:

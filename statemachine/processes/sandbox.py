@@ -2,11 +2,11 @@
 
 On POSIX it gets a session and limits of its own; on Linux processes that left the session are
 found too, and it ends when we do. With `writable`, and where Linux permits it to any user, it
-is shut in (see `_launcher`). On Windows only the process itself is ended.
+is shut in (see `_launcher` and `shut_in`). On Windows only the process itself is ended.
 
 Where it is not shut in it has the rights of whoever runs it, and this guards against what goes
-wrong, not against an attacker. Where it is, it still reads what its user can read, and a fault
-of the kernel's lets it out.
+wrong, not against an attacker. Where it is, it sees what its `view` shows (without one, all that
+its user can read), and a fault of the kernel's lets it out.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal
 
 from . import signal_name
+from .places import View, bare_python
 
 GB = 1024**3
 # Address space, of which engines reserve far more than they use.
@@ -81,6 +82,7 @@ def run(
     cwd: str | os.PathLike[str] | None = None,
     env: Mapping[str, str] | None = None,
     writable: str | os.PathLike[str] | None = None,
+    view: View | None = None,
     output_most: int = 1_000_000,
     memory_most: int = MEMORY_MOST,
     stop: threading.Event | None = None,
@@ -98,9 +100,11 @@ def run(
             limits itself from there (`limit_cpu`).
         cwd: Where it runs; None for here.
         env: Its environment; None for ours.
-        writable: The folder in which it has its home and its temporary files; where the system
-            permits it, it can write nowhere else, and has no network and no other process in
+        writable: The folder in which it has its home and its temporary files; where it is
+            `shut_in`, it can write nowhere else, and has no network and no other process in
             sight. None for none of this.
+        view: With `writable`: all that it sees of the files of this machine, beside that folder,
+            where it is `shut_in`. None for all.
         output_most: Bytes of stdout, and of stderr, to keep.
         memory_most: Bytes of address space of each process, where the system can limit it.
         stop: Set by another thread, it ends the command as the time limit does.
@@ -110,13 +114,20 @@ def run(
     """
     token, stopped = secrets.token_hex(16), stop or threading.Event()
     place, home = "", dict[str, str]()
-    if writable is not None:
-        place = str(Path(writable).resolve())
-        home.update(dict.fromkeys(("HOME", "USERPROFILE", "TMPDIR", "TEMP", "TMP"), place))
-        home["PYTHONUSERBASE"] = site.getuserbase()  # what is installed in ours is found
-    limits = (os.getpid(), memory_most, math.ceil(cpu + start_cpu), _FILE_MOST, place)
-    launched = [sys.executable, "-I", "-S", _LAUNCHER, *map(str, limits)]
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+    with ExitStack() as stack:
+        seen = ""
+        if writable is not None:
+            place = str(Path(writable).resolve())
+            home.update(dict.fromkeys(("HOME", "USERPROFILE", "TMPDIR", "TEMP", "TMP"), place))
+            if site.ENABLE_USER_SITE:  # what is installed in ours is found
+                home["PYTHONUSERBASE"] = site.getuserbase()
+            if not shut_in():
+                place = ""
+            elif view is not None:
+                seen = stack.enter_context(_written(view))
+        limits = (os.getpid(), memory_most, math.ceil(cpu + start_cpu), _FILE_MOST, place, seen)
+        launched = [sys.executable, "-I", "-S", _LAUNCHER, *map(str, limits)]
+        out, err = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
         began = time.monotonic()
         process = subprocess.Popen(
             [*(launched if os.name == "posix" else ()), *command],
@@ -166,6 +177,50 @@ def run(
         "flood": f"prints more than {_FLOOD >> 20} MB, and was ended there",
     }
     return ProcessOutcome(end, code, is_ready or started(), *texts, took, used, words[end])  # pyright: ignore
+
+
+_asked = threading.Lock()
+_answers: dict[str, bool] = {}
+
+
+def shut_in() -> bool:
+    """Return whether this system lets us shut a command in; it is tried once.
+
+    That needs Linux, user namespaces that any user may make, and mounts in them: some containers
+    and distributions permit no such thing.
+    """
+    if sys.platform != "linux":
+        return False
+    with _asked:
+        if "" not in _answers:
+            _answers[""] = _tried()
+        return _answers[""]
+
+
+def _tried() -> bool:
+    """Return whether a Python that is shut in, and sees nothing but Python, comes to its end."""
+    with tempfile.TemporaryDirectory() as folder, _written(bare_python()) as view:
+        command = [sys.executable, "-I", "-S", "-c", "import ctypes, json, os; os.listdir('.')"]
+        limits = (os.getpid(), MEMORY_MOST, 60, _FILE_MOST, os.path.realpath(folder), view)
+        tried = subprocess.run(
+            [sys.executable, "-I", "-S", _LAUNCHER, *map(str, limits), *command],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            check=False,
+        )
+    return tried.returncode == 0
+
+
+@contextmanager
+def _written(view: View) -> Iterator[str]:
+    """Write a view down as `_launcher` reads it; give the folder."""
+    with tempfile.TemporaryDirectory(prefix="statemachine-") as folder:
+        Path(folder, "root").mkdir()
+        lines = "".join(f"{line}\0" for line in view.lines())
+        Path(folder, "places").write_bytes(os.fsencode(lines))
+        yield os.path.realpath(folder)
 
 
 def limit_cpu(seconds: float, trace: IO[str]) -> None:

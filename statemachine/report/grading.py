@@ -36,6 +36,7 @@ def grade_page(grade: Figures) -> Page:
         todo=f"; {todo} not written yet" if todo else "",
         passed=if_true(grade.passed),
         unwritten=if_true(todo),
+        watched=ONLY_WATCHED if grade._watched else None,
     )
 
 
@@ -73,12 +74,18 @@ def class_page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Pa
         table=table,
         solved=sum(entry.right == len(JUDGES) for entry in counted),
         ignored=", ".join(ignored) or None,
+        watched=ONLY_WATCHED if any(entry.watched for entry in entries) else None,
         notes=notes,
         unjudged=unjudged,
         all_judged=None if unjudged else True,
     )
 
 
+# What is said where a student's code is not kept from the files of this machine.
+ONLY_WATCHED = (
+    "This system has no sandbox for a student's code: what it reads is only watched, not prevented "
+    "(docs/teaching.md)."
+)
 _WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
 
 
@@ -153,5 +160,8 @@ def gradescope_results(grade: Figures | None, refusal: str = "") -> str:
             }
         )
     versions = grade.versions if grade else {}
-    document = {"tests": tests, "output": versions_of(versions) or refusal, "visibility": "visible"}
+    output = versions_of(versions) or refusal
+    if grade is not None and grade._watched:
+        output += f"\n{ONLY_WATCHED}"
+    document = {"tests": tests, "output": output, "visibility": "visible"}
     return json.dumps(document, indent=1, ensure_ascii=False) + "\n"

@@ -23,7 +23,7 @@ import statemachine as sm
 
 from ...engines import rooms_with
 from ...installed import DEFAULT
-from ..guard import Guard
+from ..inside.guard import Guard
 from . import FAULT, IMPORT
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--engine", choices=rooms_with("backend"), default=DEFAULT, help="backend of `model`"
     )
     group.addoption("--record", metavar="FILE", help="write down there what happens")
+    group.addoption("--watched", action="store_true", help="with --record: refuse other files, too")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -49,12 +50,19 @@ def pytest_configure(config: pytest.Config) -> None:
         PATCHES[name](pytest.MonkeyPatch())  # for the life of the process
     if path := config.getoption("record"):
         config.pluginmanager.register(PytestRecorder(Path(path)))
+        tests = Path(str(config.args[0]).partition("::")[0]).absolute()
         os.chdir(Path(path).parent)  # what tests write does not end up beside them
         sm.load(
             SCENE, backend=str(config.getoption("engine"))
         )  # engines start processes of their own
-        tests = Path(str(config.args[0]).partition("::")[0])
-        Guard(tests, tests.parent, Path(path).parent, lambda _kind, _text: None)
+        Guard(
+            tests,
+            tests.parent,
+            Path(path).parent,
+            lambda _kind, _text: None,
+            alone=bool(config.getoption("watched")),
+            faults=True,
+        )
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,8 @@ import re
 import sys
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -33,7 +34,9 @@ from ...page import Figures
 from ...processes import checked_jobs, sandbox
 from ...processes.parallel import in_parallel, unwinding
 from ...runs.drive import Progress, silent
-from ..recording import content
+from ..links import refusal_of
+from ..recording import content, copied_to, environment, named_by, start_of
+from ..shown import view_of
 from . import FAULT, FAULTS, IMPORT, Fault
 
 _SECONDS = 60.0  # of computing, for the tests on the healthy arm
@@ -47,7 +50,6 @@ _LONGEST = 300  # characters of what was said last
 # Where the error itself stands, as pytest writes it; the first that fits counts.
 _ERRORS = (r"^E   (\S.*)", r"^E +(\S.*)", r"^ +\| (\w+Group: .*)", r"^(\S.*)")
 _CHAINED = re.compile(r"^(?:The above exception was|During handling of the above) .*", re.MULTILINE)
-_OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
 
 def trial_of(fault: Fault, caught_by: tuple[Figures, ...]) -> Figures:
@@ -101,6 +103,7 @@ def examine(
     seconds: float = _SECONDS,
     clock: float = _CLOCK,
     progress: Progress = silent,
+    own: Mapping[str, Path] | None = None,
 ) -> Figures:
     """Run a student's tests on the healthy arm and on one with each of the faults.
 
@@ -111,13 +114,15 @@ def examine(
         seconds: What the tests may compute on the healthy arm [s].
         clock: What they may take there on the clock, from when the arm is ready [s].
         progress: Told the fraction that is done.
+        own: All files that belong to it, by their names in its folder; without, what it names
+            beside it. No other file is there for the tests.
 
     Returns:
         As `examination_of`.
 
     Raises:
         ModelFileError: There is no such file.
-        BadInputError: It cannot be imported, or there are no tests in it.
+        BadInputError: It is a link, it cannot be imported, or there are no tests in it.
         UnknownNameError: There is no such fault or backend.
         MissingEngineError: The engine, or pytest, is not here.
         EngineError: pytest did not come as far as the tests.
@@ -128,8 +133,13 @@ def examine(
     faults = [FAULTS[name] for name in dict.fromkeys(only or FAULTS)]
     version = _ready(backend)
     records: dict[str, Figures] = {}
-    with unwinding():
-        healthy = _run(path, backend, None, seconds, clock)
+    with ExitStack() as stack:
+        stack.enter_context(unwinding())
+        folder = stack.enter_context(
+            tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True)
+        )
+        copied = copied_to(Path(folder).resolve(), path, own or named_by(path, _has_tests))
+        healthy = _run(copied, backend, None, seconds, clock)
         if broken := healthy.failures.get(IMPORT):
             raise BadInputError(f"{path.name} cannot be imported: {broken}")
         if not healthy.tests:
@@ -140,7 +150,7 @@ def examine(
             patience = _TIMES * took.cpu + _AND, _TIMES * took.wall + _CLOCK_AND
             stop, total = threading.Event(), len(faults) + 1
             records = in_parallel(
-                {f.name: partial(_run, path, backend, f.name, *patience, stop) for f in faults},
+                {f.name: partial(_run, copied, backend, f.name, *patience, stop) for f in faults},
                 checked_jobs(None),
                 stop.set,
                 lambda left: progress((total - left) / total),
@@ -157,11 +167,18 @@ def examine(
 
 def _test_file(file: AnyPath) -> Path:
     path = Path(file).absolute()
+    if path.is_symlink():
+        raise BadInputError(refusal_of(path, path.name))
     if not path.is_file():
         raise ModelFileError(f"no file {os.fspath(file)}: --faults takes a file of tests")
     if path.suffix != ".py":
         raise BadInputError(f"{path.name} is not a Python file: --faults takes a file of tests")
     return path
+
+
+def _has_tests(file: Path) -> bool:
+    """Return whether a file holds tests: then it is not another's helper."""
+    return re.search(rb"^\s*def test_", start_of(file), re.M) is not None
 
 
 def _ready(backend: str) -> str:
@@ -211,9 +228,12 @@ def _run(
             *(sys.executable, "-P", "-m", "pytest", "-c", str(settings), "--rootdir", folder),
             *("--noconftest", "--tb=short", "--no-summary", "-q", "-p", "no:cacheprovider"),
             *("-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)),
+            *([] if sandbox.shut_in() else ["--watched"]),
             os.path.join(os.curdir, path.name),  # brackets in a whole path confuse pytest
         ]
-        env = _environment() | ({FAULT: fault} if fault else {})  # where no test looks for it
+        env = _environment(backend) | (
+            {FAULT: fault} if fault else {}
+        )  # where no test looks for it
         outcome = sandbox.run(
             command,
             cpu=seconds,
@@ -222,21 +242,20 @@ def _run(
             cwd=path.parent,
             env=env,
             writable=folder,
+            view=view_of(backend, [path.parent], faults=True),
             stop=stop,
         )
         return _read(record, outcome, path.name)
 
 
-def _environment() -> dict[str, str]:
-    """Ours, without what is meant for another pytest, and with this package to be found."""
-    env = {name: value for name, value in os.environ.items() if name not in _OWN}
-    home = str(Path(__file__).parents[3])
+def _environment(backend: str) -> dict[str, str]:
+    """Return that of a student's process, with this package to be found, for one pytest alone."""
+    env = environment(backend)
+    home = str(Path(__file__).resolve().parents[3])
     paths = [home, *filter(None, [env.get("PYTHONPATH")])]
     return {
         **env,
         "PYTHONPATH": os.pathsep.join(paths),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "PYTHONUTF8": "1",
         "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
     }
 

@@ -1,8 +1,8 @@
 """The judges, one file for each function of the exercise.
 
-A judge is a module with
+The judges run in the teacher's process only. A student's process gets the worlds that its function
+is called on (`inside.worlds`), and nothing of what stands here. A judge is a module with
 
-- `worlds(scenes)`: the worlds to call the function on, the course's own first;
 - `right(world)`: what is right on one, worked out by us;
 - `judge(answer, world, right, course)`: what is wrong with what it did there, a line each, or, in
   one text, what is right; `course` is what is right on the course's own world. It raises FaultError
@@ -20,9 +20,9 @@ import numpy as np
 
 from ...interface import Array, Model
 from ...measures.text import count
-from ..answers import Answer, kind
-from ..calls import FaultError
-from ..worlds import ExerciseWorld
+from ..inside.answers import Answer, kind
+from ..inside.calls import FaultError
+from ..inside.worlds import ExerciseWorld
 
 # By the functions of the student's file, in the order in which they stand there.
 JUDGES = {
@@ -89,12 +89,7 @@ def judged(
 
 
 T = TypeVar("T")
-LIFT, TIP = "shoulder_lift", "gripperframe"
-
-
-def address(model: Model, joint: str = LIFT) -> int:
-    """Where a joint begins in qpos."""
-    return int(model.jnt_qposadr[model.joint_id(joint)])
+TIP = "gripperframe"
 
 
 def parts(value: Any, number: int, what: str) -> list[Any]:

@@ -11,25 +11,16 @@ from ...interface import Array, Data, Model, forward, make_data
 from ...interface.records import Arrays
 from ...measures.text import rounded, vector
 from ...page import Figures
-from ..answers import Answer
-from ..calls import first_of, reason
-from ..watch import Inputs, inputs_of
-from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from . import LIFT, TIP, address, grain, near, numbers, owner, parts, short_float, told_apart
+from ..inside.answers import Answer
+from ..inside.calls import first_of, reason
+from ..inside.watch import Inputs, inputs_of
+from ..inside.worlds import LIFT, ExerciseWorld, address
+from . import TIP, grain, near, numbers, owner, parts, short_float, told_apart
 
-SCENE = "so101/scene"
 ANGLE = 0.8  # [rad], what is written
 TOLERANCE = 1e-9  # [m]
 _SINGLE = 1e-7  # [m]: what float32 keeps of such places
 _READINGS = ("1, fresh", "2, after forward", "3, after the write", "4, after the second forward")
-
-
-def worlds(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; a crate before the arm, and the fingertip elsewhere."""
-    return [
-        ExerciseWorld("", scenes.ordinary(SCENE)),
-        ExerciseWorld(ELSEWHERE, scenes.crowded(SCENE)),
-    ]
 
 
 def right(world: ExerciseWorld) -> Figures:

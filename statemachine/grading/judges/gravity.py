@@ -9,31 +9,18 @@ import numpy as np
 from ...interface import Array, make_data, step
 from ...measures.text import count
 from ...page import Figures
-from ..answers import Answer
-from ..calls import reason
-from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from . import LIFT, address, grain, listed, near, numbers, owner, parts, told_apart
+from ..inside.answers import Answer
+from ..inside.calls import reason
+from ..inside.worlds import LIFT, ExerciseWorld, address
+from . import grain, listed, near, numbers, owner, parts, told_apart
 
-SCENE = "so101/scene"
 TOLERANCE = 0.006  # [degrees]: two decimals will do
-_MOON = (0.0, 0.0, -1.62)
 _SAME = 1e-6  # [degrees]: the same figure, come by another way
 _STILL = 1e-4  # [rad]
 _NAMES = ("servos on", "servos off")
 _UNITS = np.degrees, np.asarray
 _SPEED = "that is its speed, qvel; its position is in qpos"
 _NO_STEP = "no step was taken with the model that you got"
-
-
-def worlds(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; the Moon's gravity at another timestep; a crate before the arm."""
-    course = scenes.ordinary(SCENE)
-    moon = course.replace(gravity=_MOON, timestep=0.004)
-    return [
-        ExerciseWorld("", course, (4,)),
-        ExerciseWorld("with the Moon's gravity and 4 ms a step", moon, (3,)),
-        ExerciseWorld(ELSEWHERE, scenes.crowded(SCENE), (2,)),
-    ]
 
 
 def right(world: ExerciseWorld) -> Figures:

@@ -2,57 +2,59 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
-from ...interface import Array, make_data, reset
+from ...interface import Array, make_data, reset, step
 from ...measures.text import count
-from ...page import Figures
-from ..answers import Answer, kind
-from ..calls import first_of, reason
-from ..watch import EngineRun, Inputs, inputs_of
-from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from . import address, grain, listed, near, numbers, parts, same_bits, short_float
+from ..inside.answers import Answer, kind
+from ..inside.calls import first_of, reason
+from ..inside.watch import EngineRun, Inputs, inputs_of
+from ..inside.worlds import ExerciseWorld
+from . import grain, listed, near, numbers, parts, same_bits, short_float
 
-SCENE = "so101/scene_box"
-_CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
-_OTHER = (-0.2, -0.5, 0.4, 1.5, 1.5, 0.28)
-_STEPS = 100  # of the runs that are made to end apart
 _COUNT = ("first", "second")
 _START = 1e-9  # a keyframe's quaternion may be normalised
+_END = (
+    1e-6  # [rad, m]: steps taken one by one, or by the engine's own functions, may round otherwise
+)
 
 
-def worlds(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; fewer steps with a crate before the arm; runs that do end apart."""
-    course = scenes.ordinary(SCENE)
-    crowded = scenes.crowded(SCENE).replace(timestep=0.004)
-    return [
-        ExerciseWorld("", course, (np.array(_CTRL), 600)),
-        ExerciseWorld(ELSEWHERE, crowded, (np.array(_OTHER), 150)),
-        # One bit, in the middle and upwards, at the end and downwards: nearly equal, equal in
-        # part, equal in sum and not smaller all pass for equal in one of the two.
-        *(
-            ExerciseWorld(
-                f"with {what} of the second run one bit off",
-                course,
-                (np.array(_CTRL), _STEPS),
-                Figures(place=place, towards=towards, after=_STEPS),
-            )
-            for what, place, towards in (
-                ("a joint", address(course, "elbow_flex"), np.inf),
-                ("the box", course.nq - 1, -np.inf),
-            )
-        ),
-    ]
+@dataclass(frozen=True)
+class TwoRuns:
+    """What the two runs on a world are, worked out by us.
+
+    Attributes:
+        start: Where both begin, with the keyframe's own time and ctrl.
+        ends: (nq,) qpos at the end of the first, and of the second.
+    """
+
+    start: Inputs
+    ends: tuple[Array, Array]
 
 
-def right(world: ExerciseWorld) -> Inputs:
-    """Where both runs begin, with the keyframe's own time and ctrl."""
+def right(world: ExerciseWorld) -> TwoRuns:
+    """Run once; the second run ends in the same bits, but for the one that the world changes."""
+    ctrl, nstep = world.arguments
     with make_data(world.model) as data:
         reset(world.model, data, keyframe=0)
-        return inputs_of(0, data)
+        start = inputs_of(0, data)
+        data.time = 0.0
+        data.ctrl[:] = ctrl
+        step(world.model, data, nstep)
+        first = data.qpos.copy()
+    second = first.copy()
+    if world.nudge is not None:
+        place = world.nudge.place
+        second[place] = np.nextafter(second[place], world.nudge.towards)
+    return TwoRuns(start, (first, second))
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) -> list[str] | str:
+def judge(
+    answer: Answer, world: ExerciseWorld, right: TwoRuns, _course: TwoRuns
+) -> list[str] | str:
     """Two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")
@@ -71,7 +73,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) 
         numbers(end_copy, (world.model.nq,), f"{name}, qpos at the end")
         for name, end_copy in zip(_COUNT, copies, strict=True)
     ]
-    remarks += _runs(answer.runs, world, right)
+    remarks += _runs(answer.runs, world, right.start)
     if remarks:
         return remarks
     first, second = answer.runs
@@ -83,6 +85,8 @@ def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) 
                 "of the first was left over. sm.reset clears all, or use a new Data"
             )
         ]
+    if remarks := _elsewhere(answer.runs, right, nstep):
+        return remarks
     if bool(same) != same_bits(first.end.qpos, second.end.qpos):
         unlike = (
             f"the two runs ended {apart:.1e} apart and you call them equal: nearly is not "
@@ -94,6 +98,19 @@ def judge(answer: Answer, world: ExerciseWorld, right: Inputs, _course: Inputs) 
     if remarks := _ends(ends, (first, second)):
         return remarks
     return f"two runs of {nstep} steps end in the same bits"
+
+
+def _elsewhere(runs: Sequence[EngineRun], right: TwoRuns, nstep: int) -> list[str]:
+    """Whether a run ended where such a run does not end; a record may have been made up."""
+    for name, run, end in zip(_COUNT, runs, right.ends, strict=True):
+        if run.end.qpos.shape != end.shape or not near(run.end.qpos, end, _END):
+            return [
+                (
+                    f"{name} run: it did not end where {count(nstep, 'step')} of this command take "
+                    "this arm: nothing but ctrl may act on it"
+                )
+            ]
+    return []
 
 
 def _memory(answer: Answer) -> list[str]:

@@ -10,22 +10,12 @@ from typing import Any
 from ...interface import JointType, Model, make_data, reset
 from ...measures.text import count
 from ...page import Figures
-from ..answers import Answer, kind
-from ..calls import FaultError, first_of, reason
-from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
+from ..inside.answers import Answer, kind
+from ..inside.calls import FaultError, first_of, reason
+from ..inside.worlds import ExerciseWorld
 from . import parts
 
-SCENE = "so101/scene_box"
-
 Slot = tuple[int, int]  # from, and up to but not with
-
-
-def worlds(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; a crate before the arm, and a keyframe with another time."""
-    return [
-        ExerciseWorld("", scenes.ordinary(SCENE)),
-        ExerciseWorld(ELSEWHERE, scenes.crowded(SCENE)),
-    ]
 
 
 def right(world: ExerciseWorld) -> Figures:

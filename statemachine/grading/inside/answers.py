@@ -15,8 +15,8 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from ..errors import refuse
-from ..interface import DERIVED, INPUTS
+from ...errors import refuse
+from ...interface import DERIVED, INPUTS
 from .watch import EngineRun, Inputs, StudentWatch, inputs_of
 
 _MOST = 10_000  # values that a list or a generator may have

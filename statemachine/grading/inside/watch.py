@@ -16,11 +16,11 @@ from unittest import mock
 
 import numpy as np
 
-from ..engines import room
-from ..errors import ClosedDataError
-from ..installed import require
-from ..interface import INPUTS, Array, Data, Model
-from ..page import Figures
+from ...engines import room
+from ...errors import ClosedDataError
+from ...installed import require
+from ...interface import INPUTS, Array, Data, Model
+from ...page import Figures
 
 _MOST = 1000  # runs, forwards and Data that are noted
 

@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from ..backends import load
-from ..errors import UnsupportedError
-from ..interface import Model
-from ..models import resolve
-from ..page import Figures
-from ..witness.mjcf_text import parse, with_includes
+import numpy as np
+
+from ...backends import load
+from ...errors import UnsupportedError
+from ...interface import Model
+from ...models import resolve
+from ...page import Figures
+from ...witness.mjcf_text import parse, with_includes
 
 ELSEWHERE = "on a scene with a crate before the arm"
 _CRATE = """
@@ -123,3 +125,83 @@ def _crowd(root: ElementTree.Element, last: Sequence[tuple[str, str, str]]) -> N
         key.set("qvel", f"{_CRATE_QVEL} {key.get('qvel')}" + "".join(v for _, _, v in last))
         if number == 0:
             key.set("time", _TIME)
+
+
+# The worlds of each function of the exercise. Nothing here tells what is right on one.
+
+LIFT = "shoulder_lift"
+_ARM, _ARM_AND_BOX = "so101/scene", "so101/scene_box"
+_MOON = (0.0, 0.0, -1.62)  # [m/s²]
+_CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)  # [rad]
+_OTHER_CTRL = (-0.2, -0.5, 0.4, 1.5, 1.5, 0.28)  # [rad]
+_STEPS = 100  # of the runs that are made to end apart
+
+
+def address(model: Model, joint: str = LIFT) -> int:
+    """Return where a joint begins in qpos."""
+    return int(model.jnt_qposadr[model.joint_id(joint)])
+
+
+def worlds_of(function: str, scenes: Scenes) -> list[ExerciseWorld]:
+    """Make the worlds that a function of the exercise is called on, the course's own first."""
+    return _WORLDS[function](scenes)
+
+
+def _gravity(scenes: Scenes) -> list[ExerciseWorld]:
+    """The course's scene; the Moon's gravity at another timestep; a crate before the arm."""
+    course = scenes.ordinary(_ARM)
+    moon = course.replace(gravity=_MOON, timestep=0.004)
+    return [
+        ExerciseWorld("", course, (4,)),
+        ExerciseWorld("with the Moon's gravity and 4 ms a step", moon, (3,)),
+        ExerciseWorld(ELSEWHERE, scenes.crowded(_ARM), (2,)),
+    ]
+
+
+def _state(scenes: Scenes) -> list[ExerciseWorld]:
+    """The course's scene; a crate before the arm, and a keyframe with another time."""
+    return [
+        ExerciseWorld("", scenes.ordinary(_ARM_AND_BOX)),
+        ExerciseWorld(ELSEWHERE, scenes.crowded(_ARM_AND_BOX)),
+    ]
+
+
+def _forward(scenes: Scenes) -> list[ExerciseWorld]:
+    """The course's scene; a crate before the arm, and the fingertip elsewhere."""
+    return [
+        ExerciseWorld("", scenes.ordinary(_ARM)),
+        ExerciseWorld(ELSEWHERE, scenes.crowded(_ARM)),
+    ]
+
+
+def _replay(scenes: Scenes) -> list[ExerciseWorld]:
+    """The course's scene; fewer steps with a crate before the arm; runs that do end apart."""
+    course = scenes.ordinary(_ARM_AND_BOX)
+    crowded = scenes.crowded(_ARM_AND_BOX).replace(timestep=0.004)
+    # One bit, in the middle and upwards, at the end and downwards: nearly equal, equal in
+    # part, equal in sum and not smaller all pass for equal in one of the two.
+    nudges = (
+        ("a joint", address(course, "elbow_flex"), np.inf),
+        ("the box", course.nq - 1, -np.inf),
+    )
+    return [
+        ExerciseWorld("", course, (np.array(_CTRL), 600)),
+        ExerciseWorld(ELSEWHERE, crowded, (np.array(_OTHER_CTRL), 150)),
+        *(
+            ExerciseWorld(
+                f"with {what} of the second run one bit off",
+                course,
+                (np.array(_CTRL), _STEPS),
+                Figures(place=place, towards=towards, after=_STEPS),
+            )
+            for what, place, towards in nudges
+        ),
+    ]
+
+
+_WORLDS: dict[str, Callable[[Scenes], list[ExerciseWorld]]] = {
+    "demo_gravity": _gravity,
+    "demo_state": _state,
+    "demo_forward": _forward,
+    "demo_replay": _replay,
+}

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import room
-from ..errors import UnsupportedError, refuse
-from ..runs.controllers import line_of, load_module, misfit, said
+from ...engines import room
+from ...errors import UnsupportedError, refuse
+from ...runs.controllers import line_of, load_module, misfit, said
 from .answers import answer_of, encode
 from .watch import engine_watched, watching
 from .worlds import ExerciseWorld
