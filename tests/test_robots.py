@@ -195,6 +195,7 @@ def test_a_gap_of_rounding_is_no_gap_of_engines(tmp_path: Path) -> None:
     for data in raw:
         mujoco.mj_step(model.raw, data, gaps.STEPS)
     assert np.abs(raw[0].qpos - raw[1].qpos).max() > 1e-3  # MuJoCo alone
+    assert gap.floor is not None
     assert gap.largest < 0.1 * gap.floor
     assert_has(gap, is_rounding=True, shrinks=None)
     assert not BackendRow(without_contacts=gap).unexplained

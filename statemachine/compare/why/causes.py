@@ -354,7 +354,7 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
         name: What it is, and of what.
         values: Each figure that differs: its name, the left's value, the right's; of masses that
             are multiplied alike the density that says so, or the factor.
-        units: SI unit of each of them.
+        unit: SI unit of the first figure; units: of each.
         place: The one line that says it, with the value that the side has: an element's own; of a
             change that several elements share, that of the default; None where that was not found.
     """
@@ -382,7 +382,8 @@ def as_written(left: Path, right: Path, causes: Iterable[Cause]) -> Iterator[Fig
             elif len({row.where for row in rows}) > 1:
                 values, units = (("scale", 1.0, float(scale)),), ("×",)
         place = lines.pop() if len(lines) == 1 else None
-        yield Figures(name=name, values=values, units=units, place=place)
+        unit = units[0] if units else ""
+        yield Figures(name=name, values=values, unit=unit, units=units, place=place)
 
 
 def _scalings(

@@ -353,7 +353,7 @@ def _shares(
     """The causes, the largest share first; of what was found by a setting of one side, too.
 
     Returns:
-        name, values, units, place: See `as_written`.
+        name, values, unit, units, place: See `as_written`.
         kind: Of the elements: "body", "joint", "option"; "run" of what is commanded and of the
             start, "engine" of a setting of an engine as it comes.
         share: Its part of the gap (Shapley value); below zero where it hides others; None where it
@@ -381,6 +381,7 @@ def _shares(
             name=part.name,
             kind="option",
             values=((part.name, *part.values),) if part.values else (),
+            unit="",
             units=("",) if part.values else (),
             share=part.share,
             error=0.0,
