@@ -11,6 +11,7 @@ import os
 import re
 import sys
 import textwrap
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ from statemachine.errors import BadInputError
 from statemachine.grading import exercise, recording
 from statemachine.grading.classroom import judge_all, submissions
 from statemachine.grading.faults.run import examine
-from statemachine.grading.inside.guard import PUBLIC
+from statemachine.grading.inside.guard import PUBLIC, ROOMS
 from statemachine.grading.judges import JUDGES, Judgement
 from statemachine.grading.links import leads_out
 from statemachine.processes import sandbox
@@ -350,6 +351,15 @@ def test_what_a_submission_needs_is_there(
 
 def test_the_public_interface_is_what_the_package_tells() -> None:
     assert {*sm._MODULES, "interface", "worlds"} == set(PUBLIC)
+
+
+def test_what_lies_below_the_judges_is_shown() -> None:
+    """A room that is added below has to be seen in there, or nothing can be judged."""
+    tools = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]
+    floors = tools["importlinter"]["contracts"][0]["layers"]
+    above = next(number for number, rooms in enumerate(floors) if "grading" in rooms)
+    below = {room.strip() for rooms in floors[above + 1 :] for room in rooms.split("|")}
+    assert below <= set(ROOMS)
 
 
 @pytest.mark.parametrize("way", ["shut_in", "watched"])

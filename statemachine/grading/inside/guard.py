@@ -29,8 +29,8 @@ PUBLIC = (
 )  # fmt: skip
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
-    *PUBLIC, "_models", "drawing", "engines", "installed", "measures", "page", "probes",
-    "processes", "releases", "witness",
+    *PUBLIC, "_models", "drawing", "engines", "installed", "measures", "model_files", "page",
+    "probes", "processes", "releases", "typed_numbers", "witness",
 )  # fmt: skip
 
 _PROCESS, _PROGRAM = "it starts another process", "it starts another program"
