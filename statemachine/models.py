@@ -301,7 +301,7 @@ def _in_menagerie(name: str, root: Path) -> Path:
 # A xacro is a text from which a URDF is made: its macros stand for links and joints, which a reader
 # of URDF does not see, and its expressions for numbers and names.
 
-_XACRO_SUFFIX = ".xacro"
+_XACRO_SUFFIX, _BINARY_SUFFIX = ".xacro", ".mjb"
 # An expression, as ${pi / 2}, or what is put in from elsewhere, as $(find a_package).
 _XACRO_VALUE = re.compile(r"\$\{[^}]*\}|\$\([^)]*\)")
 # The same, and macros, in a text that is not quite XML, which some readers take.
@@ -324,8 +324,8 @@ def refuse_xacro(path: Path) -> None:
     waiting, seen = [path], set[Path]()
     while waiting:
         file = waiting.pop()
-        if what_is_there(file) != "a file":  # to open a pipe would wait for ever
-            continue
+        if file.suffix.lower() == _BINARY_SUFFIX or what_is_there(file) != "a file":
+            continue  # what is no text is no xacro, and to open a pipe would wait for ever
         try:
             place, content = file.resolve(), file.read_bytes()
         except OSError:

@@ -296,7 +296,7 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
     def row(name: str, share: float) -> Figures:
         values = ((name, "kp 998.2", "its motors"),)
         return Figures(
-            name=name, kind="engine", values=values, unit="", share=share, alone=share,
+            name=name, kind="engine", values=values, unit="", units=("",), share=share, alone=share,
             last=share, error=0.0, note="", place=None, chosen=None,
         )  # fmt: skip
 
@@ -308,7 +308,7 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
         "found_in": (contact,),
         "explained": 0.5, "located": 0.5, "unexplained": 1e-8, "negligible": 1e-9, "floor": 0.0,
         "tolerance": 1e-3, "draws": 8, "one_engine": False,
-        "redundant": (), "impossible": (), "unmatched": ({}, {}), "missing": (), "notes": (),
+        "redundant": (), "impossible": (), "unread": (), "unmatched": ({}, {}), "missing": (), "notes": (),
         "still": (), "touch": None, "moments": 401, "between": False, "runs": 9, "took": 1.0,
         "provenance": (one.header.provenance, two.header.provenance),
     }  # fmt: skip
@@ -349,7 +349,7 @@ def test_what_is_said_first_is_the_largest_part(hold: Made) -> None:
     switch = with_figures(rows[0], name="contact", values=(("contact", True, False),), share=0.1)
     # Two values that read the same are shown with all their digits.
     close = ("range", (-1.5708, 1.5708), (-1.5708, 1.570796))
-    rounded = with_figures(rows[0], values=(close,), unit="rad")
+    rounded = with_figures(rows[0], values=(close,), units=("rad",))
     masked = [
         [with_figures(row, **{part: value}) for row, value in zip(rows, values, strict=True)]
         for part, *values in (

@@ -16,6 +16,7 @@ from weakref import proxy
 
 import mujoco
 import numpy as np
+from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
 from ..interface import Array
@@ -197,7 +198,7 @@ def _padding(raw: mujoco.MjModel) -> Array:
             # In halves, until this pose bears it too.
             while _worst(mass, bare + _padding_at(raw, data, share)) > _BEARABLE:
                 share = share / 2
-        except np.linalg.LinAlgError:
+        except LinAlgError:
             # Two joints that turn about one axis here: no engine can step from such a pose, and
             # whether it would bear more inertia has no answer.
             continue

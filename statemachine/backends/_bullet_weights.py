@@ -15,6 +15,7 @@ from ._bullet_client import pb
 from ._bullet_plan import Plan
 from ._bullet_trees import FileTree
 from ._bullet_world import World
+from ._dense import dot, product, times
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ class Weight:
     def about(self, point: Array) -> Array:
         """Inertia (3, 3) about another point (3,), by the theorem of Huygens and Steiner."""
         arm = self.com - point
-        return self.inertia + self.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        return self.inertia + self.mass * (dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
 
 
 NOTHING = Weight(0.0, np.zeros(3), np.zeros((3, 3)))
@@ -79,10 +80,11 @@ def _weight_of_link(plan: Plan, tree: FileTree, link: int, body: int, client: in
         state = pb.getLinkState(tree.body, link, computeForwardKinematics=1, physicsClientId=client)
         where, quat = state[:2]
     still = plan.still
-    frame = still.xmat[body].reshape(3, 3)
-    axes = frame.T @ matrix_from_quat(wxyz_from_xyzw(np.array(quat)))
-    com = frame.T @ (np.array(where) - still.xpos[body])
-    return Weight(dynamics[0], com, axes @ np.diag(dynamics[2]) @ axes.T)
+    back = np.ascontiguousarray(still.xmat[body].reshape(3, 3).T)
+    axes = product(back, matrix_from_quat(wxyz_from_xyzw(np.array(quat))))
+    com = times(back, np.array(where) - still.xpos[body])
+    scaled = axes * np.array(dynamics[2])  # columns by the principal moments
+    return Weight(dynamics[0], com, product(scaled, np.ascontiguousarray(axes.T)))
 
 
 def with_weights(compiled: mujoco.MjModel, found: dict[int, Weight]) -> mujoco.MjModel:
@@ -90,12 +92,10 @@ def with_weights(compiled: mujoco.MjModel, found: dict[int, Weight]) -> mujoco.M
     raw = copy.copy(compiled)
     for body, weight in found.items():
         if weight.mass > 0:
-            moments, axes = np.linalg.eigh(weight.inertia)
-            if np.linalg.det(axes) < 0:
-                axes[:, 2] *= -1
+            moments, axes, quat = np.empty(3), np.empty(9), np.empty(4)
+            mujoco.mju_eig3(moments, axes, quat, weight.inertia.ravel())
             raw.body_mass[body], raw.body_ipos[body] = weight.mass, weight.com
-            raw.body_inertia[body] = moments
-            mujoco.mju_mat2Quat(raw.body_iquat[body], axes.ravel())
+            raw.body_inertia[body], raw.body_iquat[body] = moments, quat
     mujoco.mj_setConst(raw, mujoco.MjData(raw))
     return raw
 

@@ -32,6 +32,7 @@ _BEFORE_CLIENT = {
     "getBaseVelocity": 1,
     "getBodyInfo": 1,
     "getBodyUniqueId": 1,
+    "getCollisionShapeData": 2,
     "getContactPoints": 4,
     "getDynamicsInfo": 2,
     "getJointInfo": 2,
