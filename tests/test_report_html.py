@@ -309,7 +309,8 @@ def explanation_of(made: Made, quantity: str = "joints", **more: Any) -> Explana
         "explained": 0.5, "located": 0.5, "unexplained": 1e-8, "negligible": 1e-9, "floor": 0.0,
         "tolerance": 1e-3, "draws": 8, "one_engine": False,
         "redundant": (), "impossible": (), "unread": (), "unmatched": ({}, {}), "missing": (),
-        "notes": (), "still": (), "touch": None, "moments": 401, "between": False, "runs": 9, "took": 1.0,
+        "notes": (), "still": (), "touch": None, "moments": 401, "between": False, "runs": 9,
+        "took": 1.0,
         "provenance": (one.header.provenance, two.header.provenance),
     }  # fmt: skip
     return Explanation(**{**fields, **more})
