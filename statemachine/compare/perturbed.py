@@ -301,7 +301,7 @@ def chaos_floor(
     comparison: Comparison,
     reruns: Sequence[Rerun | None],
     *,
-    runs: int = RUNS,
+    runs: int | None = None,
     seed: int = 0,
     uncertain: Uncertainty = EXACT,
     jobs: int | None = None,
@@ -321,7 +321,7 @@ def chaos_floor(
     Args:
         comparison: Of two traces.
         reruns: How the left and the right were run; None for a side that was not run here.
-        runs: How many perturbed runs of each side.
+        runs: How many perturbed runs of each side; None for `RUNS`.
         seed: Of what is drawn.
         uncertain: What the start of a real robot is uncertain by.
         jobs: How many processes make the runs; None for one a processor where that pays, and for
@@ -332,6 +332,7 @@ def chaos_floor(
         BadInputError: `runs` is less than 1, the seed is negative, or neither side was run here.
         EngineError: A process ended before its run was done, twice.
     """
+    runs = RUNS if runs is None else runs
     if runs < 1:
         raise BadInputError(f"the chaos floor wants at least one run; got {runs}")
     traces = comparison.left.trace, comparison.right.trace

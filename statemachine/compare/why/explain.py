@@ -20,9 +20,10 @@ from ...runs.drive import Progress, silent
 from ...runs.header import provenance
 from ...runs.robot import moved_by_actuators
 from ...runs.scenarios import Scenario
+from .. import perturbed
 from ..labels import files_apart
 from ..matching import Matched, match_alike, match_models, missing_parts
-from ..perturbed import EXACT, RUNS, Uncertainty, against_floor
+from ..perturbed import EXACT, Uncertainty, against_floor
 from .causes import Cause, as_written, orders_of, readable_of
 from .gap import touched_at_start
 from .shapley import locate, shapley
@@ -168,7 +169,7 @@ def explain(
     scenario = scenario if recordings else scenario.on(left)
     compiled = left.compiled is not None and right.compiled is not None
     matched = match_models(left, right, names) if compiled else match_alike(left, right)
-    runs, expected = 0, 10 + (2 * RUNS if uncertain is not None else 0)
+    runs, expected = 0, 10 + (2 * perturbed.RUNS if uncertain is not None else 0)
 
     def ran() -> None:
         nonlocal runs, expected
@@ -268,7 +269,7 @@ def explain(
         negligible=negligible,
         tolerance=tolerance,
         floor=floor,
-        draws=0 if uncertain is None else RUNS,
+        draws=0 if uncertain is None else perturbed.RUNS,
         one_engine=_is_one_engine(left, right),
         redundant=tuple(redundant) if len(redundant) > 1 and explained > UNEXPLAINED else (),
         impossible=divided.impossible,

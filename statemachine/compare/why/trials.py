@@ -25,9 +25,10 @@ from ...processes import checked_jobs
 from ...processes.parallel import forks_for, in_forks
 from ...runs import Rerun, SideStart, Trace, beginning_with, commands_of, start_of
 from ...runs.scenarios import Controller, Scenario
+from .. import perturbed
 from ..alike import commands_alike, controller_for_right, translated
 from ..matching import Matched
-from ..perturbed import RUNS, Uncertainty, perturbed_run
+from ..perturbed import Uncertainty, perturbed_run
 from .causes import (
     COMMANDS,
     EXTRA_ACTUATOR,
@@ -456,6 +457,7 @@ class Trials:
         Raises:
             EngineError: A process ended before its run was done, twice.
         """
+        draws = perturbed.RUNS
         reruns = [self._rerun(_Run(side, _NONE), self._models[side]) for side in (0, 1)]
 
         def run(side: int, k: int) -> tuple[Curves | None]:
@@ -469,7 +471,7 @@ class Trials:
             self._ran()
             return outcome
 
-        runs = [partial(run, side, k) for side in (0, 1) for k in range(RUNS)]
+        runs = [partial(run, side, k) for side in (0, 1) for k in range(draws)]
         jobs = self._forks_for(len(runs))
         if jobs > 1:
             outcomes = in_forks(runs, jobs, self._ran, self._took)
@@ -480,7 +482,7 @@ class Trials:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
         floors = [
             self.ruler.floor(
-                self._runs[_Run(side, _NONE)].curves, curves[side * RUNS :][:RUNS], measure
+                self._runs[_Run(side, _NONE)].curves, curves[side * draws :][:draws], measure
             )
             for side in (0, 1)
         ]
