@@ -380,7 +380,7 @@ class _XacroScan:
                 self._says(match[0].decode(errors="replace"), rest[: match.start()].count(b"\n"))
 
     def _start(self, name: str, attributes: Mapping[str, str]) -> None:
-        if not self._depth and name == "mujoco":
+        if not self._depth and name != "robot":  # which a URDF begins with
             self.format = "MJCF"
         self._depth += 1
         for key, value in attributes.items():

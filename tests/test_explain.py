@@ -593,7 +593,7 @@ def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
     # An order matters to who reads or writes by number.
     orders = {"permuted actuators": ["order of ctrl"], "permuted bodies": ["order of qpos"]}
     assert [each.name for each in found.shares] == orders.get(name, [])
-    assert_has(found.verdict, answer="alike", holds=True)
+    assert_has(found.verdict, holds=True, divides=False)
 
 
 def _easily_missed(name: str) -> tuple[str, str, list[str], dict[str, Any]]:
@@ -696,7 +696,9 @@ ARM.replace("<actuator>", TENDON.format(1)), ARM.replace("<actuator>", TENDON.fo
 @pytest.mark.parametrize("name", BROUGHT)
 def test_causes_are_brought_over(name, tmp_path):
     left, right, causes, how = BROUGHT[name]
-    found = explained(tmp_path, left, right, **{"scenario": HOME, **how})
+    # A cord that leaves its pulley, and what sleeps until it is touched, hang on a last bit.
+    how = {"scenario": HOME, "uncertain": None, **how}
+    found = explained(tmp_path, left, right, **how)
     assert found.gap > 100 * found.negligible
     told = shares(found)
     assert sorted(told) == sorted(causes)

@@ -410,7 +410,7 @@ def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     pose = next(pose for pose in poses if own_ways(arm, pose, sm.forward) > 2)
     fresh, found = dialled()
     same = dict.fromkeys(SETTINGS, "model")
-    own = {name: "model" for name in SETTINGS if name != "surfaces"}
+    own = {name: "model" for name in SETTINGS if name != "self-collision"}
     models = fresh, *(found.build(names, values_of(arm)) for names in (own, same))
     assert [own_ways(model, pose, sm.step) > 0 for model in models] == [False, False, True]
 

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from .explain import Explanation, explain
 from .shapley import ADDS_UP
-from .verdict import UNEXPLAINED, Verdict
+from .verdict import UNEXPLAINED, GapVerdict
 
 __all__ = [
     "ADDS_UP",
     "UNEXPLAINED",
     "Explanation",
-    "Verdict",
+    "GapVerdict",
     "explain",
 ]

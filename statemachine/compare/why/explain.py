@@ -28,7 +28,7 @@ from .causes import Cause, as_written, orders_of, readable_of
 from .gap import touched_at_start
 from .shapley import locate, shapley
 from .trials import Measure, Trials
-from .verdict import UNEXPLAINED, CausePart, Facts, LocatedPart, Verdict, gap_state, verdict_of
+from .verdict import UNEXPLAINED, CausePart, Facts, GapVerdict, LocatedPart, gap_state, verdict_of
 
 # What the arithmetic of an engine makes of a run's positions: two arms that are built alike are
 # 1e-9° to 5e-10 m apart after some seconds. Less than this is no gap to be explained.
@@ -84,7 +84,7 @@ class Explanation(Figures):
     """
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> GapVerdict:
         """What the gap comes from, and whether that answers the question."""
         return verdict_of(
             Facts(

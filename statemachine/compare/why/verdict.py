@@ -105,7 +105,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class GapVerdict:
     """What a gap comes from.
 
     Attributes:
@@ -134,21 +134,21 @@ class Verdict:
     divides: bool = True
 
 
-def verdict_of(facts: Facts) -> Verdict:
+def verdict_of(facts: Facts) -> GapVerdict:
     """Make the verdict on a gap."""
     if facts.state == "rounding":
         answer: Answer = "alike" if facts.differs else "rounding"
-        return Verdict(answer, holds=not facts.refused, divides=False)
+        return GapVerdict(answer, holds=not facts.refused, divides=False)
     if facts.state == "within":
-        return Verdict("within", holds=not facts.refused, divides=False)
+        return GapVerdict("within", holds=not facts.refused, divides=False)
     if facts.state in ("inside", "cannot be told"):
-        return Verdict(facts.state, holds=False, divides=False)
+        return GapVerdict(facts.state, holds=False, divides=False)
     if facts.explained < -UNEXPLAINED:
-        return Verdict("hidden", holds=False)
+        return GapVerdict("hidden", holds=False)
     holds = abs(_stays(facts)) <= UNEXPLAINED
     if _is_masked(facts):
-        return Verdict("masked", holds)
-    return Verdict(_largest(facts), holds)
+        return GapVerdict("masked", holds)
+    return GapVerdict(_largest(facts), holds)
 
 
 def _stays(facts: Facts) -> float:
