@@ -459,12 +459,13 @@ class Trials:
         """
         draws = perturbed.RUNS
         reruns = [self._rerun(_Run(side, _NONE), self._models[side]) for side in (0, 1)]
+        posed = [self._posed(model) for model in self._models]  # a model is loaded once a side
 
         def run(side: int, k: int) -> tuple[Curves | None]:
             trace = perturbed_run(
                 reruns[side], k, seed=self.seed, uncertain=uncertain, derive=False
             )
-            return (self.ruler.curves(trace, self._posed(self._models[side]), side),)
+            return (self.ruler.curves(trace, posed[side], side),)
 
         def called(call: Callable[[], tuple[Curves | None]]) -> tuple[Curves | None]:
             outcome = call()
