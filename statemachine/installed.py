@@ -11,7 +11,6 @@ import importlib
 import importlib.metadata
 import os
 import platform
-import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from types import ModuleType
 from typing import Any
 
 from .errors import MissingEngineError, unknown_name
+from .processes.signals import sigint_blocked
 
 # Keep what C code prints off the terminal, and have it for an error message.
 
@@ -234,7 +234,9 @@ def require(name: str) -> ModuleType:
     if engine.module not in sys.modules:
         _installed(engine)
     try:
-        with silence(), _interrupted_later():  # PyBullet prints when it is imported
+        # PyBullet prints when it is imported. And glfw, which MuJoCo imports, asks a Python of its
+        # own for its library, in which a Ctrl-C would show a traceback.
+        with silence(), sigint_blocked():
             module = importlib.import_module(engine.module)
     except ModuleNotFoundError as error:
         if error.name != engine.module:
@@ -250,23 +252,6 @@ def require(name: str) -> ModuleType:
             engine=name,
         )
     return module
-
-
-@contextmanager
-def _interrupted_later() -> Iterator[None]:
-    """Let a Ctrl-C come when an import is done, and never to a process that the import starts.
-
-    The package glfw, which MuJoCo imports, asks a Python of its own for its library; that would
-    show a traceback.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # on Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def require_extra(module: str, what: str, package: str, extra: str, instead: str = "") -> Any:

@@ -112,6 +112,18 @@ def test_the_floor_is_the_largest_of_both_sides_and_swapping_them_changes_nothin
     assert {band.name: band.most for band in both.bands} == theirs
 
 
+SLEEPER = """
+<mujoco>
+  <option><flag sleep="enable"/></option>
+  <worldbody>
+    <body name="sleeper" pos="0 0 3" sleep="init"><freejoint/><geom size="0.1" mass="1"/></body>
+    <body pos="2 0 1"><joint name="swing" type="hinge" axis="0 1 0"/>
+      <geom pos="0 0 -0.5" size="0.1" mass="{mass}"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
 def test_forks_give_the_floor_that_one_process_gives(tmp_path: Path) -> None:
     calm, chaotic = swapped_pair(tmp_path, 0.2)
     comparison = compare(calm.record(), chaotic.record())
@@ -127,7 +139,7 @@ def test_forks_give_the_floor_that_one_process_gives(tmp_path: Path) -> None:
 def test_no_seed_turns_inside_into_beyond(tmp_path: Path) -> None:
     """Starts that differ by less than the draws, and by about twice as much."""
     start = np.array([2.5, 1.0])
-    model = model_of(tmp_path, DOUBLE_PENDULUM).replace(timestep=0.01, integrator="rk4")
+    model = model_of(tmp_path, DOUBLE_PENDULUM).replace(timestep=0.01, integrator="implicit")
     run = rerun(model, 20.0, qpos=start)
     met = set()
     for off in (1e-13, 2e-12):
@@ -140,6 +152,18 @@ def test_no_seed_turns_inside_into_beyond(tmp_path: Path) -> None:
             assert not {"inside", "beyond"} <= chances
             met |= chances
     assert "inside" in met
+
+
+def test_a_perturbed_start_wakes_no_body(tmp_path: Path) -> None:
+    """One that sleeps from the start hangs in the air; awake it falls 4.9 m in this second."""
+    runs = []
+    for name, mass in (("one", 1.0), ("two", 2.0)):
+        text = SLEEPER.format(mass=mass)
+        runs.append(rerun(model_of(tmp_path, text, f"{name}.xml"), 1.0))
+    left, right = (run.record() for run in runs)
+    floor = chaos_floor(compare(left, right), runs, runs=2)
+    widths = {band.name: band.most for band in floor.bands}
+    assert widths["sleeper, position"] < 1e-6  # mm
 
 
 def test_a_gap_within_its_tolerance_agrees_whatever_the_floor(tmp_path: Path) -> None:

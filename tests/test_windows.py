@@ -38,9 +38,9 @@ GUARDED = {
     ("sweep/worker.py", "setitimer"),
     ("worlds/_worker.py", "POLLIN"),
     ("worlds/_worker.py", "poll"),
-    ("processes/parallel.py", "SIG_BLOCK"),
-    ("processes/parallel.py", "SIG_SETMASK"),
-    ("processes/parallel.py", "pthread_sigmask"),
+    ("processes/signals.py", "SIG_BLOCK"),
+    ("processes/signals.py", "SIG_SETMASK"),
+    ("processes/signals.py", "pthread_sigmask"),
     ("processes/__init__.py", "register_at_fork"),
 }
 

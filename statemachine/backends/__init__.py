@@ -89,6 +89,15 @@ def backend_engine(name: str) -> str | None:
     return name if name in ENGINES else None
 
 
+def backend_module(name: str) -> str:
+    """Return the module that brings a backend, by full name.
+
+    Raises:
+        UnknownNameError: There is no such backend.
+    """
+    return _find(name).partition(":")[0]
+
+
 def register(name: str, loader: str) -> None:
     """Make a backend of another package known under a name.
 

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
+from ..backends import backend_module
 from ..engines import room
 from ..installed import DEFAULT, ENGINES
 from ..models import models_dir
@@ -39,9 +40,14 @@ def _of_machine(backend: str, _python_path: str | None) -> View:
 
 def modules_of(backend: str) -> tuple[str, ...]:
     """Return the modules without which nothing runs on a backend, wherever they are installed."""
-    engine = ENGINES.get(backend)
-    own = engine.module if engine else type(room(backend)).__module__.partition(".")[0]
-    return ("numpy", ENGINES[DEFAULT].module, own, *_FOR_TESTS)
+    names = ["numpy", ENGINES[DEFAULT].module]
+    if backend in ENGINES:
+        names.append(ENGINES[backend].module)
+    for module in (backend_module(backend), type(room(backend)).__module__):
+        package = module.partition(".")[0]
+        if package != _PACKAGE.name:  # of which `_of_machine` says what is shown
+            names.append(package)
+    return (*names, *_FOR_TESTS)
 
 
 def view_of(backend: str, own: Iterable[Path], faults: bool = False) -> View:

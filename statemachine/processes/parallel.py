@@ -32,6 +32,7 @@ from types import FrameType, MappingProxyType
 from typing import Any, TypeVar
 
 from . import ALONE, checked_jobs, end_with_parent
+from .signals import sigint_blocked
 
 T = TypeVar("T")
 
@@ -123,19 +124,6 @@ def _begin_trackers() -> None:
             importlib.import_module(name).ensure_running()
     finally:
         os.environ["PYTHONWARNINGS"] = before  # "" is as if it were not there
-
-
-@contextmanager
-def sigint_blocked() -> Iterator[None]:
-    """A Ctrl-C comes only afterwards, and never to what is started inside: this process answers."""
-    if not hasattr(signal, "pthread_sigmask"):  # on Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _Ended(BaseException):
