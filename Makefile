@@ -99,7 +99,7 @@ urdf: $(VENV)/run.stamp
 # make extras       what figures, films, the viewer, sweeps and parquet need, too
 extras: $(VENV)/run.stamp
 	@echo "adding figures, films, the viewer, sweeps and parquet: about half a minute ..."
-	@$(PIP) $(CONSTRAINTS) -e '.[plot,render,mp4,view,sweep,parquet]'
+	@$(PIP) $(CONSTRAINTS) -e '.[plot,render,view,sweep,parquet]'
 
 # make report       where the engines part when the arm is told one pose, and why: hold.html
 report: $(VENV)/report.stamp

@@ -113,7 +113,7 @@ def test_a_command_runs_on_it(said: Said, words: str, code: int, says: str) -> N
         ("hold", *BESIDE, *SHORT, "--why"),
         _slow(("hold", *BESIDE, *SHORT, "--plot", "hold.svg")),
         _slow(("hold", *BESIDE, *SHORT, "--html", "hold.html")),
-        _slow(("hold", *BESIDE, *SHORT, "--film", "hold.webp", "--size", "320x240")),
+        _slow(("hold", *BESIDE, *SHORT, "--film", "hold.webp")),
     ],
 )
 def test_a_comparison_finds_that_it_is_the_same(said: Said, words: tuple[str, ...]) -> None:
@@ -166,7 +166,7 @@ def test_its_traces_are_drawn(said: Said) -> None:
     pytest.importorskip("PIL")
     said("trace", "record", "hold", "--out", "a.npz", *SHORT, *ON)
     for words in (("plot", "a.npz", "--out", "a.svg"),
-                  ("film", "a.npz", "--size", "320x240", "--out", "a.webp")):  # fmt: skip
+                  ("film", "a.npz", "--out", "a.webp")):  # fmt: skip
         said("trace", *words)
         assert Path(words[-1]).stat().st_size
 

@@ -134,7 +134,6 @@ def test_a_clash_of_import_names_is_said_in_one_line(
             for words, module, extra in (
                 ("--plot a.svg", "matplotlib", "[plot]"),
                 ("--film a.webp", "PIL", "[render]"),
-                ("--film a.mp4", "imageio_ffmpeg", "[mp4]"),
             )
         ),
     ],

@@ -8,16 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..errors import MissingEngineError, ModelFileError, StateMachineError, UnknownNameError
-from ..typed_numbers import is_count, typed_float
 from ._common import Row, complain, file_name
-
-
-def _size(text: str) -> tuple[int, int]:
-    width, cross, height = text.lower().partition("x")
-    if not (cross and is_count(width) and is_count(height)):
-        raise argparse.ArgumentTypeError(f"a size reads like 640x480; got {text}")
-    return int(width), int(height)
-
 
 OF_PAGE: tuple[Row, ...] = (
     (
@@ -33,20 +24,9 @@ OF_TESTS = (
     "write each quantity as a test of JUnit, for CI",
     {"type": file_name},
 )
-OF_FILM: tuple[Row, ...] = (
-    ("--fps", "N", "of the film (default 30)", {"type": typed_float, "default": 30.0}),
-    ("--slow", "N", "of the film: N times slower", {"type": typed_float, "default": 1.0}),
-    ("--size", "WxH", "of the film (640x480)", {"type": _size, "default": (640, 480)}),
-    (
-        "--renderer",
-        "NAME",
-        "of the film: an engine that draws, or auto: the first that can here",
-    ),
-)
 OF_PICTURES: tuple[Row, ...] = (
     ("--plot", "FILE", "write a figure: .svg, .png or .pdf", {"type": file_name}),
-    ("--film", "FILE", "write a film of both sides: .webp or .mp4", {"type": file_name}),
-    *OF_FILM,
+    ("--film", "FILE", "write a film of both sides: .webp", {"type": file_name}),
 )
 
 
@@ -76,21 +56,20 @@ def checked(options: argparse.Namespace) -> Any:
     if given.get("film") is not None:
         from ..report import film as films
 
-        films.check_film(options.film, options.size, options.fps, options.slow)
+        films.check_film(options.film)
     for file in filter(None, (given.get("junit"), options.plot, given.get("film"))):
         check_place(file)
-    return _renderer(options.renderer) if given.get("film") else None
+    return _renderer() if given.get("film") else None
 
 
-def _renderer(name: str | None) -> Any:
-    """What draws a film; where nobody said which, a word if it is not the first choice."""
+def _renderer() -> Any:
+    """Return what draws a film here; say so if it is not the first choice."""
     from ..engines.pictures import renderer_here, renderers
     from ..report.terminal import progress
 
     with progress("looking for OpenGL"):
-        asked = None if name == "auto" else name
-        renderer = renderer_here(asked)
-    if not asked and renderer.name != renderers()[0]:
+        renderer = renderer_here()
+    if renderer.name != renderers()[0]:
         complain(f"no OpenGL here: the film is drawn by {renderer}", 0)
     return renderer
 
@@ -116,7 +95,7 @@ def write_pictures(
 
     Args:
         renderer: From `checked`.
-        options: `plot`, `film` and those of a film; `model`, of one trace, and `menagerie` say
+        options: `plot` and `film`; `model`, of one trace, and `menagerie` say
             what it shows, if not the traces.
         traces: One, or the two of a comparison.
         request: The `compare.Request`; its sides, or its model, say what a film of it shows.
@@ -151,9 +130,6 @@ def write_pictures(
                 models,
                 renderer,
                 comparison,
-                size=options.size,
-                fps=options.fps,
-                slow=options.slow,
                 progress=bar,
             )
         complain(

@@ -139,7 +139,6 @@ RULES: tuple[Rule, ...] = (
     ("measure finer budget jobs", NEEDS, "why"),
     ("quantity", NEEDS, "why html"),
     ("no_why", NEEDS, "html"),
-    ("fps slow size renderer", NEEDS, "film"),
     ("frame all digits", NEEDS, "models"),
     ("uncertainty", EXCLUDES, "no_chaos"),
     ("one_step converge", EXCLUDES, "why html plot film models uncertainty tolerance"),

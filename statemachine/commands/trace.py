@@ -23,7 +23,7 @@ from ._common import (
     refuse,
     show,
 )
-from ._compare_files import OF_FILM, checked, write_pictures
+from ._compare_files import checked, write_pictures
 from .compare import EXPERIMENTS, experiments, run_options
 
 
@@ -63,8 +63,8 @@ def add(parser: argparse.ArgumentParser) -> None:
             *(run_pictures, (file, _output("TRACE.svg"))),
         ),
         (
-            *("film", "make a film of it: .webp or .mp4"),
-            *(run_pictures, (file, _output("TRACE.webp"), *own, *OF_FILM)),
+            *("film", "make a film of it: .webp"),
+            *(run_pictures, (file, _output("TRACE.webp"), *own)),
         ),
     ):
         own_parser = named.add_parser(

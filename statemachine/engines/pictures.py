@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..drawing.scene import Camera, Motion, Pixels, compose, smaller
-from ..errors import EngineError, MissingEngineError, check_name
+from ..errors import EngineError, MissingEngineError
 from ..installed import DEFAULT, require
 from ..interface import Array
 from ..processes import PipedChild, fresh_python
@@ -58,21 +58,13 @@ def renderers() -> list[str]:
     return rooms_with("drawer")
 
 
-def renderer_here(name: str | None = None) -> Renderer:
-    """What draws here: the first of `renderers` that can.
-
-    Args:
-        name: One of `renderers`, to have that one and no other.
+def renderer_here() -> Renderer:
+    """Return what draws here: the first of `renderers` that can.
 
     Raises:
-        UnknownNameError: There is no such renderer.
-        MissingEngineError: It, or every one, does not work here.
+        MissingEngineError: None works here.
     """
-    if name is not None:
-        check_name("renderer", name, renderers())
     require(DEFAULT)  # it reads the models, whoever draws them
-    if name is not None:
-        return Renderer(name, room(name).opengl())
     reasons: list[MissingEngineError] = []
     for engine in renderers():
         try:

@@ -31,8 +31,7 @@ class HealthCheck:
 # is for, and the extras that bring it. pyproject.toml names the same, which a test compares;
 # `viser` is imported, see `_viewer`.
 _PACKAGES = (
-    ("pillow", "pictures and films", ("render", "mp4")),
-    ("imageio-ffmpeg", "films as mp4", ("mp4",)),
+    ("pillow", "pictures and films", ("render",)),
     ("matplotlib", "plots", ("plot", "docs", "notebook")),
     ("pyarrow", "parquet traces, sweeps", ("parquet", "sweep")),
     ("joblib", "sweeps", ("sweep",)),

@@ -1,6 +1,6 @@
 """Films: both sides of a comparison in one picture, and how far apart they are.
 
-WebP is written by Pillow, mp4 by ffmpeg. And small pictures of a robot for a page: one pose as
+A film is WebP, written by Pillow. And small pictures of a robot for a page: one pose as
 WebP, or a few seconds of a run.
 """
 
@@ -9,10 +9,7 @@ from __future__ import annotations
 import base64
 import io
 import math
-import subprocess
-import tempfile
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -24,22 +21,21 @@ from ..compare import Comparison, labels_of
 from ..drawing import drawing_of
 from ..drawing.scene import Camera, Motion, Pixels, camera_for, framed, poses_through
 from ..engines.pictures import Renderer, drawn, renderer_here
-from ..errors import BadInputError, EngineError, MissingEngineError, TraceError, refuse
+from ..errors import BadInputError, MissingEngineError, TraceError
 from ..installed import require_extra
 from ..interface import Array, Model
 from ..measures import nearest
 from ..page import Figures, Picture, RobotPicture
-from ..processes import last_line
 from ..runs import Trace
 from ..runs.drive import Progress, silent
-from ..runs.whole import beside, replace_file
+from ..runs.whole import replace_file
 from . import figures
 from .film_overlay import Overlay
 from .over_time import charts_of
 
-SUFFIXES = (".webp", ".mp4")
+SUFFIX = ".webp"
+FILM_SIZE = (640, 480)  # width and height [pixels]
 _LONGEST = 5000  # pictures of one film
-_SMALLEST, _LARGEST = (240, 180), (1920, 1440)  # in the least the strip and the text have room
 _WEBP: dict[str, Any] = {"format": "WEBP", "save_all": True, "loop": 0, "quality": 70, "method": 3}
 _WEBP |= {"kmin": 30, "kmax": 60}  # pictures between those that stand alone
 
@@ -51,59 +47,41 @@ class Timing:
     Attributes:
         seconds: Simulated time that the film shows [s].
         fps: Pictures a second.
-        slow: How many times as long it takes to watch.
     """
 
     seconds: float
     fps: float = 30.0
-    slow: float = 1.0
 
     @property
     def count(self) -> int:
         """How many pictures."""
-        return max(1, math.ceil(self.seconds * self.slow * self.fps - 1e-6))
+        return max(1, math.ceil(self.seconds * self.fps - 1e-6))
 
     @property
     def times(self) -> Array:
         """(count,) simulated time of each [s]."""
-        return np.arange(self.count) / (self.fps * self.slow)
+        return np.arange(self.count) / self.fps
 
     @property
     def milliseconds(self) -> list[int]:
-        """How long each is shown: together the whole of simulated time, times `slow`."""
-        ends = np.append(np.arange(self.count) / self.fps, self.seconds * self.slow)
+        """How long each is shown: together the whole of simulated time."""
+        ends = np.append(np.arange(self.count) / self.fps, self.seconds)
         return np.diff(np.round(1000 * ends)).astype(int).tolist()
 
 
-def check_film(path: Path, size: tuple[int, int], fps: float, slow: float) -> None:
-    """Whether there can be such a film, before anything is run.
+def check_film(path: Path) -> None:
+    """Check that there can be such a film, before anything is run.
 
     Raises:
-        BadInputError: The path, size, fps or slow cannot be.
+        BadInputError: The path has another suffix.
         MissingEngineError: An extra is missing.
     """
     suffix = path.suffix.lower()
-    hint = "; WebP is smaller and has all colours" if suffix == ".gif" else ""
-    sides = zip(("width", "height"), size, _SMALLEST, _LARGEST, strict=True)
-    refuse(
-        (
-            suffix not in SUFFIXES,
-            f"a film is a file {' or '.join(SUFFIXES)}; got {path.name!r}{hint}",
-        ),
-        (not 1 <= fps <= 60, f"--fps is from 1 to 60 pictures a second; got {fps:g}"),
-        (not 0.05 <= slow <= 100, f"--slow is from 0.05 to 100 times as long; got {slow:g}"),
-        *(
-            (
-                not least <= pixels <= most or pixels % 2,
-                f"the {word} of a film is even, from {least} to {most} pixels; got {pixels}",
-            )
-            for word, pixels, least, most in sides
-        ),
-    )
+    if suffix != SUFFIX:
+        hint = "; WebP is smaller and has all colours" if suffix == ".gif" else ""
+        raise BadInputError(f"a film is a file {SUFFIX}; got {path.name!r}{hint}")
     require_extra("PIL.Image", "a film", "Pillow", "render")
     figures.require_matplotlib()
-    if suffix == ".mp4":
-        require_extra("imageio_ffmpeg", "mp4", "ffmpeg", "mp4", "WebP needs nothing more")
 
 
 def write_film(
@@ -113,22 +91,16 @@ def write_film(
     renderer: Renderer,
     comparison: Comparison | None = None,
     *,
-    size: tuple[int, int] = (640, 480),
-    fps: float = 30.0,
-    slow: float = 1.0,
     progress: Progress = silent,
 ) -> Figures:
     """Write a film of one trace, or of two and how far apart they are.
 
     Args:
-        path: A file .webp or .mp4; it is there whole or not at all.
+        path: A file .webp; it is there whole or not at all.
         traces: The first is drawn solid, a second one as a ghost.
         models: What each looks like.
         renderer: What draws.
         comparison: Of the two; has the tolerance that is drawn.
-        size: Width and height [pixels], even.
-        fps: Pictures a second.
-        slow: How many times as long as simulated time it takes.
         progress: Told the fraction that is done.
 
     Returns:
@@ -142,8 +114,8 @@ def write_film(
         MissingEngineError: An extra is missing.
         TraceError: A model has other bodies than its trace.
     """
-    check_film(path, size, fps, slow)
-    timing = timing_of(traces, fps, slow)
+    check_film(path)
+    timing = timing_of(traces)
     header = traces[0].header
     # How far apart the fingertips are; without one, what is farthest beyond its tolerance.
     strip = max(
@@ -152,7 +124,7 @@ def write_film(
         default=None,
     )
     labels = labels_of(header, traces[1].header).long if len(traces) > 1 else [header.label]
-    overlay = Overlay(size, timing.times, slow, header.experiment, labels, strip)
+    overlay = Overlay(FILM_SIZE, timing.times, header.experiment, labels, strip)
     shots = frames(traces, models, overlay.inner, timing, renderer)
 
     def pictures() -> Iterator[Any]:
@@ -160,36 +132,30 @@ def write_film(
             progress((k + 1) / timing.count)  # before: nobody asks for more than the last
             yield overlay.paint(shot, k)
 
-    seconds = sum(timing.milliseconds) / 1000
     try:
-        if path.suffix.lower() == ".mp4":
-            _write_mp4(path, pictures(), size, fps)
-            seconds = timing.count / fps  # all of its pictures are shown equally long
-        else:
-            replace_file(path, lambda out: write_webp(out, pictures(), timing.milliseconds))
+        replace_file(path, lambda out: write_webp(out, pictures(), timing.milliseconds))
     finally:
         shots.close()
     return Figures(
         path=path,
         pictures=timing.count,
-        seconds=seconds,
+        seconds=sum(timing.milliseconds) / 1000,
         size=path.stat().st_size,
         renderer=str(renderer),
     )
 
 
-def timing_of(traces: Sequence[Trace], fps: float, slow: float) -> Timing:
+def timing_of(traces: Sequence[Trace]) -> Timing:
     """The timing of a film of what all traces have.
 
     Raises:
         BadInputError: There would be too many pictures.
     """
     seconds = min(float(trace.time[-1] - trace.time[0]) for trace in traces)
-    timing = Timing(round(seconds, 9), fps, slow)
+    timing = Timing(round(seconds, 9))
     if timing.count > _LONGEST:
         raise BadInputError(
-            f"the film would have {timing.count} pictures; at most {_LONGEST}: lower --fps, "
-            "--slow or --seconds"
+            f"the film would have {timing.count} pictures; at most {_LONGEST}: lower --seconds"
         )
     return timing
 
@@ -263,45 +229,6 @@ def write_webp(out: BinaryIO, pictures: Iterator[Any], milliseconds: list[int]) 
     # An image of many pictures, as Pillow knows them, that holds one of them at a time.
     reel.n_frames, reel.seek = len(milliseconds), seek
     reel.save(out, duration=milliseconds, **_WEBP)
-
-
-def _write_mp4(path: Path, pictures: Iterator[Any], size: tuple[int, int], fps: float) -> None:
-    """Write an mp4 that every player takes: H.264, 4:2:0, its index at the beginning.
-
-    Raises:
-        EngineError: ffmpeg gave up.
-    """
-    import imageio_ffmpeg
-
-    command = [
-        *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error"),
-        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}"),
-        *("-i", "-", "-an", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"),
-        *("-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact"),
-    ]
-    with beside(path) as (name,), tempfile.TemporaryFile() as errors:
-        child = subprocess.Popen(
-            [*command, "-f", "mp4", name],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=errors,
-            start_new_session=True,  # a Ctrl-C of the terminal is ours to hear, and to end it then
-        )
-        assert child.stdin is not None
-        try:
-            with suppress(BrokenPipeError):  # it gave up: its code says so
-                for picture in pictures:
-                    child.stdin.write(picture.tobytes())
-                child.stdin.close()
-            code = child.wait()
-        finally:  # also on Ctrl-C: no ffmpeg is left behind
-            child.kill()
-            with suppress(OSError):
-                child.stdin.close()
-            child.wait()
-        if code:
-            errors.seek(0)
-            raise EngineError(f"ffmpeg gave up: {last_line(errors.read(), code)}")
 
 
 _SIZE = (480, 360)

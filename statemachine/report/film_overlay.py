@@ -32,7 +32,6 @@ class Overlay:
         self,
         size: tuple[int, int],
         times: Array,
-        slow: float,
         title: str,
         labels: Sequence[str],
         strip: QuantityChart | None,
@@ -42,7 +41,6 @@ class Overlay:
         Args:
             size: Width and height of the film.
             times: (n,) simulated time of each picture [s].
-            slow: How many times as long as simulated time it takes.
             title: What is done.
             labels: Who the solid side is, and the ghost.
             strip: How far apart the sides are, drawn below.
@@ -53,12 +51,9 @@ class Overlay:
         self._size, self._times, self._strip = size, times, strip
         self._text = max(10, round(min(size[1] / 30, size[0] / 40)))
         self._font = ImageFont.truetype(findfont("DejaVu Sans"), max(9, round(0.8 * self._text)))
-        # Even heights: mp4 keeps colours by squares of two pixels.
-        self._low = 2 * round(STRIP * size[1] / 2) if strip is not None else 0
-        self._high = 2 * round(1.6 * self._text)
+        self._low = round(STRIP * size[1]) if strip is not None else 0
+        self._high = round(3.2 * self._text)
         self.inner = (size[0], size[1] - self._high - self._low)
-        ratio = f"1/{slow:.0f}" if slow > 1 and slow == round(slow) else f"{1 / slow:.3g} ×"
-        self._speed = "real time" if slow == 1 else f"{ratio} of real time"
         points = 72 / _DOTS * self._text
         content = saved(
             lambda: self._paper(title, labels, points),
@@ -108,7 +103,7 @@ class Overlay:
         digits = 3 if self._times[-1] < 100 else 1
         draw.text(
             (pad, pad + round(1.35 * self._text)),
-            f"t = {time:.{digits}f} s, {self._speed}",
+            f"t = {time:.{digits}f} s",
             font=self._font,
             fill=INK,
         )
