@@ -1,4 +1,4 @@
-"""Releases of an engine in environments of their own, beside the one that is installed.
+"""Releases of MuJoCo in environments of their own, beside the one that is installed.
 
 Each is a folder of the user's cache, with a Python and the engine in it; `statemachine engines`
 makes, lists and removes them.
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import BadInputError, EngineError, MissingEngineError, check_name, refuse
-from .installed import DEFAULT, ENGINES, engine_version
+from .installed import DEFAULT, engine_version
 from .page import Figures
 
 if sys.platform == "win32":
@@ -37,7 +37,7 @@ _EXAMPLE = f"{DEFAULT}==3.3.7"
 
 
 def is_release(name: str) -> bool:
-    """Whether the name of a backend means a release of an engine."""
+    """Return whether the name of a backend means a release of MuJoCo."""
     return "==" in name
 
 
@@ -46,15 +46,15 @@ def version_of(name: str) -> str:
 
     Raises:
         BadInputError: It is no such name.
-        UnknownNameError: There is no such engine that runs.
+        UnknownNameError: It is not one of MuJoCo.
     """
     match = _NAME.fullmatch(name)
     if match is None:
         whole = f"{name}.0" if _NAME.fullmatch(f"{name}.0") else _EXAMPLE
         raise BadInputError(
-            f"{name!r} is not a release of an engine, which has three numbers: type {whole}"
+            f"{name!r} is not a release of {DEFAULT}, which has three numbers: type {whole}"
         )
-    check_name("engine", match["engine"], [name for name, engine in ENGINES.items() if engine.runs])
+    check_name("engine with releases", match["engine"], [DEFAULT])
     return match["version"]
 
 
@@ -218,7 +218,7 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         BadInputError: As `version_of`, or there is no such Python.
         EngineError: It cannot be installed, or does not run.
     """
-    engine, version, home = engine_of(name), version_of(name), folder()
+    version, home = version_of(name), folder()
     if is_here(name):
         say(f"{name} is here already")
         return
@@ -235,10 +235,10 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
         _run(name, *venv, str(place))
         for numpy in ("numpy", "numpy<2"):  # old wheels were built against NumPy 1, and do not say
             say(f"installing {name} and {numpy}")
-            # What a world of PyBullet's is sent as has a compiled model in it.
-            compiler = [] if engine == DEFAULT else [f"{DEFAULT}=={engine_version(DEFAULT)}"]
-            _run(name, *pip, "--quiet", name, numpy, *compiler)
-            code = f"import importlib.metadata as m, numpy, {engine}; print(m.version('{engine}'))"
+            _run(name, *pip, "--quiet", name, numpy)
+            code = (
+                f"import importlib.metadata as m, numpy, {DEFAULT}; print(m.version('{DEFAULT}'))"
+            )
             done = subprocess.run([own, "-I", "-c", code], capture_output=True, text=True)  # noqa: PLW1510
             if done.returncode == 0:
                 break

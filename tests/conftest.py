@@ -609,11 +609,8 @@ def without_pybullet(without: Callable[..., dict[str, str]]) -> dict[str, str]:
     return without("pybullet")
 
 
-# An old one, one that is too old for the arm, the one that is installed, and one of PyBullet.
-RELEASES = (
-    *("mujoco==3.3.7", "mujoco==3.0.1"),
-    *(f"mujoco=={engine_version('mujoco')}", "pybullet==3.2.6"),
-)
+# An old one, one that is too old for the arm, and the one that is installed.
+RELEASES = ("mujoco==3.3.7", "mujoco==3.0.1", f"mujoco=={engine_version('mujoco')}")
 
 
 @pytest.fixture

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from ..errors import EngineError
-from ..installed import DEFAULT, engine_version
 from ..interface import DERIVED, Array, Contacts
 from ..interface.options import HUGE
 from ..interface.records import Arrays
@@ -109,7 +108,7 @@ class Server:
 
     def load(
         self,
-        text: str | bytes,
+        text: str,
         file: str,
         edits: Mapping[str, Array] = MappingProxyType({}),
         **job: Any,
@@ -251,8 +250,3 @@ class ServedWorld(HiddenWorld):
 
     def close(self) -> None:
         self._end()
-
-
-def sent(opener: bytes, server: Server) -> int:
-    """The number that a pickled opener of worlds gets in a process that has this package."""
-    return server.load(opener, engine_version(DEFAULT))[0]["model"]

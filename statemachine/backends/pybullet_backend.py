@@ -7,9 +7,8 @@ when fresh, values that a write leaves alone. The capability record says where.
 
 from __future__ import annotations
 
-import pickle
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -31,7 +30,6 @@ from ..interface.options import HUGE, checked_options
 from ..interface.records import Defaults
 from ..measures.text import few
 from ..models import AnyPath
-from ..releases import version_of
 from . import _bullet_urdf as urdf
 from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import Act, DrivenWorld
@@ -42,8 +40,6 @@ from ._bullet_weights import weighed_as_it_comes
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._edits import edited, step_length
 from ._hidden_data import HiddenModel
-from ._hidden_world import HiddenWorld
-from ._served import ServedEngine, ServedWorld, sent
 from .compiled import (
     check_numbers,
     compile_file,
@@ -141,8 +137,6 @@ def load(
     path: AnyPath,
     defaults: Defaults = "model",
     options: Mapping[str, Any] = MappingProxyType({}),
-    *,
-    there: ServedEngine | None = None,
 ) -> PybulletModel:
     """Compile an MJCF, URDF or MJB file, and write it as URDF for PyBullet.
 
@@ -155,7 +149,6 @@ def load(
             it is set, 1/240 s a step. PyBullet reads a URDF itself, by `useFixedBase` unless it
             has a floating joint; of an MJCF a URDF is written. ctrl is then what
             POSITION_CONTROL aims at.
-        there: Another release of the engine, in whose process worlds are; None for the installed.
 
     Raises:
         ModelError: It cannot be compiled, or PyBullet cannot read what was written.
@@ -180,11 +173,9 @@ def load(
     file = UrdfFile.read(Path(path)) if defaults == "engine" else None
     plan = Plan(raw, file)
     check(plan, "pybullet", defaults == "engine")
-    model = PybulletModel(
-        plan, Path(path), substeps, defaults, checked.get("max_qvel"), there=there
-    )
+    model = PybulletModel(plan, Path(path), substeps, defaults, checked.get("max_qvel"))
     # What PyBullet cannot read shows now.
-    (model._open_world() if there else World(plan, model._kind)).close()
+    World(plan, model._kind).close()
     if defaults == "model":
         _tell(plan, ignored(plan), stacklevel=4)
     else:
@@ -228,7 +219,6 @@ class PybulletModel(HiddenModel):
     acts: tuple[Act, ...]
     _kind: Literal["stepped", "engine"]
     _asked: Array | None  # max_qvel, where it was set
-    _there: ServedEngine | None
 
     def __init__(
         self,
@@ -238,20 +228,15 @@ class PybulletModel(HiddenModel):
         defaults: Defaults,
         max_qvel: Array | None = None,
         acts: tuple[Act, ...] = (),
-        there: ServedEngine | None = None,
     ) -> None:
         as_it_comes, raw = defaults == "engine", plan.raw
         bound = fastest(raw) if max_qvel is None else max_qvel
         kind: Literal["stepped", "engine"] = "engine" if as_it_comes else "stepped"
         about = facts(raw)
-        opener: Callable[[], HiddenWorld] = partial(DrivenWorld, plan, kind, acts)
-        if there:
-            load_there = partial(sent, pickle.dumps(opener))
-            opener = partial(ServedWorld, there, load_there, raw, float(raw.opt.timestep))
         super().__init__(
-            opener,
-            backend=there.name if there else "pybullet",
-            engine_version=version_of(there.name) if there else engine_version("pybullet"),
+            partial(DrivenWorld, plan, kind, acts),
+            backend="pybullet",
+            engine_version=engine_version("pybullet"),
             path=path,
             raw={
                 raw.body(b).name or f"body {b}": plan.described(b, kind)[0]
@@ -269,7 +254,6 @@ class PybulletModel(HiddenModel):
             acts=acts,
             _kind=kind,
             _asked=max_qvel,
-            _there=there,
         )
 
     @property
@@ -301,6 +285,4 @@ class PybulletModel(HiddenModel):
 
     def _of(self, plan: Plan, substeps: int, asked: Array | None) -> PybulletModel:
         check(plan, "pybullet", self.defaults == "engine")
-        return PybulletModel(
-            plan, self.path, substeps, self.defaults, asked, self.acts, self._there
-        )
+        return PybulletModel(plan, self.path, substeps, self.defaults, asked, self.acts)

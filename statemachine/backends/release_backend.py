@@ -11,7 +11,6 @@ import copy
 import os
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
@@ -19,13 +18,12 @@ import mujoco
 import numpy as np
 
 from ..errors import EngineError, ModelError, refuse
-from ..installed import DEFAULT, require
 from ..interface import Capabilities
 from ..interface.options import unsupported
 from ..interface.records import Arrays, Defaults
 from ..models import AnyPath
 from ..page import Figures
-from ..releases import engine_of, is_release, python_of, version_of
+from ..releases import is_release, python_of, version_of
 from . import _release_child as child
 from ._edits import put
 from ._hidden_data import HiddenModel
@@ -52,7 +50,7 @@ _FLAGS = {"opt.disableflags": mujoco.mjtDisableBit, "opt.enableflags": mujoco.mj
 
 
 def load(path: AnyPath, defaults: Defaults = "model", *, release: str) -> HiddenModel:
-    """Compile a file in both releases; a release of PyBullet's gets what the installed one gets.
+    """Compile a file in both releases.
 
     Args:
         path: An MJCF or URDF file.
@@ -60,19 +58,12 @@ def load(path: AnyPath, defaults: Defaults = "model", *, release: str) -> Hidden
         release: As "mujoco==3.3.7".
 
     Raises:
-        MissingEngineError: That release has no environment here, or its engine is not installed.
+        MissingEngineError: That release has no environment here.
         ModelError: One of the two cannot read the file, or they read different parts in it.
     """
     python, version = str(python_of(release)), version_of(release)
-    if engine_of(release) == DEFAULT:
-        engine = ServedEngine(release, python, child.__file__, f"MuJoCo {version}")
-        return served(engine)(path, defaults)
-    require("pybullet")
-    from .pybullet_backend import load as load_bullet
-
-    file = str(Path(__file__).with_name("_bullet_release_child.py"))
-    engine = ServedEngine(release, python, file, f"PyBullet {version}")
-    return load_bullet(path, defaults, there=engine)
+    engine = ServedEngine(release, python, child.__file__, f"MuJoCo {version}")
+    return served(engine)(path, defaults)
 
 
 def served(

@@ -12,8 +12,8 @@ from ._common import PROGRAM, add_table, json_of
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
     parser.description = (
-        "Other releases of MuJoCo and PyBullet, each in an environment of its own. Where an engine "
-        f"is named, so can be a release: {PROGRAM} compare hold so101@mujoco==3.3.7 so101"
+        "Other releases of MuJoCo, each in an environment of its own. Where an engine is "
+        f"named, so can be a release: {PROGRAM} compare hold so101@mujoco==3.3.7 so101"
     )
     add_table(parser, json_of())
     verbs = parser.add_subparsers(metavar="verb")

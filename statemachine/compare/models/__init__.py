@@ -69,14 +69,13 @@ def read(
         if path.suffix.lower() == ".urdf":
             return urdf.read(path)
         return room(DEFAULT).read_file(path, name)
-    release = is_release(engine)
-    if release and engine_of(engine) == DEFAULT:
+    if is_release(engine):
         loaded = load(path, backend=engine, defaults="engine")
         described = room(DEFAULT).describe(loaded.compiled, name)
         return replace(described, reader=engine.replace("==", " "), format="engine")
     check_backend("engine", engine)
-    own = room(engine_of(engine))
-    if release or not own.can("read"):
+    own = room(engine)
+    if not own.can("read"):
         known = ", ".join(rooms_with("read"))
         raise UnsupportedError(
             f"what {engine} makes of a file cannot be read here; known: {known}",
