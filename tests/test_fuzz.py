@@ -13,7 +13,7 @@ from unittest.mock import Mock
 import pytest
 
 import statemachine as sm
-from fuzz import command_lines, kills, mjb, models, threads, traces
+from fuzz import command_lines, kills, models, threads, traces
 from fuzz.__main__ import run_apart, targets
 from statemachine.errors import BusyDataError
 from statemachine.runs import formats
@@ -117,7 +117,6 @@ PATCHES: dict[str, list[tuple[Any, str, Any]]] = {
     ("fault", "target", "tries", "says"),
     [
         ("a digest is not looked at", traces, 40, "other numbers"),
-        ("a binary model is not refused", mjb, 4, ""),
         ("a data stays taken", threads, 1, ": refused when all threads were gone"),
         pytest.param("a command line ends in a traceback", command_lines, 4, "traceback",
                      marks=pytest.mark.slow),

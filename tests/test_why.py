@@ -580,7 +580,7 @@ def test_files_and_settings_of_an_engine_are_explained_together(
 ) -> None:
     heavy: Any = arm.replace(mass=1.3 * arm.body_mass)
     heavy.save_binary(tmp_path / "heavy.mjb")
-    right = quietly(str(tmp_path / "heavy.mjb"), defaults="engine")
+    right = quietly(str(tmp_path / "heavy.mjb"), defaults="engine", trust_binary=True)
     result = explain(arm, right, HOLD, uncertain=None, budget=40)
     assert {"body", "engine"} <= {row.kind for row in result.shares}
     assert result.explained + result.located == pytest.approx(1.0, abs=1e-4)

@@ -144,8 +144,8 @@ def load(
         defaults: "model" keeps the contract of this library on every backend;
             "engine" gives what the engine's own users get when they load the file.
         menagerie: A menagerie folder to look the name up in.
-        trust_binary: Whether a binary model (.mjb) is read that this library did not write.
-            MuJoCo does not check one: a damaged or malicious file can crash or harm the process.
+        trust_binary: Whether a binary model (.mjb) is read. MuJoCo does not check one: a damaged
+            or malicious file can crash or harm the process.
         **options: As `Model.replace` takes them, before anything of the file is refused:
             `contacts=False` loads a robot of whose geoms the engine knows no shape.
 
@@ -155,7 +155,7 @@ def load(
         BadInputError: The value of an option has the wrong shape, kind or size.
         MissingEngineError: The backend's engine is not installed here.
         ModelFileError: The file is not there.
-        ModelError: The engine cannot read the file, or it is a binary model of others.
+        ModelError: The engine cannot read the file, or it is a binary model that is not trusted.
     """
     place = _find(backend)
     check_name("defaults", defaults, ("model", "engine"))

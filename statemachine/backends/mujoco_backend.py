@@ -37,7 +37,6 @@ from ._delays import hold, saved
 from ._edits import CONSTANTS_FOLLOW, edited, step_length, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
 from ._release_child import constraint_part, contact_arrays
-from .binary import write_binary
 from .compiled import (
     ENGINE_ERRORS,
     check_numbers,
@@ -150,7 +149,9 @@ class MujocoModel(Model):
         return self.raw
 
     def save_binary(self, path: AnyPath) -> None:
-        """Write the compiled model as a binary model (.mjb), which this user's `load` takes back.
+        """Write the compiled model as a binary model (.mjb).
+
+        `load` takes it back with `trust_binary=True`.
 
         Args:
             path: The file; one that is there is replaced.
@@ -158,7 +159,7 @@ class MujocoModel(Model):
         Raises:
             OSError: It cannot be written.
         """
-        write_binary(path, saved(self.raw).tobytes())
+        Path(path).write_bytes(saved(self.raw).tobytes())
 
     def with_compiled(self, compiled: mujoco.MjModel) -> MujocoModel:
         check_numbers(compiled, str(self.path))

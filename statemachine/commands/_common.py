@@ -191,7 +191,7 @@ SECONDS = ("--seconds", "S", "simulated time")
 TRUST = (
     "--trust-binary",
     "",
-    "read a binary model (.mjb) that this library did not write; it can do harm",
+    "read a binary model (.mjb); a damaged one can do harm",
 )
 
 
