@@ -71,7 +71,8 @@ def of_model(model: str) -> Iterator[Case]:
     yield Case("what explains hold", "why", (*compare, "--why"))
     yield Case("one step of hold", "onestep", (*compare, "--one-step"))
     yield Case("convergence of hold", "converge", (*compare, "--converge"))
-    models = ("compare", "--models", path, "--backends", "mujoco", "pybullet", "--json")
+    pair = ("--backend", "mujoco", "--backend", "pybullet")
+    models = ("compare", "--models", path, *pair, "--json")
     yield Case("what the engines make of it", "models", models)
     yield Case("fingertip", "fingertip", ("fingertip", path, *both, "--poses", "20", "--json"))
     if model in _AUDITED:

@@ -279,7 +279,7 @@ def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
 def test_no_filler_of_ours_is_shown(model: Any, capsys: pytest.CaptureFixture[str]) -> None:
     file = str(model(MIXED.format(rest="").replace(' range="-1 1" limited="true"', "")).path)
     # The robots are the same; a motor whose ctrl has a range may differ in what it can exert.
-    main(["compare", "--models", file, "--backends", "mujoco", "pybullet"])
+    main(["compare", "--models", file, "--backend", "mujoco", "--backend", "pybullet"])
     assert_not_in(capsys.readouterr().out, "e+09", "e+12")
 
 

@@ -299,7 +299,7 @@ def test_free_of_contact_the_engines_agree() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
-    found = compare(*run_sides(Request(("hold",), defaults="engine")).traces)
+    found = compare(*run_sides(Request(("hold",), ("mujoco:engine", "pybullet:engine"))).traces)
     # FINDINGS: POSITION_CONTROL is 13 to 41 degrees off in the transient, at 5 ms.
     assert np.degrees(by_name(found)["elbow_flex"].max) > 13
     assert_in(" ".join(found.notes), "gravity differs: 0 0 -9.81 and 0 0 0", "timesteps differ")
@@ -344,7 +344,8 @@ def no_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_pybullet_its_recorded_run_takes_its_place(
     no_pybullet: None, name: str, defaults: Any
 ) -> None:
-    run = run_sides(Request((name,), defaults=defaults))
+    way = ":engine" if defaults == "engine" else ""
+    run = run_sides(Request((name,), (f"mujoco{way}", f"pybullet{way}")))
     assert [bool(trace.header.recorded) for trace in run.traces] == [False, True]
     assert "recorded run that comes with the package" in run.said[0]
     found = compare(*run.traces)

@@ -150,7 +150,7 @@ def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["so101@mujco"], "no engine named 'mujco'.*Did you mean 'mujoco'"),
+        (["so101@mujco"], "no backend named 'mujco'.*Did you mean 'mujoco'"),
         (["so101", "timstep=1"], "no option named 'timstep'.*Did you mean 'timestep'"),
         (["timestep=1", "so101"], "timestep=1 stands before any side"),
         (["so101", "timestep="], "timestep= has no value"),

@@ -22,7 +22,8 @@ from .conftest import ROOT, Cli, distribution, one_line
 NAME = "hidden"
 ON = ("--backend", NAME)
 SHORT = ("--seconds", "0.2")
-BESIDE = ("--backends", "mujoco", NAME)
+BESIDE = ("--backend", "mujoco", "--backend", NAME)
+AS_IT_COMES = ("--backend", "mujoco:engine", "--backend", f"{NAME}:engine")
 SAYS_NO, BAD_INPUT = 1, 2
 
 
@@ -109,7 +110,7 @@ def test_a_command_runs_on_it(said: Said, words: str, code: int, says: str) -> N
     "words",
     [
         ("hold", *BESIDE, *SHORT),
-        ("hold", *BESIDE, *SHORT, "--defaults", "engine"),
+        ("hold", *AS_IT_COMES, *SHORT),
         ("hold", *BESIDE, *SHORT, "--why"),
         _slow(("hold", *BESIDE, *SHORT, "--plot", "hold.svg")),
         _slow(("hold", *BESIDE, *SHORT, "--html", "hold.html")),
@@ -140,8 +141,8 @@ def test_what_it_makes_of_a_file_is_not_known(said: Said, words: tuple[str, ...]
         ("compare", "--models", "so101", *BESIDE),
         ("fingertip", *ON, "--poses", "5"),
         _slow(("lesson", "hold", "--backend", "all")),
-        _slow(("compare", "hold", "--backends", "pybullet", NAME, *SHORT, "--defaults", "engine",
-               "--why")),
+        _slow(("compare", "hold", "--backend", "pybullet:engine", "--backend", ON[1] + ":engine",
+               *SHORT, "--why")),
         _slow(("doctor",)),
     ],
 )  # fmt: skip
@@ -181,6 +182,6 @@ def test_it_is_audited_by_its_room(said: Said) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("engine", "viser")
-@pytest.mark.parametrize("ghost", [(), ("--ghost", "mujoco")])
+@pytest.mark.parametrize("ghost", [(), ("--backend", "mujoco")])
 def test_it_is_viewed(said: Said, ghost: tuple[str, ...]) -> None:
     assert "http://" in said("view", *ON, *ghost, "--seconds", "0.3")

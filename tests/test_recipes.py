@@ -123,4 +123,6 @@ def test_a_backend(copy: Copy) -> None:
     entries = toml.replace("project.entry-points.", "").replace('"', "")
     distribution(copy.folder, "my-package", "1.0", entries)
     assert "mine" in copy.run("lesson", "hold", "--backend", "mine")
-    assert "mine" in copy.run("compare", "hold", "--seconds", "0.3", "--backends", "mujoco", "mine")
+    assert "mine" in copy.run(
+        "compare", "hold", "--seconds", "0.3", "--backend", "mujoco", "--backend", "mine"
+    )

@@ -211,9 +211,9 @@ def test_the_command_of_a_played_trace_says_what_was_asked(
     box: Trace, tmp_path: Path, here: Cli
 ) -> None:
     path, out = write(box, tmp_path / "box.npz"), tmp_path / "played.npz"
-    here("trace", "play", path, "so101/scene_box", "--defaults", "engine", "-o", out)
+    here("trace", "play", path, "so101/scene_box", "--backend", "mujoco:engine", "-o", out)
     assert read(out).header.command == (
-        "statemachine trace play box.npz so101/scene_box --backend mujoco --defaults engine"
+        "statemachine trace play box.npz so101/scene_box --backend mujoco:engine"
     )
 
 

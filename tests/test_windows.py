@@ -106,7 +106,7 @@ _COMMANDS = (
 )
 _ON_BOTH_ENGINES = (
     ("compare", "hold", "--why"),
-    ("compare", "--models", "so101", "--backends", "mujoco", "pybullet"),
+    ("compare", "--models", "so101", "--backend", "mujoco", "--backend", "pybullet"),
     ("trace", "record", "hold", "--seconds", "0.1", "-o", "hold.npz"),
     ("trace", "show", "hold.npz"),
     ("audit",),

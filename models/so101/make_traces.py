@@ -13,6 +13,7 @@ from typing import Any
 
 import statemachine as sm
 from statemachine import releases
+from statemachine.backends import BackendChoice
 from statemachine.lessons.hold import OLDER
 from statemachine.runs import Trace, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
@@ -34,8 +35,7 @@ def recorded(run: str) -> Trace:
     name, backend, defaults = RUNS[run]
     scenario = SCENARIOS[name]
     model = sm.load(scenario.model, backend=backend, defaults=defaults)
-    typed = f"statemachine trace record {name} --backend {backend}"
-    typed += " --defaults engine" if defaults == "engine" else ""
+    typed = f"statemachine trace record {name} --backend {BackendChoice(backend, defaults)}"
     trace = record_scenario(scenario, model, defaults=defaults, command=typed)
     header = dataclasses.replace(trace.header, single=True)
     return Trace(header, trace.columns)

@@ -12,6 +12,7 @@ import os
 import warnings
 from collections.abc import Callable
 from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, cast
 
@@ -28,6 +29,7 @@ from .binary import is_binary, read_binary
 from .starts import overlap_warning, places_in, usual_start
 
 __all__ = [
+    "BackendChoice",
     "HiddenData",
     "HiddenModel",
     "HiddenWorld",
@@ -39,6 +41,7 @@ __all__ = [
     "load",
     "load_to_run",
     "loaders",
+    "parse_backend",
     "register",
 ]
 
@@ -77,6 +80,41 @@ def check_backend(kind: str, name: str) -> None:
         version_of(name)
     else:
         check_name(kind, name, backend_names())
+
+
+@dataclass(frozen=True)
+class BackendChoice:
+    """A backend and whose defaults it has, as `parse_backend` reads it.
+
+    Attributes:
+        name: Of the backend: "mujoco", "pybullet", "mujoco==3.3.7".
+        defaults: "engine" for the engine as its own users meet it.
+    """
+
+    name: str
+    defaults: Defaults = "model"
+
+    def __str__(self) -> str:
+        return f"{self.name}:engine" if self.defaults == "engine" else self.name
+
+
+def parse_backend(word: str) -> BackendChoice:
+    """Read a backend as it is typed behind --backend, or behind the @ of a side.
+
+    Args:
+        word: "pybullet", "mujoco==3.3.7", or "pybullet:engine" for the engine as its own users
+            meet it.
+
+    Raises:
+        UnknownNameError: There is no such backend, or something else stands behind the colon.
+        BadInputError: It is a release of MuJoCo without three numbers.
+    """
+    name, colon, way = word.partition(":")
+    check_backend("backend", name)
+    if not colon:
+        return BackendChoice(name)
+    check_name(f"way to load a file on {name}", way, ("engine",))
+    return BackendChoice(name, "engine")
 
 
 def backend_engine(name: str) -> str | None:

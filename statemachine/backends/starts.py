@@ -1,4 +1,4 @@
-"""Shapes inside each other in the state that a run starts in, and what that state is called.
+"""The state that a run starts in: what it is called, shapes inside each other, bodies asleep.
 
 Contacts throw such a robot apart, with forces that no design meant. What is told of is the state
 that is used: another one may be free of that, or alone have it.
@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..installed import DEFAULT, require
 from ..interface import MOCAP, Array, Model
 from ..measures import ContactNames, overlaps
 from ..measures.text import few
@@ -84,3 +86,15 @@ def _called(model: Model, places: Mapping[str, Array]) -> str:
         if same(number):
             return f"the keyframe {frame.name!r}" if frame.name else f"keyframe {number}"
     return "the state that the run starts in"
+
+
+def asleep_from_the_start(model: Model) -> NDArray[np.bool_]:
+    """Return which velocities (nv,) belong to bodies that the engine lets sleep from the start."""
+    asleep = np.zeros(model.nv, dtype=bool)
+    if model.backend == DEFAULT and model.compiled is not None:
+        mujoco = require("mujoco")
+        compiled = model.compiled
+        if compiled.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+            policy = compiled.tree_sleep_policy[compiled.dof_treeid]
+            asleep = policy == int(mujoco.mjtSleepPolicy.mjSLEEP_INIT)
+    return asleep

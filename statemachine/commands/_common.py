@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import errors
 from ..errors import (
@@ -21,6 +21,9 @@ from ..errors import (
 )
 from ..installed import DEFAULT
 from ..typed_numbers import typed_float, typed_int
+
+if TYPE_CHECKING:
+    from ..backends import BackendChoice
 
 PROGRAM = "statemachine"
 # Exit codes: the result says no; bad input; an engine is missing; a fault of this program; nowhere
@@ -176,8 +179,20 @@ def add_table(parser: Any, *rows: Row) -> None:
 
 
 # What several commands have.
-BACKEND = ("--backend", "NAME", f"an engine, or all (default {DEFAULT})", {"default": DEFAULT})
-ENGINE = ("--backend", "NAME", f"an engine (default {DEFAULT})", {"default": DEFAULT})
+BACKEND = (
+    "--backend",
+    "NAME",
+    "mujoco, pybullet:engine (as its own users meet it) or a release, mujoco==3.3.7; all: those "
+    f"that are installed; may be repeated (default {DEFAULT})",
+    {"action": "append"},
+)
+ENGINE = (
+    "--backend",
+    "NAME",
+    "mujoco, pybullet:engine (as its own users meet it) or a release, mujoco==3.3.7 (default "
+    f"{DEFAULT})",
+    {"action": "append"},
+)
 DEFAULTS = (
     "--defaults",
     None,
@@ -218,10 +233,48 @@ def seed_of(what: str) -> Row:
     return "--seed", "N", f"random seed of {what} (0)", {"default": 0}
 
 
+def chosen_backends(words: Sequence[str] | None, usual: str = DEFAULT) -> list[BackendChoice]:
+    """Return the backends that --backend names, as they were typed.
+
+    Args:
+        words: What was typed; "all" are those of all engines, whether or not they are installed.
+        usual: Where nothing was typed.
+
+    Raises:
+        UnknownNameError: There is no such backend.
+    """
+    from ..backends import BackendChoice, backend_names, parse_backend
+
+    chosen: list[BackendChoice] = []
+    for word in words or [usual]:
+        if word == "all":
+            chosen += [BackendChoice(name) for name in backend_names()]
+        else:
+            chosen.append(parse_backend(word))
+    return chosen
+
+
+def one_backend(words: Sequence[str] | None, what: str) -> BackendChoice:
+    """Return the one backend that --backend names.
+
+    Args:
+        words: What was typed.
+        what: The command, for the message.
+
+    Raises:
+        BadInputError: Several are named.
+        UnknownNameError: There is no such backend.
+    """
+    chosen = chosen_backends(words)
+    if len(chosen) > 1 or "all" in (words or ()):
+        raise BadInputError(f"{what} takes one --backend; got {' and '.join(words or ())}")
+    return chosen[0]
+
+
 def on_each_backend(
     options: argparse.Namespace, what: str, model: str, run: Callable[[Any, str, Any], Any]
 ) -> dict[str, Any]:
-    """Results by backend; an engine that is missing is named and left out of `all`.
+    """Return results by backend; an engine that is missing is named and left out of `all`.
 
     Args:
         options: Its `backend` and `menagerie` are read.
@@ -229,22 +282,28 @@ def on_each_backend(
         model: A model's name or file.
         run: Called with the Model, the backend's name and what is told the fraction that is done.
     """
-    from ..backends import backend_names, load_to_run
+    from ..backends import load_to_run
     from ..report.terminal import progress
 
-    everyone = options.backend == "all"
+    words = options.backend
+    everyone = words is not None and "all" in words
     results: dict[str, Any] = {}
     missing: list[StateMachineError] = []
-    for backend in backend_names() if everyone else [options.backend]:
+    for backend in dict.fromkeys(chosen_backends(words)):
         try:
-            loaded = load_to_run(model, backend=backend, menagerie=options.menagerie)
+            loaded = load_to_run(
+                model,
+                backend=backend.name,
+                defaults=backend.defaults,
+                menagerie=options.menagerie,
+            )
         except (MissingEngineError, ModelError, UnsupportedError) as error:
             if not everyone:
                 raise
             missing.append(error)
             continue
         with progress(f"{what} on {backend}") as report:
-            results[backend] = run(loaded, backend, report)
+            results[str(backend)] = run(loaded, str(backend), report)
     say_missing([*{str(error): error for error in missing}.values()], results)  # each text once
     return results
 

@@ -15,7 +15,18 @@ from typing import Any
 
 from ..errors import StateMachineError
 from ..installed import PAIR
-from ._common import JOBS, PARTS, PROGRAM, REPEATED, Row, complain, pairs_of, refuse, show
+from ._common import (
+    JOBS,
+    PARTS,
+    PROGRAM,
+    REPEATED,
+    Row,
+    chosen_backends,
+    complain,
+    pairs_of,
+    refuse,
+    show,
+)
 from ._compare_files import write_tests
 
 OF_STEPS: tuple[Row, ...] = (
@@ -212,8 +223,8 @@ OF_MODELS: tuple[Row, ...] = (
     (
         "--models",
         "NAME|FILE",
-        "two models, URDF or MJCF, before anything moves; FILE@ENGINE:engine, or --backends and "
-        "one model: what an engine itself makes of it",
+        "two models, URDF or MJCF, before anything moves; FILE@ENGINE:engine, or --backend twice "
+        "and one model: what an engine itself makes of it",
         {"nargs": "*"},
     ),
     ("--frame", "LEFT=RIGHT", "a frame of the left and what the right calls it", REPEATED),
@@ -224,7 +235,6 @@ OF_MODELS: tuple[Row, ...] = (
 
 def run_models(options: argparse.Namespace) -> int:
     """Compare, and show."""
-    from ..backends import backend_engine
     from ..compare.models import compare
     from ..compare.sides import is_trace, parse_sides
     from ..report import model_diff
@@ -249,22 +259,21 @@ def run_models(options: argparse.Namespace) -> int:
     engines = [None if s.file == word else s.engine for s, word in zip(sides, words, strict=True)]
     refuse(
         (
-            options.backends and any(engines),
-            "--backends and FILE@ENGINE say the same: give one of them",
+            options.backend and any(engines),
+            "--backend and FILE@ENGINE say the same: give one of them",
         ),
         (
             any(side.options for side in sides),
             "--models compares what the files say, without options of a run",
         ),
     )
-    if options.backends:
-        engines, sides = list(options.backends), sides * (3 - len(sides))
-        for engine in options.backends:
-            backend_engine(engine)
+    if options.backend:
+        engines = [backend.name for backend in chosen_backends(options.backend)]
+        sides *= 3 - len(sides)
     refuse(
         (
-            len(sides) != 2,
-            f"--models wants two models, or one and --backends A B; got {len(words)}",
+            len(sides) != 2 or len(engines) != 2,
+            f"--models wants two models, or one and --backend A --backend B; got {len(words)}",
         )
     )
     files = [side.file for side in sides]
@@ -333,10 +342,9 @@ def _typed(options: argparse.Namespace, request: Any) -> str:
     words = [PROGRAM, "compare", *request.words, *(side.label for side in request.sides)]
     words += [typed_option(*o) for o in request.options.items() if o[0] != "timestep"]
     if not request.sides and tuple(request.backends) != PAIR:
-        words += ["--backends", *request.backends]
+        words += [word for backend in request.backends for word in ("--backend", backend)]
     return command(
         words,
-        ("--defaults", request.defaults, "model"),
         ("--menagerie", request.menagerie and "DIR", None),
         ("--seconds", request.seconds, None),
         ("--timestep", request.options.get("timestep"), None),

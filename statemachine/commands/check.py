@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..errors import BadInputError
 from ._common import (
     ENGINE,
     NEEDS,
@@ -15,6 +16,7 @@ from ._common import (
     add_table,
     file_name,
     json_of,
+    one_backend,
     refuse,
     resumable,
     show,
@@ -131,6 +133,14 @@ def run(options: argparse.Namespace) -> int:
     return _class(options) if several else _one(options)
 
 
+def _backend(options: argparse.Namespace) -> str:
+    """Return the name of the backend that exercises are judged on."""
+    backend = one_backend(options.backend, "check")
+    if backend.defaults == "engine":
+        raise BadInputError(f"exercises are judged on {backend.name}, which keeps the contract")
+    return backend.name
+
+
 def _faults(options: argparse.Namespace) -> int:
     """A student's tests, on an arm with each of the faults."""
     from ..grading.faults.run import examine
@@ -138,13 +148,12 @@ def _faults(options: argparse.Namespace) -> int:
     from ..report.terminal import progress
 
     with progress("faults") as report:
-        examination = examine(options.faults, options.backend, options.only, progress=report)
+        examination = examine(options.faults, _backend(options), options.only, progress=report)
     return show(faults_page(examination), examination, options.json)
 
 
 def _one(options: argparse.Namespace) -> int:
     """One student's file."""
-    from ..errors import BadInputError
     from ..grading import classroom, exercise
     from ..report.grading import grade_page
     from ..report.terminal import progress
@@ -155,7 +164,7 @@ def _one(options: argparse.Namespace) -> int:
         if folder:
             file = classroom.submission_in(folder)
         with progress("check") as report:
-            grade = exercise.run(file, options.backend, options.time_limit, report, folder=folder)
+            grade = exercise.run(file, _backend(options), options.time_limit, report, folder=folder)
     except BadInputError as error:
         if options.gradescope:  # the student sees why
             _gradescope(options.gradescope, None, str(error))
@@ -184,7 +193,7 @@ def _class(options: argparse.Namespace) -> int:
     with resumable(options.csv, "judged"), progress(f"{len(submitted)} files") as report:
         entries = classroom.judge_all(
             submitted,
-            options.backend,
+            _backend(options),
             time_limit=options.time_limit,
             jobs=options.jobs,
             table=options.csv,

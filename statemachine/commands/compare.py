@@ -6,12 +6,11 @@ import argparse
 import shlex
 from typing import Any
 
-from ..errors import EndedEarlyError
+from ..errors import BadInputError, EndedEarlyError
 from ..installed import PAIR
 from . import _compare_files as files
 from . import _compare_questions as questions
 from ._common import (
-    DEFAULTS,
     EXCLUDES,
     NEEDS,
     PARTS,
@@ -23,6 +22,7 @@ from ._common import (
     Rule,
     add_rules,
     add_table,
+    chosen_backends,
     complain,
     json_of,
     menagerie,
@@ -64,7 +64,13 @@ def add(parser: argparse.ArgumentParser) -> None:
             "model for both engines, two sides, or a second trace",
             {"nargs": "*"},
         ),
-        ("--backends", ("A", "B"), "the engines (default mujoco pybullet)", {"nargs": 2}),
+        (
+            "--backend",
+            "NAME",
+            "the left's engine, and once more the right's: mujoco, pybullet:engine (as its own "
+            "users meet it) or a release, mujoco==3.3.7 (default mujoco and pybullet)",
+            {"action": "append"},
+        ),
         *run_options(),
         (
             "--tolerance",
@@ -114,7 +120,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         parser,
         *(
             "what",
-            "backends",
+            "backend",
             "why",
             "html",
             "converge",
@@ -142,7 +148,7 @@ RULES: tuple[Rule, ...] = (
     ("frame all digits", NEEDS, "models"),
     ("uncertainty", EXCLUDES, "no_chaos"),
     ("one_step converge", EXCLUDES, "why html plot film models uncertainty tolerance"),
-    ("versions", EXCLUDES, "why html film models uncertainty backends"),
+    ("versions", EXCLUDES, "why html film models uncertainty backend"),
     ("one_step", EXCLUDES, "converge"),
     ("junit", EXCLUDES, "why one_step converge models"),
     ("bisect", NEEDS, "versions"),
@@ -169,7 +175,6 @@ def experiments() -> str:
 def run_options() -> tuple[Row, ...]:
     """Options that change what is run."""
     return (
-        DEFAULTS,
         *menagerie(),
         SECONDS,
         ("--timestep", "S", "length of a step [s]"),
@@ -195,8 +200,7 @@ def request_of(options: argparse.Namespace) -> Any:
         sides = left.taking(taken[1], right, back), right.taking(taken[0], left, names)
     return Request(
         what=what,
-        backends=options.backends or PAIR,
-        defaults=options.defaults,
+        backends=_backends(options, what),
         model=model,
         menagerie=options.menagerie,
         seconds=options.seconds,
@@ -209,6 +213,28 @@ def request_of(options: argparse.Namespace) -> Any:
     )
 
 
+def _backends(options: argparse.Namespace, what: tuple[str, ...]) -> tuple[str, str]:
+    """Return the two backends; one that is named is where a trace is played.
+
+    Raises:
+        BadInputError: There are not two.
+        UnknownNameError: There is no such backend.
+    """
+    from ..compare.sides import is_trace
+
+    if not options.backend:
+        return PAIR
+    chosen = [str(backend) for backend in chosen_backends(options.backend)]
+    if len(chosen) == 1 and len(what) == 1 and is_trace(what[0]):
+        return chosen[0], chosen[0]
+    if len(chosen) != 2:
+        raise BadInputError(
+            f"compare takes two engines, as in --backend mujoco --backend pybullet:engine; "
+            f"got {' and '.join(chosen)}"
+        )
+    return chosen[0], chosen[1]
+
+
 def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any) -> None:
     """Refuse an option that has no meaning for what was asked."""
     from ..runs.controllers import is_function
@@ -216,14 +242,8 @@ def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any)
     if sides:
         refuse_given(
             options,
-            ["backends"],
+            ["backend"],
             "{} goes without sides: each side names its engine: FILE@ENGINE",
-        )
-        refuse(
-            (
-                options.defaults != "model",
-                "--defaults goes without sides: each side says whose: FILE@ENGINE:engine",
-            )
         )
     else:
         example = f"{PROGRAM} compare hold LEFT RIGHT"
@@ -290,9 +310,7 @@ def _run_compare(
 
     tolerances = parse_tolerances(options.tolerance)
     if request.is_traces and len(request.what) == 2:
-        refuse_given(
-            options, ["backends"], "{} is of a run, and two traces are runs that were made"
-        )
+        refuse_given(options, ["backend"], "{} is of a run, and two traces are runs that were made")
     with progress("compare") as bar:
         run = run_sides(request, bar)
     comparison = compare(*run.traces, tolerances=tolerances)

@@ -25,7 +25,12 @@ def add(parser: argparse.ArgumentParser) -> None:
             {"nargs": "*"},
         ),
         ("--calls", "", "which call does what, each run"),
-        ("--backend", "NAME", "an engine, or all (default all)", {"default": "all"}),
+        (
+            "--backend",
+            "NAME",
+            "an engine, or all; may be repeated (default all)",
+            {"action": "append"},
+        ),
         json_of(),
     )
     add_rules(
@@ -51,14 +56,18 @@ def run(options: argparse.Namespace) -> int:
     return show(report.page(result), result, options.json, footer)
 
 
-def _engines(asked: str) -> list[str]:
-    """The engine that was asked for; of all, those that load, and a line for each other."""
+def _engines(asked: list[str] | None) -> list[str]:
+    """Return the engines that were asked for; of all, those that load.
+
+    A line says why each other does not.
+    """
     from ..engines import room_names
     from ..probes.conventions import check_engine
 
-    if asked != "all":
-        check_engine(asked)
-        return [asked]
+    if asked and "all" not in asked:
+        for name in asked:
+            check_engine(name)
+        return list(dict.fromkeys(asked))
     engines, missing = available()
     for name in [name for name in room_names() if name not in ENGINES]:
         try:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
-from ..installed import DEFAULT
 from ..lessons import BESIDE, LESSONS, PATH, Lesson
 from ..page import Heading
 from ._common import (
@@ -172,7 +171,7 @@ def run_path(options: argparse.Namespace) -> int:
         if reader:
             again = command(
                 [PROGRAM, "lesson", "--from", lesson.name],
-                ("--backend", options.backend, DEFAULT),
+                *(("--backend", word, None) for word in options.backend or ()),
                 ("--record", options.record, None),
             )
             print(f"\nGo on later with: {again}")
@@ -190,7 +189,7 @@ def _last_page(options: argparse.Namespace, reader: Any) -> int:
     from ..lessons.fingertip import certify
     from ..report import terminal
 
-    code, every = 0, argparse.Namespace(backend="all", menagerie=options.menagerie)
+    code, every = 0, argparse.Namespace(backend=["all"], menagerie=options.menagerie)
     if reader:
         reader.go_on("the last page: the fingertip, checked by another library")
     try:

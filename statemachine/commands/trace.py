@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import BadInputError
 from ..installed import DEFAULT
 from ._common import (
-    DEFAULTS,
     ENGINE,
     PROGRAM,
     SAYS_NO,
@@ -19,12 +18,16 @@ from ._common import (
     json_of,
     menagerie,
     model_of,
+    one_backend,
     one_line,
     refuse,
     show,
 )
 from ._compare_files import checked, write_pictures
 from .compare import EXPERIMENTS, experiments, run_options
+
+if TYPE_CHECKING:
+    from ..backends import BackendChoice
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -46,7 +49,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         *run_options(),
         _output("WHAT.BACKEND.npz"),
     )
-    play = file, ENGINE, DEFAULTS, *own, _output("TRACE.BACKEND.npz")
+    play = file, ENGINE, *own, _output("TRACE.BACKEND.npz")
     for name, help_, action, rows in (
         ("record", "record an experiment, or a controller of your own", run_record, record),
         ("play", "play the ctrl of a trace on an engine", run_play, play),
@@ -113,21 +116,22 @@ def run_record(options: argparse.Namespace) -> int:
 
     asked = Request((options.what,), keyframe=options.keyframe).scenario()
     name = function_file(options.what).stem
-    target = _target(options.output, f"{name}.{options.backend}.npz")
+    backend = one_backend(options.backend, "trace record")
+    target = _target(options.output, f"{name}.{_in_a_name(backend)}.npz")
     model = load_to_run(
         options.model or asked.model or "so101/scene",
-        backend=options.backend,
-        defaults=options.defaults,
+        backend=backend.name,
+        defaults=backend.defaults,
         menagerie=options.menagerie,
     )
-    with progress(f"record {name} on {options.backend}") as bar:
+    with progress(f"record {name} on {backend}") as bar:
         trace = record_scenario(
             asked,
             model,
             seconds=options.seconds,
             seed=options.seed,
-            command=_typed(options, "record", options.what),
-            defaults=options.defaults,
+            command=_typed(options, "record", options.what, backend),
+            defaults=backend.defaults,
             options={} if options.timestep is None else {"timestep": options.timestep},
             progress=bar,
         )
@@ -141,7 +145,8 @@ def run_play(options: argparse.Namespace) -> int:
     from ..runs import model_file, play, read
 
     trace = read(options.file)
-    target = _target(options.output, f"{Path(options.file).stem}.{options.backend}.npz")
+    backend = one_backend(options.backend, "trace play")
+    target = _target(options.output, f"{Path(options.file).stem}.{_in_a_name(backend)}.npz")
     file, same = (
         (options.model, True)
         if options.model
@@ -149,8 +154,8 @@ def run_play(options: argparse.Namespace) -> int:
     )
     model = load_to_run(
         file,
-        backend=options.backend,
-        defaults=options.defaults,
+        backend=backend.name,
+        defaults=backend.defaults,
         menagerie=options.menagerie if options.model else None,
     )
     if not same:
@@ -161,12 +166,12 @@ def run_play(options: argparse.Namespace) -> int:
         )
     if trace.header.options:
         model = model.replace(**trace.header.options)
-    with progress(f"play on {options.backend}") as bar:
+    with progress(f"play on {backend}") as bar:
         played = play(
             trace,
             model,
-            command=_typed(options, "play", options.file),
-            defaults=options.defaults,
+            command=_typed(options, "play", options.file, backend),
+            defaults=backend.defaults,
             options=trace.header.options,
             progress=bar,
         )
@@ -205,6 +210,11 @@ def run_pictures(options: argparse.Namespace) -> int:
     return 0
 
 
+def _in_a_name(backend: BackendChoice) -> str:
+    """Return a backend as it stands in the name of a file, which has no colon on Windows."""
+    return str(backend).replace(":", ".")
+
+
 def _target(given: str | None, usual: str, suffixes: tuple[str, ...] = ()) -> Path:
     """Where to write, refused before anything runs if that cannot be."""
     from ..runs.files import SUFFIXES
@@ -234,7 +244,7 @@ def _written(trace: Any, target: Path) -> int:
     return 0
 
 
-def _typed(options: argparse.Namespace, action: str, what: str) -> str:
+def _typed(options: argparse.Namespace, action: str, what: str, backend: BackendChoice) -> str:
     """The command that makes this trace again, without paths of this machine."""
     from ..compare import Request
     from ..measures.text import command
@@ -243,8 +253,7 @@ def _typed(options: argparse.Namespace, action: str, what: str) -> str:
     return one_line(
         command(
             [PROGRAM, "trace", action, *words],
-            ("--backend", options.backend, DEFAULT if options.picture == "record" else None),
-            ("--defaults", options.defaults, "model"),
+            ("--backend", str(backend), DEFAULT if action == "record" else None),
             ("--keyframe", given.get("keyframe"), None),
             ("--seconds", given.get("seconds"), None),
             ("--timestep", given.get("timestep"), None),

@@ -11,12 +11,13 @@ import threading
 from contextlib import suppress
 from typing import Any
 
-from ..errors import TraceError
+from ..errors import BadInputError, TraceError
+from ..installed import DEFAULT
 from ..typed_numbers import is_count, typed_float
 from ._common import (
-    ENGINE,
     PROGRAM,
     add_table,
+    chosen_backends,
     complain,
     menagerie,
     one_line,
@@ -43,8 +44,12 @@ def add(parser: argparse.ArgumentParser) -> None:
             "the model if it is not its own",
             {"nargs": "*"},
         ),
-        ENGINE,
-        ("--ghost", "NAME", "another engine, under the same commands, seen through"),
+        (
+            "--backend",
+            "NAME",
+            f"an engine (default {DEFAULT}); a second one, under the same commands, is the ghost",
+            {"action": "append"},
+        ),
         (
             "--keyframe",
             "NAME|N",
@@ -88,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     if not traces:
         return _simulate(options, model or _MODEL, port)
     of_one = "{} is for a simulation, and a trace is a recording"
-    refuse_given(options, ("ghost", "keyframe", "site"), of_one)
+    refuse_given(options, ("backend", "keyframe", "site"), of_one)
     return _play(options, traces, model, port)
 
 
@@ -100,9 +105,12 @@ def _simulate(options: argparse.Namespace, name: str, port: int) -> int:
     from ..releases import engine_of
     from ..view.session import LiveSession
 
-    backends = [name for name in (options.backend, options.ghost) if name]
+    chosen = chosen_backends(options.backend)
+    if len(chosen) > 2:
+        raise BadInputError(f"view shows one engine or two; got {len(chosen)}")
     models = [
-        load_to_run(name, backend=backend, menagerie=options.menagerie) for backend in backends
+        load_to_run(name, backend=each.name, defaults=each.defaults, menagerie=options.menagerie)
+        for each in chosen
     ]
     keyframe = _keyframe(options.keyframe, models[0])
     if text := overlap_warning(models[0], places_in(models[0], keyframe)):

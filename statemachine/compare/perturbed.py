@@ -16,10 +16,9 @@ from functools import partial
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..backends.starts import asleep_from_the_start
 from ..errors import BadInputError, EngineError, EngineWarning, TraceError, refuse
-from ..installed import DEFAULT, require
 from ..interface import Array, Data, Ints, JointType, Model
 from ..measures import amount, common_moments, same_pairs
 from ..processes.parallel import forks_for, in_forks
@@ -208,25 +207,13 @@ def nudged_start(
         nudged[place : place + 4] = qpos[place : place + 4]
         turn(nudged[place : place + 4], ROUNDING * direction(draw))
     velocities = _nudged(qvel, draw)
-    asleep = _asleep(model)
+    asleep = asleep_from_the_start(model)
     velocities[asleep] = qvel[asleep]
     for joint in np.flatnonzero(asleep[model.jnt_dofadr]):
         place = model.jnt_qposadr[joint]
         end = place + JointType(model.jnt_type[joint]).nq
         nudged[place:end] = qpos[place:end]
     return nudged, velocities
-
-
-def _asleep(model: Model) -> NDArray[np.bool_]:
-    """Return which velocities (nv,) belong to bodies that the engine lets sleep from the start."""
-    asleep = np.zeros(model.nv, dtype=bool)
-    if model.backend == DEFAULT and model.compiled is not None:
-        mujoco = require("mujoco")
-        compiled = model.compiled
-        if compiled.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-            policy = compiled.tree_sleep_policy[compiled.dof_treeid]
-            asleep = policy == int(mujoco.mjtSleepPolicy.mjSLEEP_INIT)
-    return asleep
 
 
 def turn(quat: Array, by: Array) -> None:

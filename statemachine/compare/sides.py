@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..backends import backend_names, check_backend, load_to_run
+from ..backends import BackendChoice, backend_names, load_to_run, parse_backend
 from ..engines import room
 from ..errors import BadInputError, StateMachineError, check_name, refuse, shown, unknown_name
 from ..installed import DEFAULT, PAIR
@@ -57,6 +57,11 @@ class Side:
     taken: TakenParts | None = None
 
     @property
+    def backend(self) -> BackendChoice:
+        """The engine and its defaults, as one types them behind --backend."""
+        return BackendChoice(self.engine, self.defaults)
+
+    @property
     def path(self) -> Path:
         """Its file; raises as `models.resolve` does."""
         return resolve(self.file, self.menagerie)
@@ -64,9 +69,8 @@ class Side:
     @property
     def label(self) -> str:
         """As one types it, without folders: "so101@mujoco timestep=0.002"."""
-        way = ":engine" if self.defaults == "engine" else ""
         options = (typed_option(name, value) for name, value in self.options.items())
-        return " ".join([f"{_typed(self.file)}@{self.engine}{way}", *options])
+        return " ".join([f"{_typed(self.file)}@{self.backend}", *options])
 
     def load(self, **options: Any) -> Model:
         """The Model; `options` are those of an experiment, over which its own win.
@@ -189,17 +193,13 @@ def _split_options(word: str) -> tuple[str, list[str]]:
 
 
 def _side(word: str, menagerie: str | None) -> Side:
-    file, engine, defaults = word, DEFAULT, "model"
+    file, backend = word, BackendChoice(DEFAULT)
     before, sign, after = word.rpartition("@")
     if sign and before and _ENGINE.fullmatch(after) and not Path(word).exists():
-        file = before
-        engine, colon, defaults = after.partition(":")
-        check_backend("engine", engine)
-        if colon and defaults != "engine":
-            raise unknown_name(f"way to load a file on {engine}", defaults, ("engine",))
+        file, backend = before, parse_backend(after)
     elif not Path(word).exists():
         _refuse_mistyped(word)
-    side = Side(file, engine, "engine" if defaults == "engine" else "model", {}, menagerie)
+    side = Side(file, backend.name, backend.defaults, {}, menagerie)
     side.path  # noqa: B018  (raises for what is not a file)
     return side
 
@@ -256,14 +256,14 @@ class Request:
 
     Attributes:
         what: Name of an experiment, FILE.py:FUNCTION, or one or two files of traces.
-        backends: The two engines; of one trace the second that is not its own.
-        defaults: What `load` is given.
+        backends: The two backends, as `parse_backend` reads them; of one trace the one that is
+            not its own is taken.
         model: Instead of the experiment's own, or a trace's; menagerie: where its name is looked
             up.
         seconds: Instead of the experiment's own time [s].
         seed: Of an experiment that draws something.
         options: For `Model.replace`, on both sides.
-        sides: The two sides, instead of backends, defaults and model; empty for those.
+        sides: The two sides, instead of backends and model; empty for those.
         names: Joints, bodies, sites and actuators of the left that go by other names on the
             right.
         every: Steps for which what a FUNCTION returns holds.
@@ -272,7 +272,6 @@ class Request:
 
     what: Sequence[str]
     backends: tuple[str, str] = PAIR
-    defaults: Literal["model", "engine"] = "model"
     model: str | None = None
     menagerie: str | None = None
     seconds: float | None = None
@@ -310,9 +309,11 @@ class Request:
         Args:
             model: The experiment's own, where none was said either.
         """
-        return self.sides or [
-            Side(self.model or model, backend, self.defaults, {}, self.menagerie)
-            for backend in self.backends
+        if self.sides:
+            return self.sides
+        return [
+            Side(self.model or model, backend.name, backend.defaults, {}, self.menagerie)
+            for backend in map(parse_backend, self.backends)
         ]
 
     def scenario(self) -> Scenario:

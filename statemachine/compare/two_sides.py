@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..backends import check_backend
+from ..backends import BackendChoice, parse_backend
 from ..engines import room
 from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError, refuse
 from ..installed import DEFAULT
@@ -200,17 +200,17 @@ def run_sides(request: Request | str, progress: Progress = silent) -> SidesRun:
             raise BadInputError(
                 f"{request.what[0]!r} is not a trace: a trace ends in .npz or .parquet"
             )
-        for name in request.backends:
-            check_backend("backend", name)
+        for word in request.backends:
+            parse_backend(word)
     try:
         reruns, matched, said = prepare_sides(request)
     except MissingEngineError:
-        if request != Request(request.what, request.backends, request.defaults):
+        if request != Request(request.what, request.backends):
             raise  # nothing like it was recorded
         return _with_recorded(request, progress)
     left_run, right_run = (
         rerun.record(
-            command=_command(request, rerun.model.backend),
+            command=_command(request, BackendChoice(rerun.model.backend, rerun.defaults)),
             progress=part_of(progress, 0.35 * k, 0.35),
         )
         for k, rerun in enumerate(reruns)
@@ -255,23 +255,19 @@ def _opened(request: Request, progress: Progress) -> SidesRun:
     """Two traces; or one, and what comes of its ctrl on the other engine."""
     traces = [read(word) for word in request.what]
     both = len(traces) == 2
-    _refuse_of_run(
-        request,
-        defaults=both and request.defaults != "model",
-        **dict.fromkeys(request.options, both),
-    )
+    _refuse_of_run(request, **dict.fromkeys(request.options, both))
     if both:
         return SidesRun(traces[0], traces[1], traces[1])
     side, what = _other_side(request, _side_of(request, 0, traces[0])), request.what[0]
     played = play(
         traces[0],
         side.load(),
-        command=command(["statemachine", "trace", "play", what, "--backend", side.engine]),
+        command=command(["statemachine", "trace", "play", what, "--backend", str(side.backend)]),
         defaults=side.defaults,
         options=dict(side.options),
         progress=progress,
     )
-    said = f"the ctrl of {what} was played on {side.engine}, from the state it starts in"
+    said = f"the ctrl of {what} was played on {side.backend}, from the state it starts in"
     return SidesRun(traces[0], played, played, said=(said,))
 
 
@@ -281,10 +277,10 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
     for side in request.both_sides(scenario.model):
         try:
             rerun = rerun_of(scenario, side.load(), defaults=side.defaults)
-            trace = rerun.record(command=_command(request, side.engine), progress=progress)
+            trace = rerun.record(command=_command(request, side.backend), progress=progress)
         except MissingEngineError as error:
             try:
-                rerun, trace = None, shipped(scenario.name, side.engine, request.defaults)
+                rerun, trace = None, shipped(scenario.name, side.engine, side.defaults)
             except StateMachineError:
                 raise error from None
             said.append(f"{error}; its side is the recorded run that comes with the package")
@@ -296,13 +292,12 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
     return SidesRun(left, right, right, reruns=(reruns[0], reruns[1]), said=tuple(said))
 
 
-def _command(request: Request, backend: str) -> str:
+def _command(request: Request, backend: BackendChoice) -> str:
     """The command that records one side of an experiment; "" where it cannot say that."""
     if request.sides or request.every > 1 or {*request.options} - {"timestep"}:
         return ""
     return command(
-        ["statemachine", "trace", "record", *request.words, "--backend", backend],
-        ("--defaults", request.defaults, "model"),
+        ["statemachine", "trace", "record", *request.words, "--backend", str(backend)],
         ("--menagerie", request.menagerie and "DIR", None),
         ("--seconds", request.seconds, None),
         ("--seed", request.seed, 0),
@@ -373,10 +368,12 @@ def _side_of(request: Request, place: int, trace: Trace) -> Side:
 
 def _other_side(request: Request, own: Side) -> Side:
     """What a trace was recorded of, on the backend of a request that is not the trace's."""
-    for name in request.backends:
-        if name != own.engine:
-            return replace(own, engine=name, defaults=request.defaults)
-    raise BadInputError(f"the trace is of {own.engine}: name another with --backends")
+    backends = [parse_backend(word) for word in request.backends]
+    backends.sort(key=lambda backend: backend.name == own.engine)  # another engine first
+    for backend in backends:
+        if backend != own.backend:
+            return replace(own, engine=backend.name, defaults=backend.defaults)
+    raise BadInputError(f"the trace is of {own.backend}: name another with --backend")
 
 
 def _refuse_of_run(request: Request, **given: bool) -> None:

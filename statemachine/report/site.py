@@ -100,7 +100,7 @@ def make_comparisons(folder: Path) -> list[Path]:
         written.append(_write(folder, name, page, f"statemachine compare {name}"))
         if not (left.header.recorded or right.header.recorded):
             page = _why_as_they_come(name, (left.header.backend, right.header.backend))
-            typed = f"statemachine compare {name} --why --defaults engine"
+            typed = f"statemachine compare {name} --backend mujoco --backend pybullet:engine --why"
             written.append(_write(folder, f"{name}-why", page, typed))
     return written
 
@@ -108,7 +108,8 @@ def make_comparisons(folder: Path) -> list[Path]:
 def _why_as_they_come(name: str, backends: tuple[str, str]) -> Page:
     """The page that says why, for engines as they come."""
     asked = scenario(name)
-    left, right = (load(asked.model, backend=backend, defaults="engine") for backend in backends)
+    left = load(asked.model, backend=backends[0])
+    right = load(asked.model, backend=backends[1], defaults="engine")
     page = why.page(explain(left, right, asked))
     return replace(
         page,

@@ -222,7 +222,7 @@ def of_settings(book: Ledger, left: GroupTree, right: GroupTree) -> Iterator[str
     if len(silent) == 1:
         yield (
             f"a {silent[0]} says nothing of timestep, gravity and solver: the engine that "
-            "loads it decides (--backends shows what it takes)"
+            "loads it decides (--backend shows what it takes)"
         )
 
 
