@@ -45,7 +45,7 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "vise
         ("from statemachine.cli import main; main(['check', '--help'])", set()),
         ("from statemachine.cli import main; main(['view', '--help'])", set()),
         ("import statemachine.interface", {"numpy"}),
-        ("import statemachine.probes.freshness", {"numpy"}),
+        ("import statemachine.freshness", {"numpy"}),
         ("import statemachine.backends, statemachine.conformance", {"numpy", "xml.etree"}),
         ("import statemachine.kinematics", {"numpy", "xml.etree"}),
     ],
