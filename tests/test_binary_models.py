@@ -128,7 +128,7 @@ def test_commands_take_it_when_asked(
     strange: Path, here: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(binary.TRUST, "")
-    words = ["audit", str(strange), "--steps", "2"]
+    words = ["lesson", "state", "--model", str(strange)]
     one_line(here(*words), "--trust-binary")
     trusted = here(*words, "--trust-binary")
     assert (trusted.returncode, "is trusted" in trusted.stderr) == (0, True), trusted.stderr

@@ -48,7 +48,7 @@ SHOWN = [
 ]
 # What the words of a command need to be there.
 ENGINE_OF = {
-    **dict.fromkeys(("pybullet", "compare", "audit", "view", "trace", "sweep"), "pybullet"),
+    **dict.fromkeys(("pybullet", "compare", "view", "trace", "sweep"), "pybullet"),
     "fingertip": "pinocchio",
 }
 ROBOT = (
@@ -130,7 +130,12 @@ def test_python_block(tmp_path: Path) -> None:
 
 # Of each guide with code: what its code prints.
 PRINTS = {
-    "docs/audit.md": ("Derived values of scene_box on mujoco", "1 of 1 reads were stale"),
+    "docs/audit.md": (
+        "restored whole, against going on: same bytes",
+        "idle here: ('time',)",
+        "Derived values of scene_box on mujoco",
+        "1 of 1 reads were stale",
+    ),
     "docs/comparing.md": ("False the same ()", "[('gravity', 1.0)]"),
     "docs/gym.md": (
         "HeldBox mujoco   random   within 1 cm:  0 of 16",

@@ -41,7 +41,6 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "vise
         ("from statemachine.cli import main; main(['lesson', 'gravity', '--help'])", set()),
         ("from statemachine.cli import main; main(['fingertip', '--help'])", set()),
         ("from statemachine.cli import main; main(['conventions', '--help'])", set()),
-        ("from statemachine.cli import main; main(['audit', '--help'])", set()),
         ("from statemachine.cli import main; main(['check', '--help'])", set()),
         ("from statemachine.cli import main; main(['view', '--help'])", set()),
         ("import statemachine.interface", {"numpy"}),

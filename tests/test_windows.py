@@ -109,7 +109,6 @@ _ON_BOTH_ENGINES = (
     ("compare", "--models", "so101", "--backends", "mujoco", "pybullet"),
     ("trace", "record", "hold", "--seconds", "0.1", "-o", "hold.npz"),
     ("trace", "show", "hold.npz"),
-    ("audit",),
     ("lesson", "gravity", "--backend", "all", "--calls"),
 )
 
