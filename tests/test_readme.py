@@ -141,6 +141,7 @@ PRINTS = {
         "HeldBox mujoco   random   within 1 cm:  0 of 16",
         "HeldBox mujoco   scripted within 1 cm: 16 of 16, 150.0 steps",
         "HeldBox pybullet scripted within 1 cm: 16 of 16, 150.0 steps",
+        "two processes: (2, ",
     ),
     "docs/interface.md": ("no joint named 'elbow'; known: ", "0.001\n", "options of replace: "),
     "docs/models.md": ("13 coordinates", "True {}"),
@@ -171,6 +172,7 @@ def test_the_code_of_a_guide_runs(page: str, tmp_path: Path) -> None:
     if '"pybullet"' in PYTHON[page] or page in LONG:
         need_engine("pybullet")
     if page in LONG:
+        pytest.importorskip("gymnasium")
         need_engine("pinocchio")
     out = of_python("-c", PYTHON[page], folder=tmp_path, code=0).stdout
     assert_in(out, *PRINTS[page])

@@ -36,8 +36,6 @@ GUARDED = {
     ("sweep/worker.py", "ITIMER_REAL"),
     ("sweep/worker.py", "SIGALRM"),
     ("sweep/worker.py", "setitimer"),
-    ("worlds/_worker.py", "POLLIN"),
-    ("worlds/_worker.py", "poll"),
     ("processes/signals.py", "SIG_BLOCK"),
     ("processes/signals.py", "SIG_SETMASK"),
     ("processes/signals.py", "pthread_sigmask"),
