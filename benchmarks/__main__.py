@@ -239,26 +239,18 @@ def reading_emulated(name: str, rounds: int, target: list[float]) -> list[Ratio]
     return interleaved(steps(lambda _: None), others, rounds)
 
 
-def pooled(name: str, rounds: int, count: int, steps: int) -> list[Ratio]:
+def looped(name: str, rounds: int, count: int, steps: int) -> list[Ratio]:
     """Worlds on PyBullet against as many Data stepped one after the other."""
     model = sm.load(name, backend="pybullet")
     singles = [sm.make_data(model) for _ in range(count)]
-    pools = {
-        f"PyBullet, {count} worlds, {steps} steps, {words}": make_worlds(
-            model, count, workers=workers, derived=()
-        )
-        for workers, words in ((1, "here"), (2, "two processes"))
-    }
 
     def serial() -> None:
         for data in singles:
             sm.step(model, data, steps)
 
-    others = {words: partial(step_worlds, worlds, steps) for words, worlds in pools.items()}
-    ratios = interleaved(serial, others, max(1, rounds // 5))
-    for worlds in pools.values():
-        worlds.close()
-    return ratios
+    with make_worlds(model, count, derived=()) as worlds:
+        name = f"PyBullet, {count} worlds, {steps} steps"
+        return interleaved(serial, {name: partial(step_worlds, worlds, steps)}, rounds // 5 + 1)
 
 
 def freshness(name: str, rounds: int) -> list[Ratio]:
@@ -486,7 +478,7 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None, str]] =
     (partial(reading_emulated, target=_FLOOR), "so101/scene", 1.5, "tip"),
     (partial(reading_emulated, target=_AIR), "so101/scene", 1.5, "tip"),
     *(
-        (partial(pooled, count=count, steps=steps), "so101/scene", None, "")
+        (partial(looped, count=count, steps=steps), "so101/scene", None, "")
         for count in (2, 8)
         for steps in (1, 10, 100)
     ),

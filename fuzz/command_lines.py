@@ -40,7 +40,6 @@ _BASES = [
     ["trace", "play", "t.npz", "-o", "o.npz"],
     ["trace", "show", "t.npz"],
     ["trace", "csv", "t.npz", "-o", "o.csv"],
-    ["audit", "so101", "--steps", "2", "--seed", "1"],
     ["view", "--seconds", "0.1", "--port", "0"],
 ]
 

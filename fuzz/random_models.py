@@ -51,7 +51,6 @@ _COMMANDS: dict[tuple[str, ...], int] = {
     # These take seconds.
     ("compare", "EXPERIMENT", "LEFT", "RIGHT", *_SHORT, "--html", "page.html"): 2,
     ("compare", "EXPERIMENT", "LEFT", "--converge", *_SHORT): 2,
-    ("audit", "LEFT", "--steps", "2"): 1,
 }
 _WELL = (
     '<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size=".1" pos=".1 0 0"/></body>'

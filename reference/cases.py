@@ -31,7 +31,6 @@ _LESSONS = (
     *("objects", "state", "write", "forward", "hold", "gravity", "reset", "replay", "time"),
     *("speed", "questions"),
 )
-_AUDITED = {"arm with a box", "inverted pendulum", "fixed ant"}
 # Without them the lesson looks how fast the machine is.
 _LENGTHS = {"gravity": ("--seconds", "4", "--longer", "20")}
 _EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
@@ -75,8 +74,6 @@ def of_model(model: str) -> Iterator[Case]:
     models = ("compare", "--models", path, *pair, "--json")
     yield Case("what the engines make of it", "models", models)
     yield Case("fingertip", "fingertip", ("fingertip", path, *both, "--poses", "20", "--json"))
-    if model in _AUDITED:
-        yield Case("audit", "audit", ("audit", path, *both, "--steps", "10", "--json"))
     shipped = ROOT / "models" / (f"{path}.xml" if "/" in path else f"{path}/{path}.xml")
     file = path if Path(path).exists() else str(shipped)
     yield Case("robots", "robots", ("robots", file, "--quick", "--json"))

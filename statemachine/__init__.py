@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from .backends import load as load
+    from .freshness import freshness as freshness
+    from .freshness import watch_freshness as watch_freshness
     from .interface import Data as Data
     from .interface import Model as Model
     from .interface import State as State
@@ -44,8 +46,6 @@ if TYPE_CHECKING:
     from .interface import set_state as set_state
     from .interface import step as step
     from .kinematics import Kinematics as Kinematics
-    from .probes.freshness import freshness as freshness
-    from .probes.watch import watch_freshness as watch_freshness
 
 _HOMES = {
     "load": "backends",
@@ -59,8 +59,8 @@ _HOMES = {
     "Data": "interface",
     "State": "interface",
     "Kinematics": "kinematics",
-    "freshness": "probes.freshness",
-    "watch_freshness": "probes.watch",
+    "freshness": "freshness",
+    "watch_freshness": "freshness",
 }
 _MODULES = (
     "backends", "compare", "conformance", "errors", "kinematics", "models",

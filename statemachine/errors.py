@@ -102,12 +102,7 @@ class WorkerEndedError(StateMachineError, RuntimeError):
 
 
 class EngineError(StateMachineError, RuntimeError):
-    """An engine gave up in the middle of a step; the Data is of no use any more.
-
-    `worlds` has the numbers of those of many that are lost with their process.
-    """
-
-    worlds: tuple[int, ...] = ()
+    """An engine gave up in the middle of a step; the Data is of no use any more."""
 
 
 class UnsupportedError(StateMachineError, NotImplementedError):

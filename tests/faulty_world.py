@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import time
-import warnings
 import weakref
 from functools import partial
 from pathlib import Path
@@ -13,20 +10,16 @@ from typing import Any, ClassVar
 
 from statemachine.backends import HiddenModel, mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoModel
-from statemachine.errors import EngineError, EngineWarning
+from statemachine.errors import EngineError
 
 from .hidden_world import ExampleModel, ExampleWorld
 
-STUCK_FOR = 600.0  # seconds that a world which is stuck hears nothing
-RAISE, CRASH, NOISE, SLOW, STUCK, DIVERGE = (0.101, 0.102, 0.103, 0.104, 0.105, 0.106)
+RAISE, SLOW, DIVERGE = 0.101, 0.102, 0.103
 MOST = 16  # worlds that a process can hold: those of Data, and of each Model one with a look-ahead
 
 
 class FaultyError(Exception):
-    """What the engine raises; no other process can read it, for it wants two arguments."""
-
-    def __init__(self, what: str, where: str) -> None:
-        super().__init__(f"{what} {where}")
+    """What the engine raises."""
 
 
 class FaultyWorld(ExampleWorld):
@@ -45,18 +38,9 @@ class FaultyWorld(ExampleWorld):
     def step(self) -> None:
         what = float(self._ctrl[0])
         if what == RAISE:
-            raise FaultyError("it broke", "here")
-        if what == CRASH:
-            os.kill(os.getpid(), signal.SIGKILL)
-        elif what == NOISE:
-            os.write(1, b"noise on 1\n")
-            os.write(2, b"noise on 2\n")
-            warnings.warn("it creaks", EngineWarning, stacklevel=1)
-        elif what == SLOW:
+            raise FaultyError("it broke")
+        if what == SLOW:
             time.sleep(0.001)
-        elif what == STUCK:
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-            time.sleep(STUCK_FOR)
         elif what == DIVERGE:
             self.raw.qpos[1] = float("nan")
         super().step()

@@ -19,11 +19,9 @@ from statemachine.errors import (
     ForeignDataError,
     StaleReadError,
 )
+from statemachine.freshness import Scratch, gaps, table, worth_telling
 from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.measures import Gap
-from statemachine.probes import freshness
-from statemachine.probes.freshness import Scratch
-from statemachine.probes.stale_rows import gaps, gaps_text, table
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 
@@ -229,7 +227,8 @@ def test_data_is_untouched_and_so_is_its_future(box: Model) -> None:
 def test_every_scratch_is_closed(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Data] = []
     monkeypatch.setattr(
-        freshness, "make_data", lambda model: made.append(sm.make_data(model)) or made[-1]
+        "statemachine.freshness.make_data",
+        lambda model: made.append(sm.make_data(model)) or made[-1],
     )
     with opened(arm) as (model, data):
         sm.freshness(model, data)
@@ -321,13 +320,18 @@ def test_gaps_in_words(gap: Gap, text: str) -> None:
 
 def test_rounding_is_left_out_beside_more() -> None:
     small, large = Gap(1e-15, "N", "box"), Gap(0.5, "N·m", "j")
-    assert gaps_text([small, large]) == "0.5 N·m at j"
-    assert (gaps_text([small]), gaps_text([])) == ("below 1e-06 N at box", "")
+    assert list(worth_telling([small, large])) == [large]
+    assert list(worth_telling([small])) == [small]
 
 
-def test_a_figure_and_its_place_stay_on_one_line() -> None:
-    lines = table(("a", "b"), [("x" * 40, "12 mm at a long place; 13 N at another place")])
-    assert [line[43:] for line in lines[2:]] == ["12 mm at a long place;", "13 N at another place"]
+def test_a_gap_has_a_line_of_its_own() -> None:
+    rows = [(["x"], [Gap(0.012, "m", "tip"), Gap(13.0, "N", "box")]), (["y"], [])]
+    lines = table(("a", "b"), rows, no_gap="–")
+    assert [line.split() for line in lines[2:]] == [
+        ["x", "12", "mm", "at", "tip"],
+        ["13", "N", "at", "box"],
+        ["y", "–"],
+    ]
 
 
 def test_contacts_are_matched_by_what_touches() -> None:
@@ -512,12 +516,13 @@ STEPPED = "m = sm.load('so101'); d = sm.make_data(m); sm.step(m, d); sm.forward(
 @pytest.mark.parametrize(
     ("code", "printed"),
     [
-        (f"{STEPPED}; import sys; print('statemachine.probes' in sys.modules)", "False\n"),
-        ("import statemachine.probes.freshness; print(callable(sm.freshness))", "True\n"),
-        ("print(callable(sm.freshness))", "True\n"),
+        (f"{STEPPED}; import sys; print('statemachine.freshness' in sys.modules)", "False\n"),
+        ("import statemachine.freshness; print(callable(sm.freshness))", "True\n"),
+        ("sm.watch_freshness; print(callable(sm.freshness))", "True\n"),
+        ("print(sm.freshness.__name__)", "freshness\n"),
     ],
 )
-def test_the_name_is_the_function_and_its_module_is_loaded_when_it_is_asked_for(
+def test_the_name_can_be_called_and_its_module_is_loaded_when_it_is_asked_for(
     code: str, printed: str
 ) -> None:
     runs_in_silence(f"import statemachine as sm; {code}", ROOT, printed)

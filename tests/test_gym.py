@@ -193,6 +193,20 @@ def test_a_world_is_a_single_env_bit_for_bit(
     assert ended >= 6
 
 
+@pytest.mark.slow
+def test_processes_of_gymnasium_have_the_same_bits(backend: str) -> None:
+    make = partial(gymnasium.make, f"statemachine.gym:{REACH}", backend=backend)
+    with (
+        closing(gymnasium.vector.AsyncVectorEnv([make] * 2, context="spawn")) as theirs,
+        closing(_make_vec(REACH, backend, 2)) as ours,
+    ):
+        assert data_equivalence(ours.reset(seed=3), theirs.reset(seed=3), exact=True)
+        ours.action_space.seed(0)
+        for _ in range(5):
+            actions = ours.action_space.sample()
+            assert data_equivalence(ours.step(actions), theirs.step(actions), exact=True)
+
+
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_a_world_that_diverges_starts_anew_and_the_others_go_on(mode: str, backend: str) -> None:
     envs = _make_vec(REACH, backend, 3, autoreset_mode=mode)

@@ -69,7 +69,7 @@ def test_what_names_an_engine_is_seen() -> None:
         "import mujoco",
         "from pybullet import DIRECT",
         "from ..backends import mujoco_backend",
-        "from .engines.pybullet.audit import driver",
+        "from .engines.pybullet.driven import stepper",
         "def f():\n    return load(path, backend='mujoco')",
         "class A:\n    '''It is.'''\n    name = 'pinocchio'",
     ):

@@ -26,7 +26,6 @@ COMMANDS = [
     "doctor",
     "conventions quaternion gravity --backend mujoco",
     "conventions --calls --backend mujoco",
-    "audit --steps 2 --backend mujoco",
     "fingertip --poses 5",
     f"compare hold {ITSELF}",
     f"compare hold {ITSELF} --why",

@@ -77,7 +77,7 @@ def test_an_eighth_digit_is_a_change_and_a_tenth_another_processor(group: str) -
             told += len(lines)
             name = f"{group} | {case} | {key}"
             assert lines or tolerance_of(name) != DEFAULT, name
-    assert told >= 0.95 * with_numbers  # few figures have a tolerance of their own
+    assert told >= 0.9 * with_numbers  # few figures have a tolerance of their own
 
 
 def test_every_wider_tolerance_has_its_reason() -> None:

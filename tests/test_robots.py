@@ -274,10 +274,9 @@ def test_an_error_in_one_part_costs_that_part(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from statemachine.engines import room
-    from statemachine.probes.audit import interface_driver
     from statemachine.robots import examine, gaps
 
-    monkeypatch.setattr(interface_driver, "get_state", lambda *_: 1 / 0)
+    monkeypatch.setattr(examine, "get_state", lambda *_: 1 / 0)
     tell = Mock()
     row = examine.examine(folder / "good.xml", ExaminedModel("good.xml", "", ""), True, 0, tell)
     assert row.faults[0] == "restore, mujoco: ZeroDivisionError: division by zero"

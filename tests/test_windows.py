@@ -36,8 +36,6 @@ GUARDED = {
     ("sweep/worker.py", "ITIMER_REAL"),
     ("sweep/worker.py", "SIGALRM"),
     ("sweep/worker.py", "setitimer"),
-    ("worlds/_worker.py", "POLLIN"),
-    ("worlds/_worker.py", "poll"),
     ("processes/signals.py", "SIG_BLOCK"),
     ("processes/signals.py", "SIG_SETMASK"),
     ("processes/signals.py", "pthread_sigmask"),
@@ -109,7 +107,6 @@ _ON_BOTH_ENGINES = (
     ("compare", "--models", "so101", "--backend", "mujoco", "--backend", "pybullet"),
     ("trace", "record", "hold", "--seconds", "0.1", "-o", "hold.npz"),
     ("trace", "show", "hold.npz"),
-    ("audit",),
     ("lesson", "gravity", "--backend", "all", "--calls"),
 )
 

@@ -47,8 +47,6 @@ N = 4
 
 
 def worlds_of(model: sm.Model, n: int = N, **options: Any) -> many.Worlds:
-    if model.backend != "mujoco":
-        pytest.importorskip("statemachine.worlds.pool")
     return many.make_worlds(model, n, workers=options.pop("workers", 2), **options)
 
 

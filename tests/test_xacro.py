@@ -157,7 +157,6 @@ COMMANDS = (
     "compare --models {0} {0}",
     "view {0} --seconds 1",
     "lesson hold --model {0}",
-    "audit {0}",
     "trace record gravity {0}",
     "sweep gravity {0} --out data",
     "sweep gravity --vary model={0} --out data",

@@ -40,7 +40,6 @@ __all__ = [
     "check_backend",
     "load",
     "load_to_run",
-    "loaders",
     "parse_backend",
     "register",
 ]
@@ -154,11 +153,6 @@ def register(name: str, loader: str) -> None:
         raise BadInputError(f"loader must read 'package.module:function'; got {loader!r}")
     if _BACKENDS.setdefault(name, loader) != loader:
         raise BadInputError(f"there is a backend named {name!r} already; choose another name")
-
-
-def loaders() -> dict[str, str]:
-    """The backends of other packages that are known so far, as `register` takes them."""
-    return {name: loader for name, loader in _BACKENDS.items() if name not in ENGINES}
 
 
 def load(

@@ -19,6 +19,5 @@ COMMANDS = {
     "fingertip": "the engine's fingertip against an independent witness",
     "conventions": "what each engine takes for granted, asked of the engines",
     "engines": "other releases of an engine, to run and to compare",
-    "audit": "what exactly the state is, found by saving and restoring it",
 }
 FIRST = ("lesson", "check", "compare", "doctor")  # the others are under "more"

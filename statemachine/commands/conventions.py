@@ -14,7 +14,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Ask the engines themselves, not our backends: every answer is measured, on a small model "
         "made for the question, so that it is known what should come out. Of a model of yours "
-        "`audit` and `compare` tell."
+        "`compare` tells."
     )
     add_table(
         parser,

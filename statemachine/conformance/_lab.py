@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from functools import cached_property
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ..backends import load
-from ..engines.auditing import Driver, ReferenceRun, SavePoint
 from ..interface import (
     INPUTS,
     OPTIONS,
@@ -29,8 +28,6 @@ from ..interface import (
 from ..interface.options import unsupported
 from ..interface.records import Arrays
 from ..measures.quantities import readings
-from ..page import Figures
-from ..probes.audit.interface_driver import InterfaceDriver
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
@@ -96,23 +93,19 @@ class Lab(ExitStack):
         require(len(data.contacts) > 0, "the held box touches nothing")
         return data
 
-    def audit(self, *questions: Callable[[Driver, ReferenceRun], Iterator[Figures]]) -> None:
-        """Ask the interface questions of the audit: what is promised holds, to the bit.
+    def moving(self, push: float = 0.3, nstep: int = 25) -> Data:
+        """A new Data in which the jaws hold the box while the arm turns: mid-contact.
 
-        The run is that of the held box under a command that moves the arm: mid-contact.
+        Nothing but reset, a command and steps led there.
+
+        Args:
+            push: How far the command of the first joint is from the keyframe's [rad].
+            nstep: How many steps it took.
         """
-        driver, run = self._moving
-        for question in questions:
-            for finding in question(driver, run):
-                first = f"{finding.experiment}, {finding.case}: another future than {finding.into}"
-                require(finding.holds, f"{first}, after {finding.gap.first} steps")
-
-    @cached_property
-    def _moving(self) -> tuple[Driver, ReferenceRun]:
-        driver, key = InterfaceDriver(self.box, seed=0), self.box.keyframes[0]
-        ctrl = key.ctrl + 0.3 * (np.arange(self.box.nu) == 0)
-        point = SavePoint("held", "", self.box, key.qpos, key.qvel, ctrl, run_in=25)
-        return driver, driver.run(point, steps=100)
+        data = self.data(self.box, keyframe=0)
+        data.ctrl[0] += push
+        step(self.box, data, nstep)
+        return data
 
 
 def check(
@@ -243,6 +236,24 @@ def inputs_of(model: Model, data: Data) -> Array:
     """time, qpos, qvel and ctrl in one array."""
     state = get_state(model, data)
     return np.concatenate([[state.time], state["qpos"], state["qvel"], state["ctrl"]])
+
+
+def run_on(
+    data: Data, *calls: int, before_each: Callable[[Data], object] = lambda _: None
+) -> Array:
+    """Step, once for each call; qpos and qvel (n + 1, nq + nv), here and after each.
+
+    Args:
+        data: Whose command stays.
+        *calls: How many steps each of them takes.
+        before_each: What is done before each call.
+    """
+    rows = [np.concatenate((data.qpos, data.qvel))]
+    for nstep in calls:
+        before_each(data)
+        step(data.model, data, nstep)
+        rows.append(np.concatenate((data.qpos, data.qvel)))
+    return np.array(rows)
 
 
 def run_ctrl(model: Model, data: Data, steps: int, seed: int) -> Array:

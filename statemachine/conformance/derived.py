@@ -6,7 +6,7 @@ import numpy as np
 
 from ..interface import POSES, Data, JointType, Model, forward, get_state, reset, set_state, step
 from ..kinematics import Kinematics
-from ..probes.audit import trials
+from ..measures.quantities import readings
 from ..rotations import matrix_from_quat
 from ._lab import (
     TARGET,
@@ -17,6 +17,7 @@ from ._lab import (
     require_close,
     require_equal,
     run_ctrl,
+    run_on,
     same,
     snapshot,
 )
@@ -114,7 +115,20 @@ def check_forward_changes_no_input(lab: Lab, model: Model, data: Data) -> None:
 
 def check_forward_perturbs_nothing(lab: Lab) -> None:
     """A run with forwards in between is, bit for bit, the run without, mid-contact too."""
-    lab.audit(trials.look)
+
+    def forward_and_read(data: Data) -> None:
+        forward(data.model, data)
+        readings(data)
+
+    undisturbed = run_on(lab.moving(), *(1,) * 100)
+    for name, call in (
+        ("forward", lambda data: forward(data.model, data)),
+        ("reading what is derived", readings),
+        ("forward, then reading", forward_and_read),
+        ("get_state", lambda data: get_state(data.model, data)),
+    ):
+        run = run_on(lab.moving(), *(1,) * 100, before_each=call)
+        require_equal(run, undisturbed, f"a run with {name} before each step")
 
 
 @check("position servo", on="held")

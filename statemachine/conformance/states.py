@@ -10,7 +10,6 @@ import numpy as np
 
 from ..errors import BadInputError, ForeignStateError
 from ..interface import Data, Model, forward, get_state, reset, set_state, step
-from ..probes.audit import trials
 from ._lab import (
     Lab,
     check,
@@ -20,7 +19,10 @@ from ._lab import (
     require_equal,
     require_raises,
     run_ctrl,
+    run_on,
 )
+
+_ONE_BY_ONE = (1,) * 100  # as many calls of one step
 
 
 @check(on="arm")
@@ -40,7 +42,10 @@ def check_time_passes_only_in_step(lab: Lab, model: Model, data: Data) -> None:
 
 def check_steps_add_up(lab: Lab) -> None:
     """step(n) is n times step(1), bit for bit, mid-contact too."""
-    lab.audit(trials.pieces)
+    one_by_one = run_on(lab.moving(), *_ONE_BY_ONE)
+    for calls in ((100,), (7, 1, 22) * 3):
+        after = np.concatenate(([0], np.cumsum(calls)))
+        require_equal(run_on(lab.moving(), *calls), one_by_one[after], f"step{calls[:3]}")
 
 
 @check(on="box")
@@ -86,7 +91,18 @@ def check_a_state_restores_the_inputs(lab: Lab, model: Model, data: Data) -> Non
 
 def check_restored_futures_agree(lab: Lab) -> None:
     """Restores of one State have the same bits ever after; the run's own, if that is promised."""
-    lab.audit(trials.restored)
+    data = lab.moving()
+    state = get_state(lab.box, data)
+    going_on = run_on(data, *_ONE_BY_ONE)
+    futures = []
+    # The run itself, a new Data, and one of another past.
+    for target in (data, lab.data(lab.box), lab.moving(push=-0.2, nstep=75)):
+        set_state(lab.box, target, state)
+        futures.append(run_on(target, *_ONE_BY_ONE))
+    for future in futures[1:]:
+        require_equal(future, futures[0], "the future of a State, restored elsewhere")
+    if lab.box.capabilities.exact_restore:
+        require_equal(futures[0], going_on, "the future of a State, against that of its run")
 
 
 @check(on="arm")

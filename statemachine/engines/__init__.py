@@ -1,9 +1,9 @@
 """The engines without us: what each does and calls things when its own users drive it.
 
-Each engine has a room here, a package with a `RawEngine`; conventions, phrasebook, calls, audit,
-comparison, pictures, grading and doctor ask it by the engine's name, and name no engine themselves.
-What a room does not override is not asked, and the page says so. The methods import what they
-need: to look a room up imports no engine.
+Each engine has a room here, a package with a `RawEngine`; conventions, phrasebook, calls,
+comparison, robots, pictures, grading and doctor ask it by the engine's name, and name no engine
+themselves. What a room does not override is not asked, and the page says so. The methods import
+what they need: to look a room up imports no engine.
 
 So an engine is `backends/NAME_backend.py`, `engines/NAME` and a row of `installed.ENGINES`; one of
 another distribution declares entry points instead of the row.
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from ..drawing.scene import Camera, Drawer
     from ..interface import Array, Data, Model
     from ..page import Figures
-    from .auditing import Driver
     from .call_watch import CallWatch
     from .description.records import Robot
     from .measured import Phrases
@@ -173,7 +172,7 @@ class RawEngine:
         """
         return None
 
-    # What it takes for granted, what its state is, and what it runs.
+    # What it takes for granted, and what it runs.
 
     def measurement(self, question: str) -> Callable[..., Any] | None:
         """What measures the answer to a question of `probes.conventions`; None if nothing does."""
@@ -185,9 +184,19 @@ class RawEngine:
 
         return Phrases(("", ""), {})
 
-    def driver(self, model: Model, seed: int) -> Driver | None:
-        """What starts, steps, saves and restores by its own functions; `seed`: of what it draws."""
-        return None
+    @_needed
+    @abstractmethod
+    def stepper(
+        self, model: Model, qpos: Array, qvel: Array, ctrl: Array
+    ) -> AbstractContextManager[Callable[[int], object]]:
+        """What advances a simulation of it by so many steps, by its own functions alone.
+
+        Args:
+            model: A Model on this engine.
+            qpos: (nq,) where it starts.
+            qvel: (nv,) its velocities there.
+            ctrl: (nu,) the command.
+        """
 
     @_needed
     @abstractmethod

@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any, ClassVar
 
 from ..interface import Array
-from .auditing import Save
 from .measured import Futures
 
 HALF = 0.1  # an edge [m]
@@ -18,6 +17,8 @@ PLACES = ((0.0, 0.0, 0.25), (0.0, 0.02, 0.55), (0.0, 0.0, 0.85))
 TILT = (0.92, 0.31, 0.21, 0.1)
 Write = Callable[[Any, float], object]
 Read = Callable[[Any], float]
+# Entered, it saves a world and gives what restores one.
+Save = Callable[[Any], AbstractContextManager[Callable[[Any], object]]]
 _WRITTEN, _OTHER = 0.5, -0.25  # half of anything is not what it has at the start
 
 

@@ -58,7 +58,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
             backend: The engine to run it on.
             frame_skip: Timesteps of a control step.
             max_episode_steps: Control steps after which a world is truncated; None for no end.
-            workers: Threads or processes; no result depends on it.
+            workers: Threads at most; no result depends on it.
             autoreset_mode: When a world that ended starts anew: in the next step, in the same
                 one, or when `reset` is called with options["reset_mask"].
             render_mode: "rgb_array" or None.

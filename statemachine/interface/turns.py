@@ -92,7 +92,7 @@ class Closable:
     __slots__ = ()
 
     def close(self) -> None:
-        """Give back what the engine holds, and threads and processes. Idempotent.
+        """Give back what the engine holds, and threads. Idempotent.
 
         The last inputs stay readable, and the time of Worlds; every other use is an error.
         """

@@ -66,7 +66,7 @@ class Worlds(Closable, ABC):
     Attributes:
         model: The Model.
         n: Number of worlds.
-        workers: Threads or processes that step them.
+        workers: Threads that step them.
         qpos, qvel, ctrl: (n, nq), (n, nv) and (n, nu), as in a Data.
         mocap_pos, mocap_quat: (n, nmocap, 3) and (n, nmocap, 4), as in a Data.
         time: (n,) simulated time of each world [s].
@@ -114,7 +114,7 @@ class Worlds(Closable, ABC):
         Args:
             model: The Model.
             n: Number of worlds.
-            workers: Threads or processes that there are.
+            workers: Threads that there are.
             derived: Names of the derived arrays.
             arrays: (n, ...) of each input, of time and of each name of `derived`: the same
                 memory for the whole life.
@@ -176,7 +176,7 @@ class Worlds(Closable, ABC):
 
     @abstractmethod
     def _close(self) -> None:
-        """Give back threads, processes and memory; the arrays are copied already."""
+        """Give back threads and memory; the arrays are copied already."""
 
     @abstractmethod
     def _step(self, ids: Ints, nstep: int, forward: bool) -> Errors:

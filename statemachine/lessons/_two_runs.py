@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..engines.auditing import FRESH, ITSELF, SaveMethod, SavePoint
-from ..interface import Array, Model, make_data, reset
+from ..interface import Array, Data, Model, get_state, make_data, reset, set_state, step
 from ..measures import largest
 from ..measures.text import millimetres
 from ..page import Figures, Table, Traces
-from ..probes.audit.interface_driver import InterfaceDriver, as_a_state, written
 from .template import where
 
 BREAKS = ("extra-step", "late-ctrl")
@@ -101,28 +98,48 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[Figures, ...
         As `RawEngine.ways_back`.
     """
     key = 0 if model.keyframes else None
-    with make_data(model) as data:
-        reset(model, data, keyframe=key)
-        start = SavePoint("start", "", model, data.qpos.copy(), data.qvel.copy(), ctrl, 0)
-    driver, middle = InterfaceDriver(model, 0), replace(start, run_in=steps)
-    first_run, again = (driver.run(start, steps).future for _ in range(2))
-    rest = driver.run(middle, steps).future
-    states, arrays = (
-        driver.futures(middle, steps, way)
-        for way in (SaveMethod("a State", as_a_state), written("qpos", "qvel", "ctrl"))
-    )
-    with driver.at(middle) as data:
+
+    def start(data: Data) -> None:
         reset(model, data, keyframe=key)
         data.ctrl = ctrl
-        anew = driver.drive(data, start, steps)
-    futures = {
-        "reset to the keyframe": (anew, first_run),
-        "a new Data, same keyframe": (again, first_run),
-        "set_state, against going on": (states[ITSELF], rest),
-        "set_state, done twice": (states[FRESH], states[ITSELF]),
-        "qpos, qvel, ctrl put back": (arrays[FRESH], rest),
-    }
-    return tuple(Figures(name=name, difference=driver.off(*two)) for name, two in futures.items())
+
+    def go_on(data: Data, nstep: int = steps) -> Array:
+        """Qpos (nstep, nq) after each step."""
+        rows = []
+        for _ in range(nstep):
+            step(model, data)
+            rows.append(data.qpos.copy())
+        return np.array(rows)
+
+    def largest_difference(first: Array, second: Array) -> float:
+        return float(np.abs(first - second).max(initial=0.0))
+
+    with make_data(model) as data, make_data(model) as new, make_data(model) as written:
+        start(data)
+        first, rest = np.split(go_on(data, 2 * steps), 2)
+        start(data)
+        go_on(data)
+        state = get_state(model, data)
+        arrays = {name: np.array(getattr(data, name)) for name in ("qpos", "qvel", "ctrl")}
+        go_on(data)
+        set_state(model, data, state)
+        once = go_on(data)
+        start(data)
+        anew = go_on(data)
+        start(new)
+        again = go_on(new)
+        set_state(model, new, state)
+        twice = go_on(new)
+        for name, array in arrays.items():
+            setattr(written, name, array)
+        put_back = go_on(written)
+    return (
+        Figures(name="reset to the keyframe", difference=largest_difference(anew, first)),
+        Figures(name="a new Data, same keyframe", difference=largest_difference(again, first)),
+        Figures(name="set_state, against going on", difference=largest_difference(once, rest)),
+        Figures(name="set_state, done twice", difference=largest_difference(twice, once)),
+        Figures(name="qpos, qvel, ctrl put back", difference=largest_difference(put_back, rest)),
+    )
 
 
 def through_us(results: Mapping[str, Sequence[Figures]]) -> Table:

@@ -137,7 +137,7 @@ def _cost(model: Model, data: Data, n: int, progress: Progress) -> Figures:
     """Make n worlds, and step them and one Data in turns.
 
     Returns:
-        n: Number of worlds; workers: threads or processes that step them.
+        n: Number of worlds; workers: threads that step them.
         made: Wall time of `make_worlds` [s].
         step: Wall time of one step of one world [s].
         faster: Cost of a step of one Data, in bulk, over that of a step of one world.

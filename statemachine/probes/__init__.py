@@ -1,7 +1,10 @@
-"""Questions to an engine or to a Data, answered by trying: nothing here is known beforehand.
+"""Questions to an engine, answered by trying: nothing here is known beforehand.
 
 - `conventions`: what each engine takes for granted; which of its calls does what
-- `audit`: what exactly its state is, and what leaves it alone
+- `audit`: which parts of a State decide the future
 - `calls`: which functions of an engine some lines of code made run
-- `freshness`, `watch`: of which moment a derived array is, and how wrong it is by now
 """
+
+from .audit import Audit, audit
+
+__all__ = ["Audit", "audit"]

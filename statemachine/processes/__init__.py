@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import select
 import signal
 import subprocess
 import sys
@@ -137,8 +136,6 @@ def resident_memory() -> int:
 
 # A child that is told things by one pipe and answers by another.
 
-_SPIN = 50e-6  # [s] in which most calls are answered: to wake up takes longer
-_ASLEEP = 20  # messages that are waited for asleep when one took longer
 _ENDS_IN = 3.0  # seconds in which a process ends by itself when it is left alone
 
 
@@ -191,10 +188,6 @@ class PipedChild:
             with suppress(OSError):
                 pipe.close()
 
-    def interrupt(self) -> None:
-        """Send it what Ctrl-C sends, or on Windows Ctrl-Break."""
-        self._process.send_signal(getattr(signal, "CTRL_BREAK_EVENT", signal.SIGINT))
-
     def kill(self) -> None:
         """End it at once."""
         self._process.kill()
@@ -208,25 +201,6 @@ class PipedChild:
             self.kill()
             self._process.wait()
         self._said.close()
-
-
-def await_message(pipe: int, asleep: int) -> int:
-    """Look for a message for a short time, awake; who reads then sleeps until one is there.
-
-    It does not yield the processor: where others wait for that, it would be gone for a whole
-    time slice, which is longer than the calls that this is for. Where a message does not come in
-    time (its sender needs this very processor, or has other things to do), the next ones are
-    waited for asleep.
-
-    Args:
-        pipe: Its descriptor. On Windows no pipe can be looked at so.
-        asleep: How many messages are to be waited for asleep: 0 first, then what this returned.
-    """
-    until = time.perf_counter() + _SPIN
-    while os.name != "nt" and not asleep and not select.select([pipe], [], [], 0)[0]:
-        if time.perf_counter() > until:
-            asleep = _ASLEEP
-    return max(0, asleep - 1)
 
 
 def signal_name(number: int) -> str:

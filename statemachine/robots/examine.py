@@ -14,10 +14,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..backends import backend_names, load_to_run
 from ..backends.starts import overlaps_in
 from ..engines import room
-from ..engines.auditing import SavePoint
 from ..errors import (
     BadInputError,
     DivergedError,
@@ -29,11 +30,9 @@ from ..errors import (
     one_line,
 )
 from ..installed import DEFAULT, WITNESS, require
-from ..interface import Model, make_data, reset, step
+from ..interface import Array, Data, Model, get_state, make_data, reset, set_state, step
 from ..lessons.fingertip import certify
 from ..lessons.in_turns import Ratio, in_turns
-from ..probes.audit import trials
-from ..probes.audit.interface_driver import InterfaceDriver
 from ..runs import record_scenario
 from ..runs.scenarios import scenario
 from ..runs.whole import replace_bytes
@@ -168,18 +167,25 @@ class _Examination:
 
     def _restores(self, model: Model) -> bool | None:
         """Whether two futures of a State are one, and that of the run itself if promised."""
-        driver = InterfaceDriver(model, self.seed)
-        point = self._start(model, _FUTURE)
-        way = replace(driver.save_methods(point)[-1], portable=False)
-        findings = trials.tried(driver, driver.run(point, _FUTURE), way)
-        return all(finding.holds for finding in findings)
+        with self._started(model) as data:
+            step(model, data, _FUTURE)
+            state = get_state(model, data)
+            going_on = _future(model, data)
+            set_state(model, data, state)
+            once = _future(model, data)
+            set_state(model, data, state)
+            twice = _future(model, data)
+        if once.tobytes() != twice.tobytes():
+            return False
+        return once.tobytes() == going_on.tobytes() or not model.capabilities.exact_restore
 
-    def _start(self, model: Model, run_in: int) -> SavePoint:
-        """The start of a run, under the first command."""
-        ctrl = gaps.commands(model, 1, self.seed)[0]
+    @contextmanager
+    def _started(self, model: Model) -> Iterator[Data]:
+        """A Data at the start of a run, under the first command."""
         with make_data(model) as data:
             reset(model, data, gaps.keyframe_of(model))
-            return SavePoint("start", "", model, data.qpos.copy(), data.qvel.copy(), ctrl, run_in)
+            data.ctrl[:] = gaps.commands(model, 1, self.seed)[0]
+            yield data
 
     def _gaps(self) -> None:
         """Each other backend against the default one."""
@@ -203,11 +209,13 @@ class _Examination:
 
     def _cost(self, model: Model) -> float | None:
         """Time of a step over that of the engine, driven by its own functions, in turns."""
-        engine = room(model.backend).driver(model, self.seed) if model.nv else None
-        if engine is None:
+        engine = room(model.backend)
+        if not model.nv or not engine.can("stepper"):
             return None
-        point = self._start(model, 0)
-        with InterfaceDriver(model, self.seed).at(point) as data, engine.at(point) as machine:
+        with (
+            self._started(model) as data,
+            engine.stepper(model, data.qpos, data.qvel, data.ctrl) as alone,
+        ):
 
             def ours(steps: int) -> None:
                 for _ in range(steps):
@@ -217,10 +225,19 @@ class _Examination:
             steps = max(1, min(500, round(_TURN / max(first, 1e-7))))
             ways = {
                 "ours": lambda: ours(steps),
-                "alone": lambda: engine.advance(machine, steps),
+                "alone": lambda: alone(steps),
             }
             times = in_turns(ways, _ROUNDS, seed=self.seed)
         return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
+
+
+def _future(model: Model, data: Data) -> Array:
+    """Go on; positions and velocities (n, nq + nv) after each step."""
+    rows = []
+    for _ in range(_FUTURE):
+        step(model, data)
+        rows.append(np.concatenate((data.qpos, data.qvel)))
+    return np.array(rows)
 
 
 def _witness_row(model: Model, seed: int) -> WitnessRow:

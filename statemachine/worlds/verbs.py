@@ -25,6 +25,7 @@ from ..interface.records import Arrays, Errors
 from ..interface.turns import alone
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world, without
 from ..processes import checked_jobs, free_memory
+from .loop import LoopWorlds
 
 T = TypeVar("T")
 _SHOWN = 5  # diverged worlds that a warning names
@@ -43,8 +44,8 @@ def make_worlds(
     Args:
         model: The Model.
         n: Number of worlds, at least 1.
-        workers: Threads, or processes, this one included; by default one for each processor,
-            and no process for less than four worlds. No result depends on it.
+        workers: Threads at most; by default one for each processor. No result depends on it.
+            On an engine that steps one world at a time there is one, whatever is asked for.
         derived: The derived arrays that are kept after each call. Fewer take less memory.
         **options: Of `Model.replace`, each a sequence of n values: world i is a Data of
             `model.replace(name=values[i], ...)`.
@@ -58,14 +59,12 @@ def make_worlds(
     if not isinstance(model, Model):
         raise TypeError(f"make_worlds wants a Model, from statemachine.load; got {kind_of(model)}")
     n = as_count(n, "n")
-    workers = None if workers is None else min(as_count(workers, "workers"), n)
+    threads = checked_jobs(None) if workers is None else as_count(workers, "workers")
     names = _names(derived, "derived array", BATCHED)
     checked = _options(model, n, options)
-    worlds = model._make_worlds(n, workers or min(checked_jobs(None), n), names, checked)
+    worlds = model._make_worlds(n, min(threads, n), names, checked)
     if worlds is None:
-        from .pool import PoolWorlds
-
-        worlds = PoolWorlds(model, n, workers, names, checked)
+        worlds = LoopWorlds(model, n, names, checked)
     return worlds
 
 
@@ -82,8 +81,7 @@ def step(
         nstep: Number of timesteps, at least 1.
         ids: Numbers of some worlds, each once, or a mask (n,) of bools; all by default. Those
             that have diverged are left out.
-        forward: Whether to do what `forward` does, too, with those that did not diverge: on an
-            engine whose worlds are in processes both are one exchange.
+        forward: Whether to do what `forward` does, too, with those that did not diverge.
 
     Raises:
         BadInputError: `nstep` or `ids` is invalid.

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
 from statemachine import Model
 from statemachine.engines import RawEngine, room
-from statemachine.engines.auditing import Driver
 from statemachine.engines.description.records import Robot
+from statemachine.interface import Array
 
 
 class MyEngine(RawEngine):
     """Its own functions are MuJoCo's."""
 
-    def driver(self, model: Model, seed: int) -> Driver | None:
-        return room("mujoco").driver(model, seed)
+    def stepper(
+        self, model: Model, qpos: Array, qvel: Array, ctrl: Array
+    ) -> AbstractContextManager[Callable[[int], object]]:
+        return room("mujoco").stepper(model, qpos, qvel, ctrl)
 
     def read(self, path: Path, name: str) -> Robot:
         """The description, under the engine's own name."""

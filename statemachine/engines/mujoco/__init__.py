@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Collection, Iterable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,6 @@ class MujocoEngine(RawEngine):
     steps = ("mj_step", "mj_step2")
     forwards = ("mj_forward", "mj_kinematics", "mj_fwdPosition")
     phrases = function_of(".mujoco.conventions:phrases")
-    driver = function_of(".mujoco.audit:MujocoDriver")
     call_watch = function_of(".mujoco.calls:MujocoWatch")
     read = function_of(".mujoco.description:read")
     read_file = function_of(".mujoco.description:read_file")
@@ -68,6 +67,16 @@ class MujocoEngine(RawEngine):
             mujoco.mj_step(model, data)
             rows.append(np.concatenate((data.qpos, data.qvel)))
         return np.array(rows)
+
+    @contextmanager
+    def stepper(
+        self, model: Model, qpos: Array, qvel: Array, ctrl: Array
+    ) -> Iterator[Callable[[int], object]]:
+        """By mj_step."""
+        mujoco = require("mujoco")
+        data = mujoco.MjData(model.raw)
+        data.qpos[:], data.qvel[:], data.ctrl[:] = qpos, qvel, ctrl
+        yield lambda steps: mujoco.mj_step(model.raw, data, steps)
 
     def ignored(self, model: Model) -> list[str]:
         """Time constants of contacts that it raises (its flag refsafe)."""

@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ...installed import require
 from ...interface import Array
 from .. import samples
-from ..auditing import Save, copied
 from ..measured import (
     ANGLE,
     TORQUE,
@@ -29,9 +29,10 @@ from ..measured import (
     accelerated,
     near,
 )
-from ..pile import HALF, PLACES, TILT, Pile
+from ..pile import HALF, PLACES, TILT, Pile, Save
 from ..samples import PENDULUM_MJCF, acceleration, tip_at
-from .audit import mj, saved
+
+mj: Any = require("mujoco")
 
 
 def _loaded(text: str) -> tuple[Any, Any]:
@@ -237,10 +238,14 @@ _FIELDS = {
 def _components(*parts: str) -> Save:
     """Those of masks of mjtState."""
     spec = sum(int(getattr(mj.mjtState, f"mjSTATE_{part}")) for part in parts)
-    return copied(
-        lambda scene: saved(scene.data, spec),
-        lambda scene, state: mj.mj_setState(scene.model, scene.data, state, spec),
-    )
+
+    @contextmanager
+    def save(scene: Any) -> Iterator[Callable[[Any], object]]:
+        state = np.empty(mj.mj_stateSize(scene.model, spec))
+        mj.mj_getState(scene.model, scene.data, state, spec)
+        yield lambda other: mj.mj_setState(other.model, other.data, state, spec)
+
+    return save
 
 
 class MujocoPile(Pile):

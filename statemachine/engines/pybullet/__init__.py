@@ -32,7 +32,7 @@ class PybulletEngine(RawEngine):
     left_alone = function_of(".pybullet.as_it_comes:left_alone")
     ways_back = function_of(".pybullet.as_it_comes:ways_back")
     phrases = function_of(".pybullet.conventions:phrases")
-    driver = function_of(".pybullet.audit:PybulletDriver")
+    stepper = function_of(".pybullet.driven:stepper")
     call_watch = function_of(".pybullet.calls:PybulletWatch")
     read = function_of(".pybullet.reading:read")
     drawer = function_of(".pybullet.rendering:PybulletDrawer")

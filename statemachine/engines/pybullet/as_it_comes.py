@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from contextlib import closing, nullcontext
-from dataclasses import replace
+from contextlib import closing, contextmanager
 from typing import cast
 
 import numpy as np
@@ -21,8 +20,7 @@ from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ...page import Figures
-from ..auditing import Save, SavePoint
-from .audit import Client, PybulletDriver, put_back
+from .driven import DrivenClient
 from .world import fresh_world, gravity_of, limp, saved_in_memory
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.
@@ -181,12 +179,14 @@ def _joint(world: World, model: Model, joint: int) -> tuple[Tree, int]:
     return tree, tree.joints[tree.dofs.tolist().index(dof) - tree.base]
 
 
-class _AsLoaded(PybulletDriver):
-    """The bodies as loadURDF leaves them."""
-
-    def opened(self, model: Model) -> Client:
-        world = World(cast("PybulletModel", model).plan, "engine")
-        return Client(world, world)
+@contextmanager
+def _as_loaded(model: Model, qpos: Array, ctrl: Array, steps: int) -> Iterator[DrivenClient]:
+    """Yield the bodies as loadURDF leaves them, so many steps after a start at rest."""
+    with closing(World(cast("PybulletModel", model).plan, "engine")) as world:
+        machine = DrivenClient(model, world)
+        machine.start(qpos, np.zeros(model.nv), ctrl)
+        machine.advance(steps)
+        yield machine
 
 
 def ways_back(model: Model) -> tuple[Figures, ...]:
@@ -197,25 +197,36 @@ def ways_back(model: Model) -> tuple[Figures, ...]:
     """
     key = model.keyframes[0] if model.keyframes else None
     qpos, ctrl = (key.qpos, key.ctrl) if key else (model.compiled.qpos0, np.zeros(model.nu))
-    start = SavePoint("start", "", model, qpos, np.zeros(model.nv), ctrl, 0)
-    middle, driver = replace(start, run_in=_BEFORE), _AsLoaded(model, 0)
 
-    def back(point: SavePoint, save: Save) -> float:
-        with driver.at(point) as machine, save(machine) as restore:
-            first = driver.drive(machine, point, _AFTER)
-            restore(machine)
-            return driver.off(first, driver.drive(machine, point, _AFTER))
+    runs = []
+    for _ in range(2):
+        with _as_loaded(model, qpos, ctrl, 0) as machine:
+            runs.append(machine.positions_along(_BEFORE + _AFTER))
+    differences = {"a new client, loaded again": _largest(*runs)}
 
-    runs = [driver.run(start, _BEFORE + _AFTER).future for _ in range(2)]
-    with driver.at(middle) as machine:
-        touching, _ = driver.touching(machine)
-    moment = f"after {_BEFORE} steps, {touching} contacts"
-    differences = {
-        "a new client, loaded again": driver.off(*runs),
-        "resetJointState, resetBase… to the start": back(
-            start, lambda _: nullcontext(lambda machine: driver.start(machine, start))
-        ),
-        f"saveState, restoreState {moment}": back(middle, saved_in_memory),
-        f"written back {moment}": back(middle, put_back),
-    }
+    with _as_loaded(model, qpos, ctrl, 0) as machine:
+        first = machine.positions_along(_AFTER)
+        machine.start(qpos, np.zeros(model.nv), ctrl)
+        way = "resetJointState, resetBase… to the start"
+        differences[way] = _largest(first, machine.positions_along(_AFTER))
+
+    with _as_loaded(model, qpos, ctrl, _BEFORE) as machine:
+        moment = f"after {_BEFORE} steps, {machine.contacts()} contacts"
+
+    with _as_loaded(model, qpos, ctrl, _BEFORE) as machine, saved_in_memory(machine) as restore:
+        first = machine.positions_along(_AFTER)
+        restore(machine)
+        way = f"saveState, restoreState {moment}"
+        differences[way] = _largest(first, machine.positions_along(_AFTER))
+
+    with _as_loaded(model, qpos, ctrl, _BEFORE) as machine:
+        state = machine.world.read()
+        first = machine.positions_along(_AFTER)
+        machine.world.put(*state)
+        differences[f"written back {moment}"] = _largest(first, machine.positions_along(_AFTER))
     return tuple(Figures(name=name, difference=off) for name, off in differences.items())
+
+
+def _largest(first: Array, second: Array) -> float:
+    """The largest difference of a position after any step [rad or m]."""
+    return float(np.abs(first - second).max(initial=0.0))

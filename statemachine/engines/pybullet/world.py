@@ -14,9 +14,14 @@ from ...installed import silence
 
 
 class HasClient(Protocol):
-    """A world: its number, the numbers of its free bodies, and its joints, body by index."""
+    """A world: its number."""
 
     client: int
+
+
+class HasBodies(HasClient, Protocol):
+    """A world: the numbers of its free bodies, and its joints, body by index."""
+
     bases: Sequence[int]
     joints: Sequence[tuple[int, int]]
 
@@ -59,7 +64,7 @@ def gravity_of(client: int) -> tuple[float, float, float]:
     return tuple(parameters[f"gravityAcceleration{axis}"] for axis in "XYZ")
 
 
-def poses_and_rates(machine: HasClient) -> list[tuple[Any, Any]]:
+def poses_and_rates(machine: HasBodies) -> list[tuple[Any, Any]]:
     """Of each free body position and quaternion, and velocity and rate of turning."""
     client = machine.client
     return [
@@ -69,12 +74,12 @@ def poses_and_rates(machine: HasClient) -> list[tuple[Any, Any]]:
 
 
 @contextmanager
-def written(machine: HasClient) -> Iterator[Restore]:
+def written(machine: HasBodies) -> Iterator[Callable[[HasBodies], None]]:
     """What can be read of positions and velocities is written back."""
     bodies = poses_and_rates(machine)
     states = [pb.getJointState(*joint, machine.client)[:2] for joint in machine.joints]
 
-    def restore(other: HasClient) -> None:
+    def restore(other: HasBodies) -> None:
         for (body, index), state in zip(other.joints, states, strict=True):
             pb.resetJointState(body, index, *state, other.client)
         for body, (pose, rates) in zip(other.bases, bodies, strict=True):
