@@ -265,10 +265,10 @@ def test_what_is_read_after_each_call_comes_with_it(
 
 @pytest.mark.usefixtures("bullet")
 def test_a_control_step_of_environments_is_one_exchange(monkeypatch: pytest.MonkeyPatch) -> None:
-    gymnasium = pytest.importorskip("gymnasium")
-    pytest.importorskip("statemachine.gym")
-    task, options = "statemachine/Reach-v0", {"backend": "pybullet", "workers": 2}
-    envs = gymnasium.make_vec(task, num_envs=4, **options)
+    pytest.importorskip("gymnasium")
+    reach = pytest.importorskip("examples.reach")
+    gym = pytest.importorskip("statemachine.gym")
+    envs = gym.make_vec(num_envs=4, workers=2, **reach.task("pybullet"))
     envs.reset(seed=0)
     verbs = exchanges(monkeypatch)
     for _ in range(3):
