@@ -13,7 +13,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import mujoco
 import mujoco.batch
@@ -377,29 +376,29 @@ print((sizes[1] - sizes[0]) / {_MANY} / 1000)
 
 
 def environments(name: str, rounds: int) -> list[Ratio]:
-    """A control step of 64 worlds of a task for Gymnasium, against the engine's own batch.
+    """A control step of 64 worlds of an example for Gymnasium, against the engine's own batch.
 
     The baseline writes ctrl, steps and calls forward; the others observe and reward, too.
     """
-    import gymnasium
-
-    import statemachine.gym  # noqa: F401  (registers the tasks)
+    from examples import held_box, reach
+    from statemachine.gym import make_env, make_vec
 
     n, workers = 64, 2
-    envs: Any = gymnasium.make_vec(name, num_envs=n, workers=workers)
-    loop = [gymnasium.make(name) for _ in range(n)]
-    task = envs.unwrapped.task
-    batch = mujoco.batch.Batch(task.model.raw, n, workers)
+    task = {"reach": reach, "held box": held_box}[name].task()
+    envs = make_vec(num_envs=n, workers=workers, **task)
+    loop = [make_env(**task) for _ in range(n)]
+    batch = mujoco.batch.Batch(envs.model.raw, n, workers)
     ctrl, ids = batch.bind("ctrl"), np.arange(n)
-    actions = np.zeros((n, task.model.nu), dtype=np.float32)
-    commands = task.ctrl(actions, actions.shape)
+    actions = np.zeros((n, envs.model.nu), dtype=np.float32)
     envs.reset(seed=0)
     for world, env in enumerate(loop):
         env.reset(seed=world)
+    envs.step(actions)
+    commands = envs.worlds.ctrl.copy()
 
     def raw() -> None:
         ctrl[:] = commands
-        batch.step(ids, task.frame_skip)
+        batch.step(ids, task["frame_skip"])
         batch.forward(ids)
 
     def one_by_one() -> None:
@@ -491,8 +490,8 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None, str]] =
     (worlds_alone, "so101/scene_box", 1.03, "worlds"),
     (worlds_on_two, "so101", 1 / 1.9, "worlds"),
     (worlds_on_two, "so101/scene_box", 1 / 1.9, "worlds"),
-    (environments, "statemachine/Reach-v0", None, ""),
-    (environments, "statemachine/HeldBox-v0", None, ""),
+    (environments, "reach", None, ""),
+    (environments, "held box", None, ""),
     (why_in_forks, "so101", None, ""),
 ]
 

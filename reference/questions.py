@@ -5,14 +5,14 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import gymnasium
 import numpy as np
 
 import statemachine as sm
+from examples import held_box, reach
+from examples.arm import play
 from statemachine import conformance
-from statemachine.gym.policies import play, random_policy, scripted_policy
+from statemachine.gym import make_vec
 from statemachine.interface import DERIVED
 from statemachine.worlds import get_state, make_worlds, record, reset, set_state, step
 
@@ -66,10 +66,9 @@ def many_worlds(backend: str) -> Figures:
 def tasks(backend: str) -> Figures:
     """Four episodes of each task at once, by chance and by the scripted policy."""
     figures: Figures = {}
-    for task in ("Reach", "HeldBox"):
-        envs: Any = gymnasium.make_vec(f"statemachine/{task}-v0", num_envs=4, backend=backend)
-        policies = {"random": random_policy(envs.task, 0), "scripted": scripted_policy(envs.task)}
-        for policy, actions in policies.items():
+    for task, example in (("Reach", reach), ("HeldBox", held_box)):
+        envs = make_vec(num_envs=4, **example.task(backend))
+        for policy, actions in example.policies(envs.model).items():
             run = play(envs, actions, seed=0)
             for name in ("distance", "steps", "returned"):
                 figures[f"{task} | {policy} | {name}"] = curve(getattr(run, name))

@@ -1,11 +1,13 @@
-"""The tasks for Gymnasium: its own checker, the bits of every world, policies, faults."""
+"""Any robot for Gymnasium: its own checker, the bits of every world, faults."""
 
 from __future__ import annotations
 
 import itertools
 import warnings
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -13,10 +15,11 @@ import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env, data_equivalence
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
 import statemachine as sm
-import statemachine.gym  # registers the tasks
+from examples import held_box, reach
+from statemachine.drawing.scene import Camera
 from statemachine.engines.pictures import renderer_here
 from statemachine.errors import (
     BadInputError,
@@ -24,151 +27,216 @@ from statemachine.errors import (
     DivergedWarning,
     UnknownNameError,
 )
-from statemachine.gym.env import CAMERA, SIZE
-from statemachine.gym.policies import play, random_policy, scripted_policy
-from statemachine.gym.tasks import TASKS, HeldBox, Reach
-from statemachine.gym.vector import ArmVectorEnv
+from statemachine.gym import RobotVectorEnv, Start, WorldView, joint_state, make_env, make_vec
 
-from .conftest import ROOT, assert_has, refused, runs_in_silence
-from .rendering import seen_by
+from .conftest import ROOT, assert_has, refused, runs_in_silence, written
+from .small_models import loaded, mjcf
 
-IDS = [task.id for task in TASKS.values()]
-REACH, HELD_BOX = IDS
 pytestmark = pytest.mark.filterwarnings("error")
 
+CART = """
+<body name="cart"><joint name="rail" type="slide" axis="1 0 0" limited="true" range="-2 2"/>
+  <geom type="box" size=".2 .1 .05" mass="1" contype="0" conaffinity="0"/>
+  <body name="pole"><joint name="hinge" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 .6" size=".03" mass=".1" contype="0" conaffinity="0"/>
+    <site name="top" pos="0 0 .6"/></body></body>
+"""
+PUSH = (
+    '<actuator><motor name="push" joint="rail" ctrllimited="true" ctrlrange="-10 20"/></actuator>'
+)
+KEY = '<keyframe><key name="left" qpos="-1 0.1" qvel="0 0.5"/></keyframe>'
+STILL = np.zeros(1, dtype=np.float32)
 
-def _make(task: str, backend: str, **options: Any) -> Any:
-    return gymnasium.make(task, backend=backend, **options)
+
+def upright(world: WorldView) -> float:
+    """A reward of what is derived."""
+    return float(world.site_xpos[0, 2])
 
 
-def _make_vec(task: str, backend: str, num_envs: int, **options: Any) -> Any:
-    return gymnasium.make_vec(task, num_envs=num_envs, backend=backend, **options)
+def fallen(world: WorldView) -> bool:
+    return abs(world.qpos[1]) > 0.3
 
 
-@pytest.mark.parametrize("task", IDS)
-def test_gymnasium_finds_no_fault(task: str, backend: str) -> None:
-    with _make(task, backend) as env:
-        check_env(env.unwrapped, skip_render_check=True)
-        assert env.observation_space.dtype == np.float64
-        assert env.action_space.dtype == np.float32
+def start(model: sm.Model, rng: np.random.Generator) -> Start:
+    qpos, qvel = rng.uniform(-0.05, 0.05, (2, model.nq))
+    return Start(qpos, qvel, goal=rng.uniform(-1, 1))
+
+
+def facts(world: WorldView) -> dict[str, Any]:
+    return {"away": float(world.qpos[0] - world.goal), "fallen": fallen(world)}
+
+
+BALANCE: dict[str, Any] = {
+    "reward": upright,
+    "reset": start,
+    "terminated": fallen,
+    "info": facts,
+    "frame_skip": 5,
+}
+
+
+@pytest.fixture
+def cart(backend: str, tmp_path: Path) -> sm.Model:
+    """A cart with a pole, on every backend."""
+    return loaded(tmp_path, CART, PUSH + KEY, backend=backend)
+
+
+@pytest.fixture
+def env(cart: sm.Model) -> Iterator[Any]:
+    """It as an Env."""
+    with closing(make_env(cart, **BALANCE)) as made:
+        yield made
+
+
+def tasks(backend: str, folder: Path) -> dict[str, dict[str, Any]]:
+    """The cart and the arms of the examples, as arguments of `make_env`."""
+    return {
+        "cart": {"model": loaded(folder, CART, PUSH, backend=backend), **BALANCE},
+        "reach": reach.task(backend),
+        "held box": held_box.task(backend),
+    }
+
+
+TASKS = ("cart", "reach", "held box")
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_gymnasium_finds_no_fault(task: str, backend: str, tmp_path: Path) -> None:
+    with closing(make_env(**tasks(backend, tmp_path)[task])) as made:
+        check_env(made, skip_render_check=True)
+        assert made.observation_space.dtype == np.float64
+        assert made.action_space.dtype == np.float32
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", IDS)
-def test_gymnasium_finds_no_fault_in_pictures(task: str, backend: str) -> None:
+def test_gymnasium_finds_no_fault_in_pictures(backend: str, tmp_path: Path) -> None:
+    """Registered, as it is told of the render modes by a spec."""
     renderer_here()
-    with _make(task, backend, render_mode="rgb_array") as env:
-        check_env(env.unwrapped)
-        env.reset(seed=0)
-        before = env.render()
-        for _ in range(10):
-            env.step(env.action_space.sample())
-        assert before.shape == (360, 480, 3)
-        assert before.std() > 10
-        assert not np.array_equal(before, env.render())
+    path = written(tmp_path / "cart.xml", mjcf(CART, PUSH))
+    arguments = {"model": path, "backend": backend, **BALANCE}
+    entry_point = "statemachine.gym:make_env"
+    gymnasium.register("tests/Cart-v0", entry_point=entry_point, kwargs=arguments)
+    try:
+        with gymnasium.make("tests/Cart-v0", render_mode="rgb_array") as made:
+            check_env(made.unwrapped)
+            made.reset(seed=0)
+            before: Any = made.render()
+            for _ in range(10):
+                made.step(np.ones(1, dtype=np.float32))
+            assert before.shape == (360, 480, 3)
+            assert before.std() > 5
+            now: Any = made.render()
+            assert not np.array_equal(before, now)
+    finally:
+        gymnasium.registry.pop("tests/Cart-v0")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", IDS)
-def test_the_target_is_in_the_picture(task: str) -> None:
-    """A violet ball where the target is, and nowhere else; in each world its own."""
+def test_each_world_has_its_picture_and_the_camera_is_as_told(tmp_path: Path) -> None:
     renderer_here()
-    with closing(_make_vec(task, "mujoco", 2, render_mode="rgb_array")) as envs:
-        seen, _ = envs.reset(seed=1)
-        for picture, target in zip(envs.render(), seen[:, -6:-3], strict=True):
-            x, y = seen_by(CAMERA, target[None], SIZE[0] / SIZE[1])[0]
-            column, row = np.round((np.array([x, -y]) + 1) / 2 * SIZE - 0.5).astype(int)
-            red, green, blue = np.moveaxis(picture.astype(int), -1, 0)
-            violet = (blue > green + 25) & (red > green + 10)
-            rows, columns = np.nonzero(violet)
-            assert violet[row - 1 : row + 2, column - 1 : column + 2].all()
-            assert np.hypot(rows - row, columns - column).max() < 20
-    with _make(task, "mujoco", render_mode="rgb_array") as env:
-        refused((ResetNeeded, "before render", env.unwrapped.render))
+    cart, side = loaded(tmp_path, CART, PUSH), Camera((0, 0, 0.3), 4, 90, -10)
+    options: Any = {"render_mode": "rgb_array", "camera": side, **BALANCE}
+    with closing(make_vec(cart, 2, **options)) as envs, closing(make_env(cart, **options)) as one:
+        refused((ResetNeeded, "before render", envs.render), (ResetNeeded, "before", one.render))
+        envs.reset(seed=3)
+        one.reset(seed=4)
+        pictures = envs.render()
+        assert not np.array_equal(*pictures)
+        assert np.array_equal(pictures[1], one.render())
+        one.data.qvel[1] = np.nan
+        assert one.step(STILL)[4] == {"diverged": True}
+        assert np.array_equal(pictures[1], one.render())
 
 
-def test_an_observation_is_of_the_present(backend: str) -> None:
-    """The fingertip is that of the qpos beside it, not that of a timestep before."""
-    with _make(REACH, backend) as env, sm.make_data(env.unwrapped.model) as data:
-        env.reset(seed=1)
-        seen, reward, _, _, info = env.step(np.ones(6, dtype=np.float32))
-        model = env.unwrapped.model
-        data.qpos[:] = seen[:6]
-        sm.forward(model, data)
-        tip = data.site_xpos[model.site_id("gripperframe")]
-        assert np.array_equal(seen[12:15], tip)
-        assert np.array_equal(seen[18:21], seen[15:18] - tip)
-        assert np.abs(seen[6:12]).max() > 0.5
-        assert info["distance"] == pytest.approx(np.linalg.norm(seen[18:21]), rel=1e-12)
-        assert reward == -info["distance"]
+def test_without_more_than_a_reward(cart: sm.Model) -> None:
+    """qpos and qvel of the default state are observed, and no episode ends."""
+    with closing(make_env(cart, upright)) as made:
+        observation, info = made.reset(seed=1)
+        assert np.array_equal(observation, np.zeros(4))
+        assert info == {"diverged": False}
+        _, reward, terminated, truncated, _ = made.step(STILL)
+        assert (reward, terminated, truncated) == (pytest.approx(0.6), False, False)
+        assert made.data.time == pytest.approx(cart.timestep)
+        assert made.render() is None
+        assert made.metadata["render_fps"] == round(1 / cart.timestep)
 
 
-def test_actions_are_commands(backend: str) -> None:
-    with _make(REACH, backend) as env:
-        env.reset(seed=0)
-        low, high = env.unwrapped.model.actuator_ctrlrange.T
-        for action, ctrl in ((-1, low), (1, high), (0, (low + high) / 2)):
-            env.step(np.full(6, action, dtype=np.float32))
-            assert np.allclose(env.unwrapped.data.ctrl, ctrl, atol=1e-12)
-    task = HeldBox(backend, 4)
-    held = task.model.keyframes[0].ctrl
-    assert np.array_equal(task.ctrl(np.zeros(6), (6,)), held)
-    assert np.array_equal(task.ctrl(np.full(6, 2.0), (6,)), task.ctrl(np.ones(6), (6,)))
-    away = np.array([0.3, -0.2, 0.1, 0.0, 0.1, 0.05])
-    assert np.allclose(task.ctrl(task.action(held + away), (6,)), held + away, atol=1e-7)
+def test_an_observation_is_of_the_present(env: Any) -> None:
+    """What is derived is that of the qpos beside it, not that of a timestep before."""
+    env.reset(seed=1)
+    observation, reward, *_ = env.step(np.ones(1, dtype=np.float32))
+    with sm.make_data(env.model) as data:
+        data.qpos[:] = observation[:2]
+        sm.forward(env.model, data)
+        assert reward == data.site_xpos[0, 2]
+    assert env.data.time == pytest.approx(5 * env.model.timestep)
+    assert reward != pytest.approx(0.6, abs=1e-9)
 
 
-def test_targets_can_be_reached_and_are_the_same_on_every_backend(backend: str) -> None:
-    for kind in (Reach, HeldBox):
-        here, there = kind(backend, 4), kind("mujoco", 4)
-        for seed in range(20):
-            one, two = (task.start(np.random.default_rng(seed))[1] for task in (here, there))
-            assert np.array_equal(one, two)
-            assert 0.03 < one[2] < 0.6
-    with _make(HELD_BOX, backend) as env:
-        seen, info = env.reset(seed=4)
-        assert 0.04 < info["distance"] < 0.4
-        assert np.array_equal(seen[:13], env.unwrapped.model.keyframes[0].qpos)
+def test_actions_are_commands(env: Any) -> None:
+    env.reset(seed=0)
+    for action, ctrl in ((-1, -10), (1, 20), (0, 5), (3, 20)):
+        env.step(np.full(1, action, dtype=np.float32))
+        assert env.data.ctrl[0] == pytest.approx(ctrl)
+    with closing(make_env(env.model, upright, ctrl_range=[[-1, 3]])) as narrow:
+        narrow.reset()
+        narrow.step(STILL)
+        assert narrow.data.ctrl[0] == 1
 
 
-def test_the_box_is_held_by_the_action_0_and_dropped_by_open_jaws(backend: str) -> None:
-    with _make(HELD_BOX, backend) as env:
-        env.reset(seed=0)
-        for _ in range(40):
-            _, reward, terminated, truncated, info = env.step(np.zeros(6, dtype=np.float32))
-            assert (terminated, truncated, reward) == (False, False, 1 - info["distance"])
-        steps, terminated, reward, info = 0, False, 0.0, {}
-        while not terminated:
-            _, reward, terminated, truncated, info = env.step(np.eye(6, dtype=np.float32)[5])
-            steps += 1
-            assert steps < 60
-        assert_has(info, distance=-reward, is_success=False, diverged=False)
+def test_a_keyframe_is_the_start_that_reset_adds_to(cart: sm.Model) -> None:
+    def pushed(model: sm.Model, rng: np.random.Generator) -> Start:
+        return Start(qvel=[2.0, 0.0])
+
+    cases: list[tuple[dict[str, Any], list[float]]] = [({}, [0, 0.5]), ({"reset": pushed}, [2, 0])]
+    for options, qvel in cases:
+        with closing(make_env(cart, upright, keyframe="left", **options)) as made:
+            assert made.reset()[0].tolist() == [-1, 0.1, *qvel]
+
+
+def test_what_functions_read_is_that_of_the_data_and_cannot_be_written(cart: sm.Model) -> None:
+    names = [name for name in vars(WorldView) if isinstance(vars(WorldView)[name], property)]
+    seen: list[WorldView] = []
+
+    def keep(world: WorldView) -> float:
+        seen.append(world)
+        return 0.0
+
+    with closing(make_env(cart, keep)) as made, closing(make_vec(cart, 2, keep)) as envs:
+        made.reset()
+        envs.reset()
+        made.step(STILL)
+        of_env = {name: np.array(getattr(seen[-1], name)) for name in names}
+        envs.step(np.zeros((2, 1), dtype=np.float32))
+        assert len(names) == 13
+        for name in names:
+            assert np.array_equal(of_env[name], getattr(seen[-1], name)), name
+            assert np.array_equal(of_env[name], getattr(made.data, name)), name
+        for array in (seen[-1].qpos, seen[-1].xpos, made.world.qpos, made.world.goal):
+            assert not array.flags.writeable
 
 
 # One way of each to start anew is quick enough for every run of the tests.
-_QUICK = (REACH, AutoresetMode.NEXT_STEP, 2)
+_QUICK = ("cart", AutoresetMode.NEXT_STEP, 2)
 
 
 @pytest.mark.parametrize(
     ("task", "mode", "workers"),
     [
         pytest.param(*case, marks=() if case == _QUICK else pytest.mark.slow)
-        for case in itertools.product(IDS, AutoresetMode, (1, 2, 3))
+        for case in itertools.product(TASKS, AutoresetMode, (1, 2, 3))
     ],
 )
 def test_a_world_is_a_single_env_bit_for_bit(
-    task: str, mode: AutoresetMode, workers: int, backend: str
+    task: str, mode: AutoresetMode, workers: int, backend: str, tmp_path: Path
 ) -> None:
     """Ours against Gymnasium's own loop over single ones, in every way to start anew."""
-    ours = _make_vec(task, backend, 3, workers=workers, autoreset_mode=mode, max_episode_steps=9)
-    theirs = _make_vec(
-        task, backend, 3, vectorization_mode="sync", max_episode_steps=9,
-        vector_kwargs={"autoreset_mode": mode},
-    )  # fmt: skip
-    assert isinstance(ours, ArmVectorEnv)
-    assert ours.metadata["autoreset_mode"] is mode
+    arguments = {**tasks(backend, tmp_path)[task], "max_episode_steps": 9}
+    ours = make_vec(num_envs=3, workers=workers, autoreset_mode=mode, **arguments)
+    theirs = SyncVectorEnv(3 * [partial(make_env, **arguments)], autoreset_mode=mode)
     assert_has(
         ours,
+        metadata=theirs.metadata,
         single_observation_space=theirs.single_observation_space,
         observation_space=theirs.observation_space,
         action_space=theirs.action_space,
@@ -194,130 +262,173 @@ def test_a_world_is_a_single_env_bit_for_bit(
 
 
 @pytest.mark.slow
-def test_processes_of_gymnasium_have_the_same_bits(backend: str) -> None:
-    make = partial(gymnasium.make, f"statemachine.gym:{REACH}", backend=backend)
-    with (
-        closing(gymnasium.vector.AsyncVectorEnv([make] * 2, context="spawn")) as theirs,
-        closing(_make_vec(REACH, backend, 2)) as ours,
-    ):
+def test_processes_of_gymnasium_give_the_same_bits(backend: str, tmp_path: Path) -> None:
+    path = written(tmp_path / "cart.xml", mjcf(CART, PUSH))
+    single = partial(make_env, path, backend=backend, **BALANCE)
+    theirs = AsyncVectorEnv(2 * [single], context="spawn")
+    ours = make_vec(path, 2, backend=backend, **BALANCE)
+    with closing(ours), closing(theirs):
         assert data_equivalence(ours.reset(seed=3), theirs.reset(seed=3), exact=True)
-        ours.action_space.seed(0)
         for _ in range(5):
             actions = ours.action_space.sample()
             assert data_equivalence(ours.step(actions), theirs.step(actions), exact=True)
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_a_world_that_diverges_starts_anew_and_the_others_go_on(mode: str, backend: str) -> None:
-    envs = _make_vec(REACH, backend, 3, autoreset_mode=mode)
+def test_a_world_that_diverges_starts_anew_and_the_others_go_on(mode: str, cart: sm.Model) -> None:
+    envs = make_vec(cart, 3, autoreset_mode=mode, **BALANCE)
     with warnings.catch_warnings(action="error", category=DivergedWarning), closing(envs):
-        seen, _ = envs.reset(seed=0)
-        still = np.zeros((3, 6), dtype=np.float32)
+        first, _ = envs.reset(seed=0)
+        still = np.zeros((3, 1), dtype=np.float32)
         envs.worlds.qvel[1] = 1e12
         after, rewards, terminated, truncated, infos = envs.step(still)
         assert truncated.tolist() == [False, True, False]
         assert not terminated.any()
         assert np.isfinite(after).all()
-        assert np.isfinite(rewards).all()
+        assert rewards[1] == (0 if mode == "NextStep" else rewards[1])
         same = mode == "SameStep"
         final, last = (infos["final_info"], infos["final_obs"]) if same else (infos, after)
         assert final["diverged"].tolist() == [False, True, False]
-        assert np.array_equal(last[1], seen[1])
+        assert np.array_equal(last[1], first[1])
         after, _, _, truncated, infos = envs.step(still)
         assert not truncated.any()
         assert not infos["diverged"].any()
         assert not envs.worlds.diverged
-        assert (after != seen).any(axis=1).all()
+        assert (after != first).any(axis=1).all()
 
 
-@pytest.mark.parametrize(("name", "value"), [("qvel", 1e12), ("qpos", 5.0)])
-def test_one_that_diverges_or_leaves_the_space_is_truncated(
-    name: str, value: float, backend: str
-) -> None:
-    with _make(REACH, backend) as env:
-        seen, _ = env.reset(seed=0)
-        getattr(env.unwrapped.data, name)[1] = value  # a position beyond its range is finite
-        still = np.zeros(6, dtype=np.float32)
-        after, reward, terminated, truncated, info = env.step(still)
-        assert (terminated, truncated, info["diverged"]) == (False, True, True)
-        assert np.array_equal(after, seen)
-        assert np.isfinite(reward)
-        env.reset(seed=0)
-        assert not env.step(still)[3]
+def huge_when_pushed(world: WorldView) -> np.ndarray:
+    return np.array([1e11 * (world.ctrl[0] > 6)])
+
+
+@pytest.mark.parametrize("leaves", [False, True])
+def test_one_that_diverges_or_leaves_the_space_is_truncated(leaves: bool, cart: sm.Model) -> None:
+    observe: Any = huge_when_pushed if leaves else joint_state
+    with closing(make_env(cart, observe=observe, **BALANCE)) as made:
+        first, _ = made.reset(seed=0)
+        if not leaves:
+            made.data.qvel[1] = 1e12
+        pushed = np.ones(1, dtype=np.float32)
+        after, reward, terminated, truncated, info = made.step(pushed)
+        assert (reward, terminated, truncated, info) == (0, False, True, {"diverged": True})
+        assert np.array_equal(after, first)
+        made.reset(seed=0)
+        assert not made.step(STILL)[3]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", IDS)
-def test_no_command_within_the_ranges_leaves_the_space(task: str, backend: str) -> None:
+@pytest.mark.parametrize("task", TASKS)
+def test_no_command_within_the_ranges_diverges(task: str, backend: str, tmp_path: Path) -> None:
     """The hardest ones: from end to end of every joint."""
-    with _make(task, backend) as env:
+    with closing(make_env(**tasks(backend, tmp_path)[task])) as made:
         rng = np.random.default_rng(0)
         for seed in range(6):
-            env.reset(seed=seed)
-            actions = rng.choice([-1.0, 1.0], (8, 6)).astype(np.float32)
+            made.reset(seed=seed)
+            actions = rng.choice([-1.0, 1.0], (8, made.model.nu)).astype(np.float32)
             for k in range(60):
-                seen, _, terminated, truncated, info = env.step(actions[k // 8])
-                assert seen in env.observation_space
+                observation, _, terminated, truncated, info = made.step(actions[k // 8])
+                assert observation in made.observation_space
                 assert not info["diverged"]
                 if terminated or truncated:
                     break
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("task", IDS)
-@pytest.mark.usefixtures("pinocchio")
-def test_the_scripted_policy_comes_within_a_centimetre(task: str, backend: str) -> None:
-    with closing(_make_vec(task, backend, 16)) as envs:
-        scripted = play(envs, scripted_policy(envs.task), 100)
-        chance = play(envs, random_policy(envs.task, 0), 100)
-    assert (scripted.distance < 0.01).sum() >= 11
-    assert (chance.distance < 0.01).sum() <= 2
-    assert scripted.returned.mean() > chance.returned.mean() + 20
-    assert not scripted.diverged.any()
-    assert (scripted.steps == envs._most).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
-def test_an_episode_is_the_same_however_the_next_one_starts(mode: str) -> None:
-    runs, zero = [], np.zeros((4, 6), dtype=np.float32)
-    for each in ("NextStep", mode):
-        how: Any = {"autoreset_mode": each, "max_episode_steps": 6}
-        with closing(_make_vec(HELD_BOX, "mujoco", 4, **how)) as envs:
-            runs.append(play(envs, lambda _seen: zero, 0))
-    for name in ("returned", "distance", "success", "steps", "diverged"):
-        assert np.array_equal(*(getattr(run, name) for run in runs))
-
-
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"backend": "mujcoo"}, r"no backend named 'mujcoo'.*Did you mean"),
-        ({"backend": "mujcoo", "num_envs": 2}, "no backend named"),
-        ({"task": "reech"}, r"no task named 'reech'.*'reach'"),
-        ({"task": ["reach"]}, "no task named"),
-        ({"autoreset_mode": "Never", "num_envs": 2}, "no autoreset mode named 'Never'"),
+        ({"reward": lambda _: np.nan}, r"reward\(world\) = nan is not a finite number"),
+        ({"reward": lambda world: world.qpos}, r"reward\(world\) must be one number; .*\(2,\)"),
+        ({"reward": lambda _: None}, r"reward\(world\) must be real numbers"),
+        ({"reward": 1.0}, "reward must be a function; got 1.0"),
+        ({"observe": lambda _: [1, np.inf]}, r"observe\(world\)\[1\] = inf is not a finite"),
+        ({"observe": lambda _: "far"}, r"observe\(world\) must be real numbers; got 'far'"),
+        ({"terminated": lambda _: 1}, r"terminated\(world\) must be True or False; got 1"),
+        ({"info": lambda _: [1]}, r"info\(world\) must return a dict; got \[1\]"),
+        ({"reset": lambda model, rng: [0, 0]}, r"must return a Start; got \[0, 0\]"),
+        ({"reset": lambda model, rng: Start([0, 0, 0])}, r"qpos wants 2 numbers.*\(3,\)"),
+        ({"reset": lambda model, rng: Start(qvel=[0, np.nan])}, r"qvel\[1\] = nan"),
+        ({"reset": lambda model, rng: Start(goal=np.inf)}, r"goal = inf"),
+        ({"keyframe": "lift"}, "no keyframe named 'lift'.*'left'"),
         ({"frame_skip": 0}, "frame_skip must be a whole number"),
+        ({"max_episode_steps": 0}, "max_episode_steps must be a whole number"),
+        ({"ctrl_range": [1, 2]}, r"ctrl_range wants .*shape \(1, 2\)"),
+        ({"ctrl_range": [[2, 2]]}, "'push' must go up from action -1 to 1; got 2 and 2"),
+        ({"ctrl_range": [[0, np.inf]]}, "inf is not a finite number"),
+        ({"render_mode": "human"}, "no render mode named 'human'"),
+        ({"backend": "pybullet"}, "leave backend= out"),
         ({"num_envs": 0}, "num_envs must be a whole number"),
+        ({"num_envs": 2, "autoreset_mode": "Never"}, "no autoreset mode named 'Never'"),
     ],
 )
-def test_what_nothing_can_be_made_of_is_one_clear_line(options: Any, says: str) -> None:
-    make: Any = gymnasium.make_vec if "num_envs" in options else gymnasium.make
-    refused(((BadInputError, UnknownNameError), says, lambda: make(REACH, **options)))
+def test_what_nothing_can_be_made_of_is_one_clear_line(
+    options: Any, says: str, tmp_path: Path
+) -> None:
+    make: Any = make_vec if "num_envs" in options else make_env
+    arguments = {"model": loaded(tmp_path, CART, PUSH + KEY), "reward": upright, **options}
+    refused(((BadInputError, UnknownNameError), says, lambda: make(**arguments)))
 
 
-def test_faults_are_one_clear_line(backend: str) -> None:
-    env, envs = _make(REACH, backend).unwrapped, _make_vec(REACH, backend, 2)
-    still = np.zeros(6, dtype=np.float32)
-    for each, action in ((env, still), (envs, np.tile(still, (2, 1)))):
+def test_a_backend_is_named_with_a_file() -> None:
+    refused((UnknownNameError, "Did you mean", lambda: make_env("so101", upright, backend="mjc")))
+
+
+@pytest.mark.parametrize(
+    ("actuators", "says"),
+    [
+        ("", r"m\.xml has no actuators"),
+        ('<actuator><motor name="m" joint="rail"/></actuator>', "'m' has no ctrlrange: give ctrl_"),
+    ],
+)
+def test_a_model_without_commands_between_bounds_is_refused(
+    actuators: str, says: str, cart: sm.Model, tmp_path: Path
+) -> None:
+    model = loaded(tmp_path, CART, actuators, backend=cart.backend)
+    refused((BadInputError, says, lambda: make_env(model, upright)))
+
+
+def after(calls: int, first: Any, then: Any) -> Callable[[WorldView], Any]:
+    """A function that returns something else from a call on."""
+    seen = itertools.count()
+    return lambda _: first if next(seen) < calls else then
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "then", "says"),
+    [
+        ("observe", [1.0, 2.0], [1.0], r"observe\(world\) must always have .*\(2,\); got \(1,\)"),
+        ("observe", [1.0], [np.nan], r"observe\(world\)\[0\] = nan"),
+        ("reward", 1.0, np.inf, r"reward\(world\) = inf"),
+        ("terminated", False, None, r"terminated\(world\) must be True or False; got None"),
+        ("info", {}, None, r"info\(world\) must return a dict; got None"),
+    ],
+)
+def test_what_a_function_returns_later_is_checked_too(
+    name: str, first: Any, then: Any, says: str, cart: sm.Model
+) -> None:
+    makes: list[Any] = [make_env, partial(make_vec, num_envs=2)]
+    for make, action in zip(makes, (STILL, np.zeros((2, 1))), strict=True):
+        options = {"reward": upright, name: after(12, first, then)}
+        with closing(make(cart, **options)) as made:
+
+            def steps(made: Any = made, action: Any = action) -> None:
+                made.reset(seed=0)
+                for _ in range(12):
+                    made.step(action)
+
+            refused((BadInputError, says, steps))
+
+
+def test_faults_are_one_clear_line(env: Any) -> None:
+    envs = make_vec(env.model, 2, **BALANCE)
+    for each, action in ((env, STILL), (envs, np.tile(STILL, (2, 1)))):
         refused((ResetNeeded, "call reset before step", partial(each.step, action)))
         each.reset(seed=0)
         bad, nan = action.copy(), r"action\[\d+\] = nan is not a finite number"
-        bad[..., 2] = np.nan
+        bad[..., 0] = np.nan
         commanded = env.data if each is env else envs.worlds
         before = commanded.ctrl.copy()
         refused(
-            (BadInputError, r"action wants .* got shape \(5,\)", partial(each.step, still[:5])),
+            (BadInputError, r"action wants .* got shape \(5,\)", partial(each.step, np.zeros(5))),
             (BadInputError, nan, partial(each.step, bad)),
         )
         # The engine never saw it: the next step is as if nothing had been.
@@ -331,16 +442,15 @@ def test_faults_are_one_clear_line(backend: str) -> None:
             lambda: envs.reset(options={"reset_mask": np.array([False, False])}),
         ),
     )
-    env.close()
     envs.close()
 
 
-def test_an_ended_world_must_be_reset_where_nobody_else_does() -> None:
-    with closing(
-        _make_vec(REACH, "mujoco", 2, autoreset_mode="Disabled", max_episode_steps=1)
-    ) as envs:
+def test_an_ended_world_must_be_reset_where_nobody_else_does(tmp_path: Path) -> None:
+    cart = loaded(tmp_path, CART, PUSH)
+    options: Any = {"autoreset_mode": "Disabled", "max_episode_steps": 1, **BALANCE}
+    with closing(make_vec(cart, 2, **options)) as envs:
         envs.reset(seed=0)
-        actions = np.zeros((2, 6), dtype=np.float32)
+        actions = np.zeros((2, 1), dtype=np.float32)
         envs.step(actions)
         refused((ResetNeeded, r"worlds \[0, 1\] have ended", lambda: envs.step(actions)))
 
@@ -351,15 +461,17 @@ def test_without_gymnasium_the_extra_is_named() -> None:
         "try:\n    import statemachine.gym\n"
         "except ImportError as error:\n    print(type(error).__name__, error)\n",
         ROOT,
-        "MissingEngineError the tasks need Gymnasium: pip install 'statemachine-sim[gym]'\n",
+        "MissingEngineError statemachine.gym needs Gymnasium: "
+        "pip install 'statemachine-sim[gym]'\n",
     )
 
 
-def test_what_is_closed_says_so_and_starts_nothing() -> None:
+def test_what_is_closed_says_so_and_starts_nothing(tmp_path: Path) -> None:
     """A picture of a closed environment would start a process that nobody ends."""
-    env = gymnasium.make(REACH, render_mode="rgb_array").unwrapped
-    envs = _make_vec(REACH, "mujoco", 1, render_mode="rgb_array")
-    for each, actions in ((env, np.zeros(6)), (envs, np.zeros((1, 6)))):
+    cart = loaded(tmp_path, CART, PUSH)
+    env = make_env(cart, upright, render_mode="rgb_array")
+    envs = make_vec(cart, 1, upright, render_mode="rgb_array")
+    for each, actions in ((env, np.zeros(1)), (envs, np.zeros((1, 1)))):
         each.reset(seed=0)
         each.close()
         each.close()  # twice is as good as once
@@ -369,15 +481,9 @@ def test_what_is_closed_says_so_and_starts_nothing() -> None:
         )
 
 
-def test_seeds_may_be_an_array_of_numbers() -> None:
-    with closing(_make_vec(REACH, "mujoco", 2)) as envs:
-        listed, as_array = (envs.reset(seed=seed)[0] for seed in ([3, 4], np.array([3, 4])))
+def test_seeds_may_be_an_array_of_numbers(tmp_path: Path) -> None:
+    with closing(make_vec(loaded(tmp_path, CART, PUSH), 2, **BALANCE)) as envs:
+        assert isinstance(envs, RobotVectorEnv)
+        seeds: list[Any] = [[3, 4], np.array([3, 4])]
+        listed, as_array = (envs.reset(seed=seed)[0] for seed in seeds)
         assert np.array_equal(listed, as_array)
-
-
-def test_another_model_and_an_unknown_option_are_refused() -> None:
-    for make in (partial(_make, REACH, "mujoco"), partial(_make_vec, REACH, "mujoco", 2)):
-        refused(
-            (BadInputError, "take no other model", lambda make=make: make(model="so101")),
-            (UnknownNameError, "frame_skip", lambda make=make: make(frame_skp=2)),
-        )

@@ -17,7 +17,7 @@ from .conftest import ROOT
 
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-OURS = ("statemachine", "benchmarks", "fuzz", "mutants", "reference", "tests")
+OURS = ("statemachine", "benchmarks", "examples", "fuzz", "mutants", "reference", "tests")
 # What an option of our command imports only when it is given, and the extra that brings it.
 EXTRA_OF_AN_OPTION = {"--html": "plot"}
 # Distributions of modules that may not be installed where this test runs.

@@ -1,12 +1,15 @@
-"""Tasks for reinforcement learning, as Gymnasium has them, on any backend.
+"""Any robot for reinforcement learning, as Gymnasium's Env and VectorEnv, on any backend.
 
-    import gymnasium
-    import statemachine.gym
+    import statemachine as sm
+    from statemachine.gym import WorldView, make_env, make_vec
 
-    env = gymnasium.make("statemachine/Reach-v0", backend="pybullet")
-    envs = gymnasium.make_vec("statemachine/HeldBox-v0", num_envs=64)
+    def reward(world: WorldView) -> float:
+        return -abs(world.qpos[1])
 
-Importing this package registers the tasks. It wants the extra `gym`.
+    env = make_env("pole.xml", reward, backend="pybullet")
+    envs = make_vec("pole.xml", 64, reward)
+
+It needs the extra `gym`.
 """
 
 from __future__ import annotations
@@ -17,22 +20,24 @@ from ..errors import MissingEngineError as _MissingEngineError
 
 if _find_spec("gymnasium") is None:
     raise _MissingEngineError(
-        "the tasks need Gymnasium: pip install 'statemachine-sim[gym]'", engine="gymnasium"
+        "statemachine.gym needs Gymnasium: pip install 'statemachine-sim[gym]'", engine="gymnasium"
     )
 
-import gymnasium as _gymnasium  # (where it is missing, the sentence above comes first)
+from .env import RobotEnv, make_env
+from .task import Info, Observe, Reset, Reward, Start, Terminated, WorldView, joint_state
+from .vector import RobotVectorEnv, make_vec
 
-from .env import ArmEnv
-from .tasks import TASKS, Task
-from .vector import ArmVectorEnv
-
-__all__ = ["TASKS", "ArmEnv", "ArmVectorEnv", "Task"]
-
-for _task in TASKS.values():
-    _gymnasium.register(
-        id=_task.id,
-        entry_point=f"{__name__}.env:ArmEnv",
-        vector_entry_point=f"{__name__}.vector:ArmVectorEnv",
-        max_episode_steps=_task.episode,
-        kwargs={"task": _task.name},
-    )
+__all__ = [
+    "Info",
+    "Observe",
+    "Reset",
+    "Reward",
+    "RobotEnv",
+    "RobotVectorEnv",
+    "Start",
+    "Terminated",
+    "WorldView",
+    "joint_state",
+    "make_env",
+    "make_vec",
+]
