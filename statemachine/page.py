@@ -148,45 +148,20 @@ class Pipeline:
 
 
 @dataclass(frozen=True)
-class HeatMap:
-    """A figure over two parameters as a map; shown where pictures can be.
-
-    Attributes:
-        title: What it shows.
-        across: The parameter from left to right; up: from bottom to top, "" for none.
-        columns: Values of the one, as text; rows: of the other.
-        values: By row and column, in `unit`; None where there is none.
-        unit: As it is read.
-        hatched: By row and column, what is not to be read; the title says why.
-        framed: By row and column, what is set off; likewise.
-    """
-
-    title: str
-    across: str
-    up: str
-    columns: Sequence[str]
-    rows: Sequence[str]
-    values: Sequence[Sequence[float | None]]
-    unit: str
-    hatched: Sequence[Sequence[bool]]
-    framed: Sequence[Sequence[bool]]
-
-
-@dataclass(frozen=True)
 class Bars:
-    """Two bars for each name, with their intervals; shown where pictures can be.
+    """Bars for each name; shown where pictures can be.
 
     Attributes:
         title: What they show.
         across: What their length is.
         names: From top to bottom.
-        bars: By what they are: the length for each name, and its interval or None.
+        bars: By what they are: the length for each name, which is not negative.
     """
 
     title: str
     across: str
     names: Sequence[str]
-    bars: Mapping[str, Sequence[tuple[float, tuple[float, float] | None]]]
+    bars: Mapping[str, Sequence[float]]
 
 
 class TableCell(str):
@@ -370,7 +345,7 @@ class Headline:
         return " ".join(part for part in (f"{self.lead}.", *self.causes, self.end) if part)
 
 
-Picture = Traces | Slots | Pipeline | HeatMap | Bars | RobotPicture
+Picture = Traces | Slots | Pipeline | Bars | RobotPicture
 Block = (
     Heading
     | Text

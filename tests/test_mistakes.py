@@ -296,7 +296,7 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("compare hold --digits 3", ""),
         ("compare waves --seed=-1", ""),
         ("compare waves --why --seed=-1", ""),
-        ("sweep hold --out t --fit x", "goes with --report"),
+        ("sweep hold --out t --quantity x", "goes with --report"),
         ("sweep hold", "--report DIR"),
         ("sweep hold --out t missing.xml", "model file missing.xml does not exist"),
         ("sweep hold missing.xml", "--report DIR"),

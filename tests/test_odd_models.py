@@ -10,11 +10,9 @@ import pytest
 import statemachine as sm
 from fuzz import random_models
 from statemachine.engines.mujoco.description import read
-from statemachine.sweep.analysis_runs import _joints
-from statemachine.sweep.design import parse_vary
 
 from .conftest import Cli, written
-from .small_models import loaded, mjcf
+from .small_models import mjcf
 
 # A mocap body leads a free one by a weld; the file has no keyframe.
 LED = mjcf(
@@ -82,12 +80,6 @@ def test_only_transmissions_by_a_joint_have_one(tmp_path: Path) -> None:
     assert [note for note in robot.notes if "beyond the range" in note] == [
         "the ctrlrange of 'actuator 0' goes beyond the range of its joint by 458°"
     ]
-
-
-def test_a_factor_without_a_place_is_of_all_joints_though_one_has_no_name(tmp_path: Path) -> None:
-    model = loaded(tmp_path, '<body><freejoint/><geom size=".1"/></body>')
-    (vary,) = parse_vary(["timestep=0.001,0.002"])
-    assert _joints(model, vary) == {0}
 
 
 def test_a_lesson_on_runs_refuses_a_model_in_which_nothing_moves(here: Cli, tmp_path: Path) -> None:

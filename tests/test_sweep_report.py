@@ -1,55 +1,200 @@
-"""From a sweep to an answer: agreement, sensitivity and fits against closed forms."""
+"""What moves a quantity of a sweep: main effects against closed forms, and where it is largest."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from itertools import product
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
-from statemachine.page import Figures, HeatMap, Traces
-from statemachine.report.as_json import plain
-from statemachine.report.sweep_pictures import pictures
 from statemachine.report.sweep_report import page
 from statemachine.sweep import Design, Sweep, Vary, run_sweep
-from statemachine.sweep.analysis import sweep_report
-from statemachine.sweep.analysis_data import SweepData, read_runs, sweep_data
-from statemachine.sweep.analysis_fit import fit_curves, values_within
-from statemachine.sweep.analysis_gaps import agreement_of, gap_map
-from statemachine.sweep.analysis_runs import ModelFacts, facts_of
-from statemachine.sweep.analysis_together import REFINED, brought_together
-from statemachine.sweep.folder import design_of, read_manifest, write_manifest
+from statemachine.sweep.analysis import SweepEffects, effects
+from statemachine.sweep.folder import write_manifest
+from statemachine.sweep.main_effects import MainEffects, main_effects
+from statemachine.sweep.quantities import cell_values, parse_quantity
 from statemachine.sweep.request import MANIFEST_VERSION
-from statemachine.sweep.rows import DONE, FAILED, RowWriter, read_cells, schema_of
+from statemachine.sweep.rows import DONE, FAILED, RowWriter, schema_of
 
 from .conftest import assert_has, assert_in, refused, shown
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
-TipOf = Callable[..., Any]
-T = TypeVar("T")
+Value = Callable[..., float]  # of the values of a setting
+TipOf = Callable[..., Any]  # of the values of a setting and a seed
 
 
-def the(value: T | None) -> T:
-    """What is there."""
-    assert value is not None
-    return value
+def grid(name: str, low: float, high: float, count: int, **more: Any) -> Vary:
+    return Vary(name, values=tuple(np.linspace(low, high, count).tolist()), **more)
+
+
+def ranges(names: str, low: float, high: float, samples: int) -> Design:
+    factors = tuple(Vary(name, bounds=(low, high)) for name in names)
+    return Design(factors, samples=samples, seed=1)
+
+
+def found(design: Design, value: Value, seeds: int = 1) -> MainEffects:
+    """The main effects on a function of the values."""
+    values = np.array([value(*point.values) for point in design.points()])
+    return main_effects(design, np.repeat(values[:, None], seeds, axis=1), rounding=1e-12)
+
+
+def numbers(shares: Mapping[str, float | None]) -> dict[str, float]:
+    """Shares, or their errors, each of which is there."""
+    assert None not in shares.values()
+    return {name: share for name, share in shares.items() if share is not None}
+
+
+# Shares of the variance.
+
+
+def ishigami(x: float, y: float, z: float) -> float:
+    """T. Ishigami and T. Homma, 1990, with a = 7, b = 0.1."""
+    return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+
+
+# Its variance a²/8 + b π⁴/5 + b² π⁸/18 + 1/2, and what of it x and y explain alone.
+_VARIANCE = 49 / 8 + 0.1 * np.pi**4 / 5 + 0.01 * np.pi**8 / 18 + 0.5
+_BY_X = 0.5 * (1 + 0.1 * np.pi**4 / 5) ** 2
+ISHIGAMI = {"x": _BY_X / _VARIANCE, "y": 49 / 8 / _VARIANCE, "z": 0.0}
+
+
+@pytest.mark.parametrize(("samples", "near"), [(64, 0.12), (256, 0.04), (1024, 0.015)])
+def test_shares_of_the_ishigami_function_are_its_closed_form(samples: int, near: float) -> None:
+    assert [*ISHIGAMI.values()] == pytest.approx([0.3139, 0.4424, 0.0], abs=1e-4)
+    answer = found(ranges("xyz", -np.pi, np.pi, samples), ishigami)
+    assert answer.shares == pytest.approx(ISHIGAMI, abs=near)
+    for name, error in numbers(answer.errors).items():
+        assert 0 < error < 1.3 / np.sqrt(samples)
+        assert abs(numbers(answer.shares)[name] - ISHIGAMI[name]) < 3 * error
+
+
+WEIGHTS = {"x": 3.0, "y": 2.0, "z": 1.0}
+SQUARES = sum(weight**2 for weight in WEIGHTS.values())
+LINEAR = {name: weight**2 / SQUARES for name, weight in WEIGHTS.items()}
+
+
+def linear(x: float, y: float, z: float) -> float:
+    return 5 + 3 * x + 2 * y - z
+
+
+def test_shares_of_a_sum_are_those_of_its_terms_in_a_grid() -> None:
+    design = Design(tuple(grid(name, -1, 1, 4) for name in "xyz"))
+    answer = found(design, linear)
+    assert answer.shares == pytest.approx(LINEAR, abs=1e-12)
+    assert_has(answer, mean=pytest.approx(5), settings=64, left_out={}, why_none="")
+    # Of four levels from -1 to 1 the variance is 5/9.
+    assert answer.deviation == pytest.approx(np.sqrt(SQUARES * 5 / 9))
+
+
+def test_shares_of_a_sum_are_those_of_its_terms_in_samples() -> None:
+    # What a range varies within one of its eight classes is lost: 1/8² of its share.
+    expected = {name: share * (1 - 1 / 64) for name, share in LINEAR.items()}
+    assert found(ranges("xyz", -1, 1, 64), linear).shares == pytest.approx(expected, abs=0.015)
+
+
+def test_levels_of_different_spread_count_by_their_variance() -> None:
+    """A share is a² σ² over the sum: y has a hundredth of the range, and ten times the slope."""
+    design = Design((grid("x", 0, 1, 5), grid("y", 0, 0.01, 5)))
+    answer = found(design, lambda x, y: x + 10 * y)
+    assert answer.shares == pytest.approx({"x": 1 / 1.01, "y": 0.01 / 1.01})
+
+
+@pytest.mark.parametrize("design", [Design((grid("x", -1, 1, 4), grid("y", -1, 1, 4))),
+                                    ranges("xy", -1, 1, 64)])  # fmt: skip
+def test_a_pure_interaction_has_no_main_effect(design: Design) -> None:
+    answer = found(design, lambda x, y: x * y)
+    assert answer.shares == pytest.approx({"x": 0.0, "y": 0.0}, abs=0.01)
+    assert answer.deviation > 0.3
+
+
+def test_names_and_switches_are_classes() -> None:
+    kinds = Vary("kind", values=("euler", "implicit", "fast"))
+    design = Design((kinds, Vary("on", values=(True, False)), Vary("x", bounds=(0.0, 1.0))), 16)
+    size = {"euler": 0.0, "implicit": 3.0, "fast": 6.0}
+    answer = found(design, lambda kind, on, x: size[kind] + 2 * on + 1e-9 * x)
+    assert answer.shares == pytest.approx({"kind": 6 / 7, "on": 1 / 7, "x": 0.0}, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("design", "value", "says"),
+    [
+        (Design((grid("x", 0, 1, 3),)), lambda _: 4.2, "the same at every setting"),
+        (Design((grid("x", 0, 1, 3),)), lambda _: 0.0, "the same at every setting"),
+        (Design((grid("x", 0, 1, 3),)), lambda x: 4 + 1e-14 * x, "the same at every setting"),
+        (Design((Vary("x", values=(1.0,)),)), lambda x: x, "no two settings"),
+        (ranges("x", 0, 1, 2), lambda x: x, "too few values"),
+        (Design(), lambda: 4.2, "nothing is varied"),
+    ],
+)
+def test_where_there_is_no_share_it_is_said_why(design: Design, value: Value, says: str) -> None:
+    answer = found(design, value)
+    assert set(answer.shares.values()) <= {None}
+    assert answer.errors.keys() == answer.shares.keys()
+    assert says in answer.why_none
+
+
+def test_the_error_in_a_grid_is_that_of_the_seeds() -> None:
+    design, seeds = Design((grid("x", 0, 1, 4), grid("y", 0, 1, 4))), 8
+    draw = np.random.default_rng(0)
+    settings = np.array([x + y for x, y in (point.values for point in design.points())])
+    few, many = (
+        main_effects(design, settings[:, None] + draw.normal(0, noise, (16, seeds)))
+        for noise in (0.01, 0.3)
+    )
+    assert 0 < numbers(few.errors)["x"] < 0.02 < numbers(many.errors)["x"] < 0.3
+    assert set(found(design, lambda x, y: x + y, seeds=2).errors.values()) == {None}
+    again = main_effects(design, settings[:, None] + np.zeros((16, seeds)))
+    assert again.errors == pytest.approx({"x": 0.0, "y": 0.0}, abs=1e-12)
+
+
+def without(design: Design, value: Value, is_hole: Callable[..., bool]) -> MainEffects:
+    """The main effects where some settings have no figure."""
+    values = [
+        np.nan if is_hole(*point.values) else value(*point.values) for point in design.points()
+    ]
+    return main_effects(design, np.array(values)[:, None])
+
+
+def test_a_grid_with_holes_keeps_the_rest() -> None:
+    design = Design(tuple(grid(name, -1, 1, 3) for name in "xy"))
+    for is_hole in (lambda _x, y: y == 1, lambda x, y: y == 1 and x == 0):
+        answer = without(design, lambda x, _: 10 + 3 * x, is_hole)
+        assert answer.settings == 6
+        gone = next(iter(answer.left_out.items()))
+        assert gone in {("y", (1.0,)), ("x", (0.0,))}
+        assert answer.shares == pytest.approx({"x": 1, "y": 0})
+    # Only one value of y is left: nothing is known of it.
+    answer = without(design, lambda x, _: x, lambda _x, y: y >= 0)
+    assert answer.shares == {"x": pytest.approx(1), "y": None}
+    # Wherever the holes are, something stays.
+    answer = without(design, lambda x, y: x + y, lambda x, y: (x + y) % 2 == 0)
+    assert answer.settings >= 1
+
+
+def test_samples_without_a_figure_are_left_out() -> None:
+    design = ranges("xyz", -np.pi, np.pi, 256)
+    gone = {point.values for point in list(design.points())[::10]}
+    answer = without(design, ishigami, lambda *values: values in gone)
+    assert answer.settings == 256 - 26
+    assert answer.shares == pytest.approx(ISHIGAMI, abs=0.09)
+
+
+# The dataset.
 
 
 def made_up(
     folder: Path,
     design: Design,
-    left: TipOf,
-    right: TipOf,
+    tips: dict[str, TipOf],
     seeds: int = 1,
     fails: Callable[[str, tuple[Any, ...], int], bool] = lambda *_: False,
 ) -> Path:
@@ -59,17 +204,16 @@ def made_up(
         "schema": MANIFEST_VERSION,
         "request": {"what": "made up", "function": "", "moments": TIMES},
         "files": {"no-such-model": ""},
-        "versions": {"statemachine": "0", **dict.fromkeys(SIDES, "0")},
+        "versions": {"statemachine": "0", **dict.fromkeys(tips, "0")},
         "design": {
-            "vary": [], "seeds": seeds, "backends": SIDES, "samples": design.samples,
-            "indices": design.indices, "design_seed": design.seed,
+            "vary": [], "seeds": seeds, "backends": [*tips], "samples": design.samples,
+            "design_seed": design.seed,
         },
         "factors": [{**asdict(vary), "label": vary.label} for vary in design.factors],
     }  # fmt: skip
     write_manifest(folder, manifest)
     writer = RowWriter(folder, design.factors, {})
-    sides = zip(SIDES, (left, right), strict=True)
-    for (backend, tip_of), point, seed in product(sides, list(design.points()), range(seeds)):
+    for backend, point, seed in product(tips, list(design.points()), range(seeds)):
         row: dict[str, Any] = {
             "cell": f"{point.id}{seed}{backend}",
             "point": point.id,
@@ -77,409 +221,209 @@ def made_up(
             "backend": backend,
             **dict(zip((v.column for v in design.factors), point.values, strict=True)),
         }
+        tip = [float(x) for x in tips[backend](*point.values, seed)]
+        row |= {"status": DONE, "steps": 100, "time": 1.0, "tip": tip, "max_qvel": 2 * tip[0],
+                "sample_tip": [tip] * TIMES, "sample_qpos": [[0.0]] * TIMES}  # fmt: skip
         if fails(backend, point.values, seed):
             row |= {"status": FAILED, "error_class": "DivergedError"}
-        else:
-            row |= ran(np.broadcast_to(tip_of(*point.values, seed), (TIMES, 3)).tolist())
         writer.add([row])
     writer.flush()
     return folder
-
-
-def ran(tips: list[list[float]] | None) -> dict[str, Any]:
-    """What the row of a run has whose fingertip was there."""
-    angles = [[0.0]] * len(tips or ())
-    return {
-        "status": DONE, "steps": 100, "time": 1.0, "sample_tip": tips, "sample_qpos": angles,
-    }  # fmt: skip
-
-
-def along_x(length: float) -> list[float]:
-    return [float(length), 0.0, 0.0]
 
 
 def nowhere(*_: Any) -> list[float]:
     return [0.0, 0.0, 0.0]
 
 
-def grid(name: str, low: float, high: float, count: int, **more: Any) -> Vary:
-    return Vary(name, values=tuple(np.linspace(low, high, count).tolist()), **more)
-
-
-GAIN = grid("gain", 0, 2, 9, kind="parameter")
-
-
-def of(folder: Path, **given: Any) -> Figures:
-    return sweep_report(folder, run=False, **given)
-
-
-def shares(found: Figures) -> dict[str, tuple[float, float]]:
-    return {each.label: (each.first, each.total) for each in the(found.sensitivity).indices}
-
-
-def ishigami(x: float, y: float, z: float, _seed: int) -> list[float]:
-    """T. Ishigami and T. Homma, 1990, with a = 7, b = 0.1; moved above 0, for a gap."""
-    return along_x(20 + np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x))
-
-
-# Of its closed form: V = a²/8 + b π⁴/5 + b² π⁸/18 + 1/2.
-_V = 49 / 8 + 0.1 * np.pi**4 / 5 + 0.01 * np.pi**8 / 18 + 0.5
-_VX = 0.5 * (1 + 0.1 * np.pi**4 / 5) ** 2
-_VXZ = 0.01 * np.pi**8 * (1 / 18 - 1 / 50)
-ISHIGAMI = {
-    "x": (_VX / _V, (_VX + _VXZ) / _V),
-    "y": (49 / 8 / _V, 49 / 8 / _V),
-    "z": (0.0, _VXZ / _V),
-}
-
-
-def sobol(samples: int) -> Design:
-    factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
-    return Design(factors, samples=samples, indices=True, seed=1)
-
-
-def test_sobol_indices_are_those_of_the_ishigami_function(tmp_path: Path) -> None:
-    found = of(made_up(tmp_path / "s", sobol(1024), nowhere, ishigami))
-    assert_has(the(found.sensitivity), method="sobol", samples=1024)
-    assert shares(found).keys() == ISHIGAMI.keys()
-    for each in the(found.sensitivity).indices:
-        for name, value in zip(("first", "total"), ISHIGAMI[each.label], strict=True):
-            assert getattr(each, name) == pytest.approx(value, abs=0.03), each
-            low, high = getattr(each, f"{name}_interval")
-            assert low - 0.02 < value < high + 0.02  # 95 %, six of them
-            assert 0 < high - low < 0.3
-    assert the(found.sensitivity).indices[0].label == "x"
-    assert_has(the(found.map), across="x", up="y", others=("z",))
-
-
-def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> None:
-    gone = list(sobol(256).points())[300].values
-    found = of(
-        made_up(
-            *(tmp_path / "s", sobol(256), nowhere, ishigami),
-            fails=lambda backend, values, _: backend == "mujoco" and values == gone,
-        )
-    )
-    assert (found.failed, found.quantity.counts["no runs"]) == ({"DivergedError": 1}, 1)
-    assert the(found.sensitivity).samples == 128
-    assert "1 of 256 samples" in the(found.sensitivity).notes[0]
-    assert shares(found)["y"][0] == pytest.approx(ISHIGAMI["y"][0], abs=0.15)
-
-
-def test_a_full_factorial_is_taken_apart_as_its_closed_form(tmp_path: Path) -> None:
-    # f = 10 + 3 x + 2 y + x y + 0 z over levels -1, 0, 1, whose variance is 2/3.
-    design = Design(tuple(grid(name, -1, 1, 3) for name in "xyz"))
-    right: TipOf = lambda x, y, z, _: along_x(10 + 3 * x + 2 * y + x * y)  # noqa: E731
-    found = of(made_up(tmp_path / "s", design, nowhere, right))
-    x, y, both = np.array([6, 8 / 3, 4 / 9]) / (6 + 8 / 3 + 4 / 9)
-    expected = {"x": (x, x + both), "y": (y, y + both), "z": (0.0, 0.0)}
-    assert shares(found) == {name: pytest.approx(e, abs=1e-9) for name, e in expected.items()}
-    assert the(found.sensitivity).method == "factorial"
-    assert the(found.sensitivity).indices[0].first_interval is None  # of one seed
-
-
-def test_a_factorial_with_holes_keeps_the_rest(tmp_path: Path) -> None:
-    design = Design(tuple(grid(name, -1, 1, 3) for name in "xy"))
-    found = of(
-        made_up(
-            *(tmp_path / "s", design, nowhere, lambda x, y, _: along_x(10 + 3 * x)),
-            fails=lambda _backend, values, _seed: values[1] == 1,
-        )
-    )
-    assert_has(shares(found), x=pytest.approx((1, 1)), y=pytest.approx((0, 0)))
-    assert "y = 1.0" in the(found.sensitivity).notes[0]
-    assert found.failed == {"DivergedError": 6}
-
-
-def agreement(folder: Path, seeds: int = 2) -> Path:
-    """Gaps of 0 to 4 mm over x, and one seed that is 2 mm worse where y is 1."""
-    design = Design((grid("x", 0, 4, 5, kind="parameter"), grid("y", 0, 1, 2)))
+def two_engines(folder: Path) -> Path:
+    """Gaps of 0 to 4 mm over x, and a second seed that is 2 mm worse where y is 1."""
+    design = Design((grid("x", 0, 4, 5, kind="parameter"), grid("y", 0, 1, 2, times=True)))
+    right: TipOf = lambda x, y, seed: [1e-3 * (x + (2 * seed if y else 0)), 0, 0.5]  # noqa: E731
+    left: TipOf = lambda *_: [0.0, 0.0, 0.5]  # noqa: E731
     return made_up(
-        folder, design, nowhere,
-        lambda x, y, seed: along_x(1e-3 * (x + (2 * seed if y else 0))), seeds,
+        folder, design, {"mujoco": left, "pybullet": right}, 2,
         fails=lambda backend, values, _: backend == "pybullet" and values == (3.0, 0.0),
     )  # fmt: skip
 
 
-def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
-    found = of(agreement(tmp_path / "s"), tolerances={"tip": 1.5e-3}, quantity="tip")
-    # y = 0: x = 0, 1 agree, 2 and 4 differ, 3 has no runs; y = 1: of two seeds the better one
-    # agrees at 0 and 1.
-    assert found.quantity.counts == {"agrees": 2, "some seeds": 2, "differs": 5, "no runs": 1}
-    assert found.agreed == 2
-    by = {each.values: each for each in found.settings}
-    assert_has(by[2.0, 1.0], median=pytest.approx(3e-3), worst=pytest.approx(4e-3))
-    assert by[3.0, 0.0].median is None
-    for y, row in zip(the(found.map).rows, the(found.map).gap, strict=True):
-        for x, value in zip(the(found.map).columns, row, strict=True):
-            gone = {x, y} == {3.0, 0.0}  # whichever of the two is across
-            assert value == (None if gone else pytest.approx(1e-3 * (float(x) + float(y))))
-    said = shown(page(found))
+def text_of(answer: SweepEffects) -> str:
+    lines = shown(page(answer)).splitlines()
+    assert max(map(len, lines)) <= 80
+    return " ".join(" ".join(lines).split())
+
+
+def test_a_report_is_of_the_gap_between_two_engines(tmp_path: Path) -> None:
+    answer = effects(two_engines(tmp_path / "s"))
+    assert_has(answer, backends=SIDES, quantity="sample_tip", unit="m", scaled=("y",), seeds=2)
+    assert_has(answer.largest, value=pytest.approx(6e-3), settings=(4.0, 1.0), seed=1)
+    # Of x = 3 nothing is left; the others are 0, 1, 2, 4, and 1 more where y is 1.
+    variance = np.var([0, 1, 2, 4])
+    shares = {each.parameter: each.share for each in answer.effects}
+    assert shares == pytest.approx(
+        {"x": variance / (variance + 0.25), "y": 0.25 / (variance + 0.25)}
+    )
+    assert [*shares] == ["x", "y"]
+    assert_has(answer, settings=8, left_out=2, left_out_values={"x": (3.0,)}, missing=0)
+    assert answer.failed == {"DivergedError": 2}
+    assert (answer.mean, answer.deviation) == pytest.approx(
+        (1e-3 * (1.75 + 0.5), 1e-3 * np.sqrt(variance + 0.25))
+    )
     assert_in(
-        " ".join(said.split()),
-        "In 2 of 10 settings mujoco and pybullet agree within 1.5 mm",
-        "failed with DivergedError: 2",
-        "thereby have no gap: 1",
-    )
-    assert max(map(len, said.splitlines())) <= 80
-
-
-def test_a_sweep_that_failed_everywhere_has_no_report(tmp_path: Path) -> None:
-    design = Design((grid("x", 0, 1, 2, kind="parameter"),))
-    for failed in (("pybullet",), SIDES):
-        folder = made_up(
-            tmp_path / str(len(failed)), design, nowhere, nowhere,
-            fails=lambda backend, _values, _seed, failed=failed: backend in failed,
-        )  # fmt: skip
-        refused((BadInputError, r"no setting .* both mujoco and pybullet", partial(of, folder)))
-
-
-def data_of(folder: Path) -> SweepData:
-    return sweep_data(read_cells(folder), design_of(read_manifest(folder)), SIDES, 1, TIMES)
-
-
-def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
-    data = data_of(agreement(tmp_path / "s", seeds=1))
-    width, tolerances = np.full(10, 2.5e-3), {"tip": 1.5e-3}
-    found, settings = agreement_of(data, "tip", width, ModelFacts(), tolerances)
-    verdicts = {each.values[0]: each.verdict for each in settings if each.values[1] == 0}
-    assert verdicts == {0: "agrees", 1: "agrees", 2: "chaos", 3: "no runs", 4: "differs"}
-    assert the(gap_map(data, "tip", width, None)).inside[0] == (True, True, True, False, False)
-    assert found.counts["chaos"] == 2
-
-
-def fitted(
-    folder: Path, best: float, least: float = 0.0, seeds: int = 4, spread: float = 0.0
-) -> Figures:
-    """Left and right part by 5 mm for each unit of gain from the best one, and by `least`."""
-    design = Design((GAIN, grid("y", 0, 1, 2)))
-
-    def right(gain: float, _y: float, seed: int) -> list[float]:
-        return [5e-3 * (gain - (best + spread * (seed - (seeds - 1) / 2))), least, 0.0]
-
-    folder = made_up(folder, design, nowhere, right, seeds)
-    return of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])
-
-
-def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
-    (found,) = fitted(tmp_path / "s", best=0.61, least=0.1e-3).together
-    assert found.varied == "both"  # a parameter of a function is not a side's own
-    assert_has(found, verdict="together", measured=None)
-    assert_has(
-        the(found.fit),
-        value=pytest.approx(0.61, abs=1e-3),
-        gap=pytest.approx(0.1e-3, rel=1e-3),
-        error=pytest.approx(0.0, abs=1e-3),  # the seeds are alike
-    )
-    reach = np.sqrt(0.2**2 - 0.1**2) / 5  # where hypot(5 mm · reach, 0.1 mm) is 0.2 mm
-    assert values_within(the(found.fit), 0.2e-3) == pytest.approx(
-        (0.61 - reach, 0.61 + reach), abs=6e-3
-    )
-    assert values_within(the(found.fit), 0.05e-3) is None
-    assert np.interp(1.61, *the(found.fit)._scan) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
-
-
-def test_its_error_is_that_of_the_seeds(tmp_path: Path) -> None:
-    seeds, spread = 16, 0.02
-    (found,) = fitted(tmp_path / "s", best=0.9, least=5e-3, seeds=seeds, spread=spread).together
-    # The gap is a parabola here, so that the value is the mean of 16 that are evenly spread;
-    # the curves of a seed at 2 values of y are the same, and count once.
-    deviation = spread * np.sqrt((seeds**2 - 1) / 12)
-    assert_has(
-        the(found.fit),
-        value=pytest.approx(0.9, abs=0.02),
-        error=pytest.approx(deviation / np.sqrt(seeds), rel=0.15),
-        of="16 seeds drawn again",
-    )
-    assert found.verdict == "closer"
-
-
-def test_at_the_edge_no_value_and_only_closer(tmp_path: Path) -> None:
-    for name, best, least, says in (
-        ("edge", 5.0, 0.0, "at the edge of the range"),
-        ("none", 1.0, 0.5, "No value of gain is better"),
-        ("closer", 0.9, 5e-3, "brings mujoco and pybullet closer, not together"),
-    ):
-        report = fitted(tmp_path / name, best=best, least=least)
-        assert report.together[0].verdict == name
-        assert says in " ".join(shown(page(report)).split())
-
-
-def test_one_curve_has_its_error_from_the_curvature(tmp_path: Path) -> None:
-    right: TipOf = lambda gain, _: [5e-3 * (gain - 1), 1e-3, 0.0]  # noqa: E731
-    (found,) = of(made_up(tmp_path / "s", Design((GAIN,)), nowhere, right)).together
-    # One unknown: s² = 5 · 1e-6 / 14 left over, Σ slope² = 5 · 25e-6.
-    assert the(found.fit).error == pytest.approx(np.sqrt(5e-6 / 14 / (5 * 25e-6)), rel=0.02)
-
-
-def moments(x: list[float], steps: int, d: int = 2) -> NDArray[np.float64]:
-    """(1, k, m, d) a curve whose runs keep so many moments; NaN before them."""
-    made = np.full((1, len(x), 4, d), np.nan)
-    made[0, :, 4 - steps :] = np.array(x)[:, None, None]
-    return made
-
-
-def test_runs_that_keep_fewer_moments_are_fitted_by_those_they_have() -> None:
-    levels = np.array([0.0, 1.0, 2.0])
-    right = np.concatenate([moments([-1, 0, 1], steps) for steps in (4, 2)])
-    found = fit_curves("qpos", levels, 0 * right, right, [0, 0])
-    assert (the(found).value, the(found).curves) == (pytest.approx(1.0, abs=1e-3), 2)
-    assert the(found)._scan[1][-1] == pytest.approx(1.0)
-
-
-def test_of_a_curve_with_runs_of_several_lengths_the_end_is_fitted() -> None:
-    """As where the timestep itself is fitted: the moments before are no longer the same."""
-    levels = np.array([0.0, 1.0, 2.0])
-    right = moments([-1, 0, 1], 4)
-    right[0, :, :-1] = 7.0
-    right[0, 0, :2] = np.nan
-    found = fit_curves("qpos", levels, 0 * np.nan_to_num(right), right, [0])
-    assert (the(found).value, the(found).gap) == (
-        pytest.approx(1.0, abs=1e-3),
-        pytest.approx(0.0, abs=1e-3),
+        text_of(answer),
+        "Sweep of made up: the gap of sample_tip between mujoco and pybullet",
+        "largest at 6.00 mm, at seed 1",
+        "x 0.90 – 4 y 0.10 – 1x",
+        "it takes three seeds",
+        "2 cells failed with DivergedError",
+        "2 settings thereby left out",
+        "x = 3: left out as a whole",
     )
 
 
-def test_a_sampled_range_is_fitted_by_a_parabola(tmp_path: Path) -> None:
-    ranges = (Vary("gain", kind="parameter", bounds=(0.0, 2.0)), Vary("y", bounds=(0.0, 1.0)))
+def test_a_report_is_of_a_quantity_on_one_engine(tmp_path: Path) -> None:
+    design = Design((grid("x", 0, 4, 5), Vary("model", values=("a", "b"), kind="model")))
     folder = made_up(
-        tmp_path / "s", Design(ranges, samples=64), nowhere,
-        lambda gain, y, _: [5e-3 * (gain - 0.7), 1e-3 * y, 0.0],
-    )  # fmt: skip
-    report = of(folder, fit=["gain"])
-    (found,) = report.together
-    assert the(found.fit).value == pytest.approx(0.7, abs=0.02)
-    assert the(report.sensitivity).method == "rank"
-    assert "run it with --indices" in the(report.sensitivity).notes[0]
-
-
-def test_pictures_and_page_are_of_the_same_figures(tmp_path: Path) -> None:
-    folder = agreement(tmp_path / "s")
-    found = of(folder, tolerances={"tip": 1.5e-3})
-    chart = next(each for each in pictures(found) if isinstance(each, HeatMap))
-    within = [[v is not None and v <= 1.5 for v in row] for row in chart.values]
-    assert sum(map(sum, chart.framed)) == sum(map(sum, within))
-    html, plot = tmp_path / "r.html", tmp_path / "r.png"
-    arguments = ["sweep", "--report", str(folder), "--no-runs", "--tolerance", "tip=1.5mm"]
-    assert main([*arguments, "--html", str(html), "--plot", str(plot)]) == 1
-    assert (chart.across, chart.unit) == ("x", "gap [mm]")
-    page_text = html.read_text("utf-8")
-    assert page_text.count("data:image/svg+xml;base64,") == 3
-    assert "In 2 of 10 settings" in page_text
-    assert plot.read_bytes().startswith(b"\x89PNG")
-    assert plain(found)["agreed"] == 2
-
-
-def test_one_parameter_is_a_curve(tmp_path: Path) -> None:
-    design = Design((grid("x", 0, 4, 5),))
-    folder = made_up(tmp_path / "s", design, nowhere, lambda x, _: along_x(1e-3 * x))
-    curve = pictures(of(folder))[0]
-    assert isinstance(curve, Traces)
-    assert curve.curves["median of the seeds"] == ([0, 1, 2, 3, 4], pytest.approx([0, 1, 2, 3, 4]))
-
-
-def test_an_axis_says_what_its_values_are_in() -> None:
-    pytest.importorskip("mujoco")
-    factors = [
-        Vary("timestep", values=(0.001, 0.002)),
-        Vary("damping", values=(0.5, 1.0), times=True),
-        Vary("damping", "elbow_flex", values=(0.5, 1.0)),
-        Vary("qpos", "elbow_flex", "state", values=(0.5, 1.0)),
-        Vary("gain", kind="parameter", values=(0.5, 1.0)),
-    ]
-    assert facts_of({"files": {"so101/scene_box": ""}}, factors, ["mujoco"]).units == {
-        "timestep": "s", "damping": "", "damping[elbow_flex]": "N·m·s/rad",
-        "qpos[elbow_flex]": "rad", "gain": "",
-    }  # fmt: skip
-
-
-def test_what_no_sweep_has_is_refused(tmp_path: Path) -> None:
-    report = partial(of, agreement(tmp_path / "s"))
-    refused(
-        (UnknownNameError, "parameter", lambda: report(fit=["z"])),
-        (UnknownNameError, "quantity", lambda: report(quantity="touch")),
-        (BadInputError, "two engines", lambda: report(backends=["mujoco"])),
+        tmp_path / "s", design, {"mujoco": lambda x, model, _: [x, 0, x if model == "a" else 0]}
     )
+    answer = effects(folder)
+    assert_has(answer, backends=("mujoco",), quantity="tip[2]", unit="m")
+    assert_has(answer.largest, value=4.0, settings=(4.0, "a"))
+    answer = effects(folder, "max_qvel")
+    assert {each.parameter: each.share for each in answer.effects} == pytest.approx(
+        {"x": 1.0, "model": 0.0}
+    )
+    assert_in(
+        text_of(answer), "Sweep of made up: max_qvel on mujoco", "largest at 8.00 rad/s or m/s",
+        "x 1.00 – 4 model 0.00 – a",
+    )  # fmt: skip
+
+
+def test_one_engine_of_two_may_be_named(tmp_path: Path) -> None:
+    folder = two_engines(tmp_path / "s")
+    answer = effects(folder, backends=["mujoco"])
+    assert_has(answer, backends=("mujoco",), quantity="tip[2]", left_out=0, failed={})
+    same = "it is the same at every setting, but for rounding"
+    assert answer.why_none == same
+    assert f"There are no shares: {same}." in text_of(answer)
+    assert effects(folder, backends=SIDES[::-1]).effects == effects(folder).effects
+
+
+def test_a_gap_that_is_rounding_of_its_sides_has_no_shares(tmp_path: Path) -> None:
+    def right(x: float, _seed: int) -> list[float]:
+        return [0.0, 0.0, 0.5 + 2e-16 * x]
+
+    tips = {"mujoco": lambda *_: [0.0, 0.0, 0.5], "pybullet": right}
+    answer = effects(made_up(tmp_path / "s", Design((grid("x", 0, 4, 5),)), tips))
+    assert 0 < answer.largest.value < 1e-15
+    assert "rounding" in answer.why_none
+
+
+def test_what_no_report_can_be_of_is_refused(tmp_path: Path) -> None:
+    report = partial(effects, two_engines(tmp_path / "s"))
+    three = made_up(
+        tmp_path / "t", Design((grid("x", 0, 1, 2),)), dict.fromkeys((*SIDES, "other"), nowhere)
+    )
+    failed = made_up(
+        tmp_path / "f", Design((grid("x", 0, 1, 2),)), dict.fromkeys(SIDES, nowhere),
+        fails=lambda backend, *_: backend == "pybullet",
+    )  # fmt: skip
+    one = partial(report, backends=["mujoco"])
+    refused(
+        (UnknownNameError, "no quantity named 'touch'", lambda: report("touch")),
+        (UnknownNameError, "no quantity named 'seed'", lambda: report("seed")),
+        (UnknownNameError, "backend of this sweep", lambda: report(backends=["drake"])),
+        (BadInputError, r"no tip\[3\]: tip has 3 numbers", lambda: report("tip[3]")),
+        (BadInputError, r"no time\[0\]: time is one number", lambda: report("time[0]")),
+        (BadInputError, r"tip has 3 numbers: say which one, tip\[0\] to", lambda: one("tip")),
+        (BadInputError, r"of one engine tip\[0\]", lambda: one("sample_tip[0]")),
+        (BadInputError, "name one or two with --backend", lambda: effects(three)),
+        (BadInputError, "has sample_tip on both mujoco and pybullet", lambda: effects(failed)),
+        (BadInputError, "has energy on mujoco", lambda: one("energy")),
+    )
+    assert effects(three, backends=["other"]).largest.value == 0.0
+    assert effects(failed, backends=["mujoco"]).failed == {}
+
+
+def rows_of(*rows: dict[str, Any]) -> Any:
+    """A table of runs of one point and seed, the first on the left engine and the next right."""
+    arrow = pytest.importorskip("pyarrow")
+    given = [
+        {"backend": SIDES[k % 2], "point": str(k // 2), "seed": 0, "status": DONE, **row}
+        for k, row in enumerate(rows)
+    ]
+    schema = schema_of((), {}).append(arrow.field("backend", arrow.string()))
+    return arrow.Table.from_pylist(given, schema)
+
+
+def gaps(name: str, *rows: dict[str, Any]) -> list[float]:
+    points = [str(k) for k in range(len(rows) // 2)]
+    found = cell_values(rows_of(*rows), parse_quantity(name), SIDES, points, 1)
+    return found.values[:, 0].tolist()
+
+
+def test_the_gap_of_a_place_is_a_length_and_of_others_the_largest_difference() -> None:
+    here, there = [0.0, 0.0, 0.0], [3.0, 4.0, 0.0]
+    assert gaps("tip", {"tip": here}, {"tip": there}) == [5.0]
+    assert gaps("tip[0]", {"tip": there}, {"tip": here}) == [3.0]
+    assert gaps("qpos", {"qpos": here}, {"qpos": there}) == [4.0]
+    assert gaps("energy", {"energy": 1.0}, {"energy": -2.0}) == [3.0]
+    moments = {"sample_tip": [here, there, here]}
+    assert gaps("sample_tip", moments, {"sample_tip": [here] * 3}) == [5.0]
 
 
 def test_runs_of_several_lengths_keep_their_last_moment_last() -> None:
-    arrow = pytest.importorskip("pyarrow")
-    tips = [[[1.0, 2.0, 3.0]], [[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]], None, [[1.0, 1.0, 1.0]] * 2]
-    rows = [ran(tip) | {"steps": 4, "sample_qpos": [[0.0, 1.0]]} for tip in tips]
-    rows[1]["first_touch"] = 0.5
-    rows[3]["status"] = FAILED
-    runs = read_runs(arrow.Table.from_pylist(rows, schema_of((), {})), 3, [1])
-    assert (runs["tip"].shape, runs["qpos"].shape) == ((4, 3, 3), (4, 3, 1))
-    for run, tip in zip(runs["tip"], [*tips[:2], None, None], strict=True):
-        there = tip or np.empty((0, 3))
-        np.testing.assert_array_equal(run[3 - len(there) :], there)
-        assert np.isnan(run[: 3 - len(there)]).all()
-    np.testing.assert_array_equal(runs["touch"], [np.inf, 0.5, np.inf, np.nan])
-    np.testing.assert_array_equal(runs["timestep"], [0.25, 0.25, 0.25, np.nan])
+    long, short = [[1.0], [2.0], [5.0]], [[4.0]]
+    assert gaps("sample_qpos", {"sample_qpos": long}, {"sample_qpos": short}) == [1.0]
+    # A run without any moment, and one that failed, have none.
+    rows = {"sample_qpos": long}, {"sample_qpos": None}, {"sample_qpos": long}
+    found = gaps("sample_qpos", *rows, {"sample_qpos": long, "status": FAILED})
+    assert np.isnan(found).all()
 
 
-def tried(folder: Path, left: TipOf, right: TipOf) -> Any:
-    """What fitting the gain gives where the made-up engines can be run at any value."""
-    arrow, tip_of = pytest.importorskip("pyarrow"), dict(zip(SIDES, (left, right), strict=True))
-
-    def run(asked: Any, **_: Any) -> Any:
-        rows = [ran([tip_of[backend](*values, seed)]) for backend, values, seed in asked]
-        return read_runs(arrow.Table.from_pylist(rows, schema_of((), {})), TIMES)
-
-    runner: Any = SimpleNamespace(run=run)
-    return brought_together(data_of(folder), GAIN, "tip", 0.2e-3, varied="both", runner=runner)
-
-
-def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Path) -> None:
-    """A tip that jumps over what the left one does, as over a contact: 5 mm is the least gap."""
-
-    def right(gain: float, _seed: int) -> list[float]:
-        return along_x(5e-3 + 20e-3 * (gain - 0.62) if gain >= 0.62 else -20e-3 + 2e-3 * gain)
-
-    folder = made_up(tmp_path / "s", Design((GAIN,)), nowhere, right)
-    report = of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])
-    (fit,) = report.together
-    assert the(fit.fit).gap < 1e-3  # which no run gives
-    assert fit.tried is None
-    found = tried(folder, nowhere, right)
-    assert the(found.measured) > 5e-3
-    assert_has(
-        found,
-        value=pytest.approx(0.625),
-        error=pytest.approx(0.25 / (REFINED - 1)),
-        verdict="closer",
-        cells=2 * (1 + REFINED),
-    )
-    assert found.after == min(the(found.tried)[1]) == pytest.approx(5.1e-3)
-    assert_in(
-        " ".join(shown(page(Figures(**vars(report) | {"together": (found,)}))).split()),
-        "gain = 0.625 ± 0.031 in both brings mujoco and pybullet closer",
-        "9 values from 0.5 to 0.75 were run, 0.03125 apart",
-    )
-    # Where it agrees with the fit nothing more is run.
-    sides = nowhere, lambda gain, _: along_x(5e-3 * (gain - 0.61))
-    found = tried(made_up(tmp_path / "t", Design((GAIN,)), *sides), *sides)
-    assert (found.tried, found.cells) == (None, 2)
+@pytest.mark.parametrize(
+    ("left", "right", "gap"),
+    [(0.25, 0.5, 0.25), (0.25, None, 0.8), (None, 0.5, 0.8), (None, None, 0.0)],
+)
+def test_a_touch_that_one_engine_has_is_as_far_as_the_run_is_long(
+    left: float | None, right: float | None, gap: float
+) -> None:
+    rows = {"first_touch": left, "time": 1.0}, {"first_touch": right, "time": 0.8}
+    assert gaps("first_touch", *rows) == [gap]
+    assert np.isnan(gaps("first_touch", rows[0], {**rows[1], "status": FAILED})).all()
 
 
-@pytest.mark.slow
+# The command.
+
+
+def test_the_command_prints_the_report_as_page_and_as_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(two_engines(tmp_path / "s"))
+    assert main(["sweep", "--report", folder, "--quantity", "tip", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["largest"]["value"] == pytest.approx(6e-3)
+    assert answer["largest"]["settings"] == [4.0, 1.0]
+    assert answer["effects"][0] == {
+        "parameter": "x", "share": pytest.approx(0.897, abs=1e-3), "error": None,
+    }  # fmt: skip
+    assert main(["sweep", "--report", folder, "--backend", "pybullet"]) == 0
+    assert "tip[2] on pybullet" in capsys.readouterr().out
+    assert main(["sweep", "--report", folder, "--quantity", "tips"]) == 2
+
+
+@pytest.mark.usefixtures("bullet")
 def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
-    pytest.importorskip("mujoco")
-    pytest.importorskip("pybullet")
-    from statemachine import load
-
     sweep = Sweep(
-        "hold", vary=("damping=0.6x:1.4x:5",), backends=SIDES, seeds=2, seconds=0.4,
-        spread="0.5deg",
+        "hold", vary=("damping=0.6x:1.4x", "kp=0.9x:1.1x:2"), backends=SIDES, samples=8,
+        seconds=0.5,
     )  # fmt: skip
     run_sweep(sweep, tmp_path / "s", jobs=1)
-    found = sweep_report(tmp_path / "s", floor_cells=8, jobs=1)
-    assert (the(found.floor).cells, the(found.floor).settings) == (8, 2)
-    assert 0 < max(each.floor or 0 for each in found.settings) < 1e-6
-    (fit,) = found.together
-    assert_has(fit, label="damping", varied="right", own=1.0, pairs=2)
-    assert load("so101/scene").dof_damping.any()
-    # Both engines have the same model: its own damping, or one near it, is the best.
-    assert the(fit.fit).value == pytest.approx(1.0, abs=0.15)
-    assert the(fit.measured) < np.interp(0.6, *the(fit.fit)._scan)
-    assert found.ran == the(found.floor).cells + fit.cells
+    of_gap, of_one = effects(tmp_path / "s"), effects(tmp_path / "s", "max_qvel", ["mujoco"])
+    for answer in (of_gap, of_one):
+        assert_has(answer, settings=16, why_none="", missing=0)
+        shares = numbers({each.parameter: each.share for each in answer.effects})
+        errors = numbers({each.parameter: each.error for each in answer.effects})
+        assert 0 <= min(shares.values()) <= max(shares.values()) <= 1
+        assert min(errors.values()) > 0
+    assert 0 < of_gap.largest.value < 0.1
+    assert of_one.effects[0].parameter == "damping"

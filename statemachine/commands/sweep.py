@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from ._common import (
     add_rules,
     add_table,
     complain,
-    file_name,
     json_of,
     menagerie,
     model_of,
@@ -27,7 +25,6 @@ from ._common import (
     shorten_help,
     show,
 )
-from ._compare_files import checked
 from .compare import experiments
 
 
@@ -50,7 +47,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
-        "Exit code 1: a run failed; with --report: two engines differ in some setting.\n"
+        "Exit code 1: a run failed.\n"
         "docs/sweeps.md has the columns of the dataset."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -72,11 +69,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_table(
         parser.add_argument_group("ranges"),
         ("--samples", "N", "Sobol points of the ranges, a power of 2", {"default": 0}),
-        (
-            "--indices",
-            "",
-            "the points that Sobol indices are computed from: N for each range, and 2 N more",
-        ),
         ("--design-seed", "N", "of what is drawn for them (0)", {"default": 0}),
     )
     add_table(
@@ -99,47 +91,28 @@ def add(parser: argparse.ArgumentParser) -> None:
         (
             "--report",
             "DIR",
-            "of the dataset in DIR, or of that which was just run: where two engines agree, what "
-            "the gap is sensitive to, which value brings them together",
+            "of the dataset in DIR, or of that which was just run: how much each parameter moves a "
+            "quantity of one engine, or the gap between two, and where it is largest",
             {"nargs": "?", "const": True},
         ),
-        ("--quantity", "NAME", "whose gap: tip, tip-end, qpos, qpos-end, touch (tip)"),
         (
-            "--tolerance",
-            "KIND=SIZE",
-            "another tolerance, such as tip=2mm, joint=0.5deg, contact=10ms",
-            REPEATED,
-        ),
-        (
-            "--fit",
+            "--quantity",
             "NAME",
-            "the parameter that is to bring them together (the most sensitive one)",
-            REPEATED,
+            "a column of the dataset, or one number of it: energy, qpos[0], … (sample_tip of two "
+            "engines, tip[2] of one)",
         ),
-        (
-            "--varied",
-            None,
-            "right: the left engine keeps the model's own value; both: both have the same "
-            "(right, of an option of the model)",
-            {"choices": ("right", "both")},
-        ),
-        ("--floor-cells", "N", "run for the chaos floor (64)"),
-        ("--no-runs", "", "no floor and no check: nothing is run for a report"),
-        ("--html", "PAGE.html", "write it as one page", {"type": file_name}),
-        ("--plot", "FILE", "write its pictures: .png, …", {"type": file_name}),
     )
     add_table(parser, DEFAULTS, *menagerie(), json_of("summary, or the report,"))
-    of_a_report = "quantity tolerance fit varied floor_cells no_runs html plot"
-    add_rules(parser, (of_a_report, NEEDS, "report"))
+    add_rules(parser, ("quantity", NEEDS, "report"))
     shorten_help(
         parser,
         *("what", "model", "vary", "out", "backend", "seeds", "seconds", "samples", "jobs"),
-        *("report", "html", "json"),
+        *("report", "json"),
     )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run what is missing, and say what there is, or what it says of two engines."""
+    """Run what is missing, and say what there is, or what moves a quantity of it."""
     _check(options)
     if options.report not in (None, True):
         answer, page = _report(options, options.report)
@@ -165,11 +138,10 @@ def run(options: argparse.Namespace) -> int:
         )
     if not (options.report and options.json):
         show(words.summary_page(ready, summary), summary, options.json)
-    code = 0
     if options.report:
         answer, page = _report(options, out)
-        code = show(page, {"summary": summary, "report": answer}, options.json)
-    return SAYS_NO if summary.failed else code
+        show(page, {"summary": summary, "report": answer}, options.json)
+    return SAYS_NO if summary.failed else 0
 
 
 def _asked(options: argparse.Namespace) -> Any:
@@ -184,7 +156,7 @@ def _check(options: argparse.Namespace) -> None:
     """Whether what is asked for goes together, before anything is run.
 
     Raises:
-        BadInputError: It does not, or a file cannot be written.
+        BadInputError: It does not.
     """
     runs = options.what is not None and options.out is not None
     there = options.report not in (None, True)
@@ -209,50 +181,14 @@ def _check(options: argparse.Namespace) -> None:
             there and options.retry_failed,
             "--retry-failed is of a sweep that runs: say WHAT and --out DIR",
         ),
-        (
-            (options.floor_cells or 0) < 0,
-            f"--floor-cells must not be negative; got {options.floor_cells}",
-        ),
     )
-    checked(options)
 
 
 def _report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
-    """The report of a dataset, and its page; what is to be written is written."""
-    from ..measures import parse_tolerances
+    """Return the report of a dataset, and its page."""
     from ..report import sweep_report as words
-    from ..report.terminal import progress
-    from ..sweep.analysis import FLOOR_CELLS, sweep_report
+    from ..sweep.analysis import effects
 
-    with progress("report") as bar:
-        answer = sweep_report(
-            folder,
-            backends=[name for name in options.backend or () if name != "all"],
-            quantity=options.quantity,
-            tolerances=parse_tolerances(options.tolerance),
-            fit=options.fit,
-            varied=options.varied,
-            floor_cells=FLOOR_CELLS if options.floor_cells is None else options.floor_cells,
-            run=not options.no_runs,
-            menagerie=options.menagerie,
-            jobs=options.jobs,
-            progress=bar,
-        )
-    page = words.page(answer)
-    if options.html is not None:
-        from ..report.html import report as as_html
-        from ..report.html import write_report
-
-        text = as_html(page)
-        target = write_report(options.html, text)
-        print(f"wrote {target} ({len(text.encode()) / 1e6:.2f} MB)", file=sys.stderr)
-    if options.plot is not None:
-        from ..report.figures import write_pictures
-        from ..report.sweep_pictures import pictures
-
-        if drawn := pictures(answer):
-            size = write_pictures(drawn, options.plot)
-            print(f"wrote {options.plot} ({size / 1e3:.0f} kB)", file=sys.stderr)
-        else:
-            complain("nothing is varied: there is no picture", 0)
-    return answer, page
+    backends = [name for name in options.backend or () if name != "all"]
+    answer = effects(folder, options.quantity, backends)
+    return answer, words.page(answer)

@@ -15,15 +15,11 @@ import numpy as np
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..interface import Array
-from ..page import Bars, Block, HeatMap, Pipeline, Slots, Traces
+from ..page import Bars, Block, Pipeline, Slots, Traces
 from ..runs.whole import replace_bytes
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
 INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
-_WIDE = 30.0  # times the least value: beyond, colours are logarithmic
-_WRITTEN, _LONG = 150, 60  # cells whose figures are written; letters that fit under a map
-_UP = 24  # letters that fit beside a map
-_DARK = 0.7  # of the scale: beyond, figures are white
 _WRITTEN_OUT = range(-3, 4)  # powers of ten; others as 1e6
 _TITLE = 80  # letters of a line of it
 _LINES = ("-", "--", ":", "-.")
@@ -37,7 +33,7 @@ SIDES: tuple[dict[str, Any], ...] = (
 GAP: dict[str, Any] = {"color": INK, "linewidth": 1.0}  # of the sides
 Box = tuple[float, float, float, float]
 
-Drawn = Traces | Slots | Pipeline | HeatMap | Bars
+Drawn = Traces | Slots | Pipeline | Bars
 _DOTS = 150  # a PNG has to an inch
 SUFFIXES = (".svg", ".png", ".pdf")
 # The same figures give the same bytes: no settings of the user's, no random names, no date, no
@@ -306,63 +302,12 @@ def _pipeline(axes: Any, picture: Pipeline) -> None:
     axes.axis("off")
 
 
-def _heat_map(axes: Any, picture: HeatMap) -> None:
-    """Cells with their figures; hatched where they are not to be read."""
-    import matplotlib
-    from matplotlib.colors import ListedColormap, LogNorm, Normalize
-    from matplotlib.patches import Rectangle
-    from matplotlib.ticker import LogLocator
-
-    values = np.array([[np.nan if v is None else v for v in row] for row in picture.values])
-    hatched = np.array(picture.hatched, bool)
-    shown = np.ma.masked_where(~np.isfinite(values) | hatched, values)
-    low, high = (float(shown.min()), float(shown.max())) if shown.count() else (0.0, 1.0)
-    wide = low > 0 and high > _WIDE * low
-    norm = (LogNorm if wide else Normalize)(low if wide else 0.0, high or 1.0)
-    pale = ListedColormap(matplotlib.colormaps["YlOrBr"](np.linspace(0, 0.85, 256)))
-    rows, columns = (np.arange(n + 1) - 0.5 for n in values.shape)
-    line: dict[str, Any] = {"edgecolors": "#999999", "linewidth": 0.3}
-    cells = axes.pcolormesh(columns, rows, shown, norm=norm, cmap=pale, **line)
-    unread = np.ma.masked_where(~np.isfinite(values) | ~hatched, values)
-    axes.pcolor(columns, rows, unread, cmap=ListedColormap([_PAPER]), hatch="////", **line)
-    axes.set_facecolor(_BELOW)
-    for (r, c), value in np.ndenumerate(values):
-        if not np.isfinite(value):
-            axes.text(c, r, "no run", fontsize=6, **_CENTRE)
-            continue
-        if picture.framed[r][c]:
-            inner = c - 0.46, r - 0.46
-            axes.add_patch(Rectangle(inner, 0.92, 0.92, fill=False, edgecolor=_COLOURS[2], lw=1.6))
-        if values.size <= _WRITTEN:
-            colour = _PAPER if not hatched[r, c] and norm(value) > _DARK else INK
-            axes.text(c, r, f"{value:.3g}", fontsize=7, color=colour, **_CENTRE)
-    slope = 45 if len("".join(picture.columns)) > _LONG else 0
-    axes.set_xticks(range(len(picture.columns)), picture.columns, fontsize=8, rotation=slope)
-    axes.set_yticks(range(len(picture.rows)), picture.rows, fontsize=8)
-    axes.set_xlabel(picture.across)
-    axes.set_ylabel(textwrap.fill(picture.up, _UP))
-    steps = LogLocator(subs=(1, 2, 5) if high < 1e4 * low else (1,)) if wide else None
-    # Beside its map, whatever room the legends of other panels take.
-    bar = axes.figure.colorbar(
-        cells,
-        axes.inset_axes((1.02, 0.0, 0.02, 1.0)),
-        ticks=steps,
-        format="{x:g}",
-        label=picture.unit,
-    )
-    bar.minorticks_off()
-
-
 def _bars(axes: Any, picture: Bars) -> None:
     """Bars from left to right, those of a name one below the other."""
     high = 0.8 / len(picture.bars)
     for k, (what, bars) in enumerate(picture.bars.items()):
         places = [n + (k + 0.5) * high - 0.4 for n in range(len(bars))]
-        axes.barh(places, [max(0.0, length) for length, _ in bars], high * 0.9,
-                  color=_COLOURS[k], alpha=0.75, label=what)  # fmt: skip
-        for place, (_, interval) in zip(places, bars, strict=True):
-            if interval is not None:
-                axes.plot(interval, [place, place], color=INK, linewidth=1.2)
+        axes.barh(places, bars, high * 0.9, color=_COLOURS[k], alpha=0.75, label=what)
     axes.set_yticks(range(len(picture.names)), picture.names)
     axes.invert_yaxis()
     axes.set_xlabel(picture.across)
@@ -375,13 +320,11 @@ _DRAW = {
     Traces: _traces,
     Slots: _slots,
     Pipeline: _pipeline,
-    HeatMap: _heat_map,
     Bars: _bars,
 }
 _SIZES: dict[type, Callable[[Any], tuple[float, float]]] = {
     Traces: lambda _: (7.0, 3.4),
     Slots: lambda _: (7.5, 2.6),
-    HeatMap: lambda p: (7.0, 1.3 + 0.33 * min(14, max(2, len(p.rows)))),
     Bars: lambda p: (7.0, 0.9 + 0.42 * len(p.names)),
     Pipeline: lambda p: (7.5, 0.26 * max(len(content) for _, content in p.stages) + 1.6),
 }

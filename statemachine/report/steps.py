@@ -226,7 +226,7 @@ def versions(comparisons: Sequence[Comparison], request: Request) -> Page:
         both = comparison.left.trace.header, comparison.right.trace.header
         left, right = (header.provenance.versions[header.backend] for header in both)
         cells, worst = ("nothing differs", NONE, NONE, NONE), leading(comparison)
-        bars.append((worst.max / worst.tolerance if worst.tolerance else 0.0, None))
+        bars.append(worst.max / worst.tolerance if worst.tolerance else 0.0)
         if worst.max:
             largest, tolerance = (quantity(v, worst.unit) for v in (worst.max, worst.tolerance))
             cells = (name_of(worst.name), largest, short_time(worst.at), tolerance)

@@ -62,7 +62,7 @@ Submit = Callable[[PreparedSweep, Batch], Future[list[Row]]]  # to a worker
 _BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
 _TASKS = 4  # at least so many for each job, so that none is idle at the end
 _PATIENCE = 10.0  # seconds for a scheduler to answer
-_RUN_APART = partial(run_batch, own=True)
+_BATCH_APART = partial(run_batch, own=True)
 
 
 def run_sweep(
@@ -132,7 +132,7 @@ def run_sweep(
             run = (
                 _run_on_dask(ready, batches, workers, client, raise_if_ended)
                 if client
-                else run_apart(ready, batches, workers, raise_if_ended)
+                else _run_apart(ready, batches, workers, raise_if_ended)
             )
             try:
                 with closing(run) as results:
@@ -173,18 +173,18 @@ def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Itera
     return (batch for turn in turns for batch in turn if batch is not None)
 
 
-def run_apart(
+def _run_apart(
     ready: PreparedSweep,
     batches: Iterable[Batch],
     jobs: int,
-    look: Callable[[], None] = lambda: None,
+    look: Callable[[], None],
 ) -> Results:
     """The rows of each batch, as they are ready, from processes of this machine.
 
     `look` is called between any two waits, and may raise.
     """
     with worker_processes(jobs) as workers:
-        here = [partial(submit, _RUN_APART) for submit in workers]
+        here = [partial(submit, _BATCH_APART) for submit in workers]
         yield from _results(ready, batches, here, here, look)
 
 
@@ -206,7 +206,7 @@ def _run_on_dask(
         def submit_here(ready: PreparedSweep, batch: Batch) -> Future[list[Row]]:
             if client.status != "running":
                 raise BadInputError("the scheduler went away; what was done is kept")
-            return worker(_RUN_APART, ready, batch)
+            return worker(_BATCH_APART, ready, batch)
 
         # Some batches always wait, so that no worker is idle.
         yield from _results(ready, batches, 2 * workers * [submit], [submit_here], look)

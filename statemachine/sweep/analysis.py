@@ -1,193 +1,196 @@
-"""From a sweep to an answer: where two engines agree, what decides it, what brings them together.
+"""From a sweep to an answer: how much each parameter moves a quantity, and where it is largest.
 
-from statemachine.sweep.analysis import sweep_report
+from statemachine.sweep.analysis import effects
 
-found = sweep_report("sweep-damping")
-print(found.agreed, "of", len(found.settings), "settings agree")
+found = effects("sweep-damping", "max_qvel")
+for each in found.effects:
+    print(each.parameter, each.share, each.error)
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import StateMachineError, check_name, refuse
+from ..errors import BadInputError, check_name
 from ..interface import Array
 from ..measures.text import listed
-from ..page import Figures
-from ..runs.drive import Progress, part_of, silent
-from .analysis_data import SweepData, sweep_data
-from .analysis_gaps import agreement_of, gap_map, only_rounding
-from .analysis_indices import ranked, sensitivity
-from .analysis_runs import CellRunner, ModelFacts, facts_of, floor_of, runner_of
-from .analysis_together import Varied, brought_together
+from .design import Value
 from .folder import design_of, read_manifest
+from .main_effects import main_effects
+from .quantities import cell_values, default_quantity, parse_quantity
 from .rows import read_cells
 
-FLOOR_CELLS = 64
+
+@dataclass(frozen=True)
+class MainEffect:
+    """How much one parameter moves a quantity, whatever the others are.
+
+    Attributes:
+        parameter: Its label, as "damping" or "qpos[elbow_flex]".
+        share: Its share of the quantity's variance over the settings [1], from 0 to 1; None where
+            there is nothing to compute it from.
+        error: The standard error of the share [1]; None where there is nothing to compute it from.
+    """
+
+    parameter: str
+    share: float | None
+    error: float | None
 
 
-def sweep_report(
-    folder: str | Path,
-    *,
-    backends: Sequence[str] = (),
-    quantity: str | None = None,
-    tolerances: Mapping[str, float] | None = None,
-    fit: Sequence[str] = (),
-    varied: Varied | None = None,
-    floor_cells: int = FLOOR_CELLS,
-    run: bool = True,
-    menagerie: str | None = None,
-    jobs: int | None = None,
-    progress: Progress = silent,
-) -> Figures:
-    """What the dataset of a sweep says of two engines.
+@dataclass(frozen=True)
+class LargestCell:
+    """The cell in which a quantity is largest.
+
+    Attributes:
+        value: The quantity there, in its SI unit.
+        settings: The value of each parameter.
+        seed: Of the start.
+    """
+
+    value: float
+    settings: tuple[Value, ...]
+    seed: int
+
+
+@dataclass(frozen=True)
+class SweepEffects:
+    """What moves one quantity of a sweep, on one engine or of the gap between two.
+
+    Attributes:
+        what: The experiment.
+        folder: Of the dataset.
+        versions: Of what the dataset was made with.
+        backends: The engine; or the two engines that the gap is between.
+        quantity: A column of the dataset, or one number of it.
+        unit: Of the quantity, SI.
+        parameters: What was varied.
+        units: The unit of each parameter that has one.
+        scaled: The parameters whose values are times the model's own.
+        seeds: How many starts each setting has; of its seeds the median counts.
+        effects: One for each parameter, the largest share first.
+        why_none: Why no parameter has a share; "" where one has.
+        mean: The mean over the settings that the shares are of, in the unit of the quantity.
+        deviation: The standard deviation over them: the root of the variance that is shared.
+        largest: The cell with the largest value, of all cells that have one.
+        settings: How many settings the shares are of.
+        left_out: How many other settings there are: those without a value, and those that go with
+            them, so that all that stays was run at every combination.
+        left_out_values: The values of a list or grid that are left out so, by parameter.
+        failed: How many cells failed, by the class of the error.
+        missing: How many cells have not run.
+    """
+
+    what: str
+    folder: str
+    versions: Mapping[str, str]
+    backends: tuple[str, ...]
+    quantity: str
+    unit: str
+    parameters: tuple[str, ...]
+    units: Mapping[str, str]
+    scaled: tuple[str, ...]
+    seeds: int
+    effects: tuple[MainEffect, ...]
+    why_none: str
+    mean: float
+    deviation: float
+    largest: LargestCell
+    settings: int
+    left_out: int
+    left_out_values: Mapping[str, tuple[Value, ...]]
+    failed: Mapping[str, int]
+    missing: int
+
+
+def effects(
+    folder: str | Path, quantity: str | None = None, backends: Sequence[str] = ()
+) -> SweepEffects:
+    """Compute how much each parameter of a sweep moves a quantity, and where it is largest.
+
+    The shares are first-order sensitivity indices; `main_effects` says how they are computed.
 
     Args:
         folder: Of the dataset.
-        backends: Two of its engines, the left one first; by default its first two.
-        quantity: Of `QUANTITIES`; by default the site's, else the joint angles'.
-        tolerances: By kind, instead of ours [SI].
-        fit: The parameters to fit; by default the one that the gap is most sensitive to.
-        varied: Whether the left side keeps the model's own value of it ("right") or both have the
-            same ("both"). By default "right" of an option of the model: that is what one does who
-            tunes one simulator to another.
-        floor_cells: How many cells may be run for the chaos floor.
-        run: Whether anything may be run.
-        menagerie: Where the name of a model is looked up.
-        jobs: How many processes.
-        progress: Told the fraction that is done.
-
-    Returns:
-        what: The experiment; folder: of the dataset.
-        sides: The engines; versions: of what the dataset was made with.
-        parameters: What was varied, in the order of a setting's values; units: of each of them
-            that has one.
-        seeds: How many starts each setting has.
-        quantity: The one that the settings, the map, the indices and the fit are of.
-        quantities: Each that the dataset has, see `agreement_of`.
-        settings: Every point of the design, see `agreement_of`.
-        failed: How many cells failed, by the class of the error; missing: have not run.
-        floor: The chaos floor, see `floor_of`; None where it is not known, and no_floor says why.
-        map: The gap over one or two parameters, see `gap_map`; None where nothing is varied.
-        sensitivity: See there; None where the gap is the same everywhere, or nothing is varied.
-        together: For each parameter that was fitted, see `brought_together`.
-        ran: How many cells were run for this report.
-        agreed: In how many settings both sides agree at every seed.
-        scaled: The parameters whose values are times the model's own.
-        only_rounding: Whether every gap is inside the chaos floor, so that nothing has a cause to
-            look for.
+        quantity: A column of the dataset, or one number of it: "energy", "tip[2]". By default
+            "sample_tip" of two engines, "tip[2]" of one.
+        backends: One engine of the dataset, or two for the gap between them; by default all that
+            it has.
 
     Raises:
-        BadInputError: There is no dataset, or none of two engines.
-        UnknownNameError: No such backend, quantity or parameter.
+        BadInputError: There is no dataset, no cell has that quantity, or it is not one number.
+        UnknownNameError: The dataset has no such engine or quantity.
         MissingEngineError: A package is missing.
     """
     manifest = read_manifest(folder)
-    design = design_of(manifest)
-    sides = _sides(manifest["design"]["backends"], backends)
-    labels = [vary.label for vary in design.factors]
-    for name in fit:
-        check_name("parameter", name, labels)
-        numeric = design.factors[labels.index(name)].numeric
-        refuse((not numeric, f"{name} has no numbers that could be fitted"))
-    facts = facts_of(manifest, design.factors, sides, menagerie)
-    seeds, moments = manifest["design"]["seeds"], manifest["request"]["moments"]
-    data = sweep_data(read_cells(folder), design, sides, seeds, moments, facts.hinges)
-    main = next(iter(data.gaps)) if quantity is None else quantity
-    check_name("quantity", main, data.gaps)
-    runner, floor, no_floor = None, None, "nothing was to be run"
-    if run:
-        try:
-            runner = runner_of(manifest, data, facts.hinges, menagerie, jobs)
-        except StateMachineError as error:
-            no_floor = str(error)
-        else:
-            floor = floor_of(data, runner, floor_cells, part_of(progress, 0.0, 0.5))
-            no_floor = "" if floor else "no cell was to be run for it"
-    widths = {} if floor is None else floor._width
-    agreements = {
-        name: agreement_of(data, name, widths.get(name), facts, tolerances) for name in data.gaps
-    }
-    agreement, settings = agreements[main]
-    rounding = only_rounding(settings)
-    shares = None if rounding else sensitivity(data, data.gaps[main])
-    together = () if rounding and not fit else _together(
-        data, shares, agreement, widths.get(main), facts, fit, varied, runner,
-        part_of(progress, 0.5, 0.5),
-    )  # fmt: skip
-    return Figures(
+    design, seeds = design_of(manifest), int(manifest["design"]["seeds"])
+    sides = _backends(manifest["design"]["backends"], backends)
+    table = read_cells(folder)
+    asked = default_quantity(table, sides) if quantity is None else parse_quantity(quantity)
+    points = list(design.points())
+    cells = cell_values(table, asked, sides, [point.id for point in points], seeds)
+    if not np.isfinite(cells.values).any():
+        both = "both " if len(sides) > 1 else ""
+        raise BadInputError(
+            f"no setting of this sweep has {asked} on {both}{' and '.join(sides)}; of cells that "
+            "failed, the column error says why"
+        )
+    shares = main_effects(design, cells.values, cells.rounding)
+    found = [
+        MainEffect(label, shares.shares[label], shares.errors[label]) for label in shares.shares
+    ]
+    found.sort(key=_share_or_less, reverse=True)
+    return SweepEffects(
         what=manifest["request"]["what"],
         folder=str(folder),
-        sides=sides,
         versions={name: manifest["versions"].get(name, "") for name in ("statemachine", *sides)},
-        parameters=tuple(labels),
-        units={label: unit for label, unit in facts.units.items() if unit},
+        backends=sides,
+        quantity=str(asked),
+        unit=asked.unit,
+        parameters=tuple(shares.shares),
+        units={vary.label: vary.unit_on() for vary in design.factors if vary.unit_on()},
+        scaled=tuple(vary.label for vary in design.factors if vary.times),
         seeds=seeds,
-        quantity=agreement,
-        quantities=tuple(agreement for agreement, _ in agreements.values()),
-        settings=settings,
-        failed=data.failed,
-        missing=data.missing,
-        floor=floor,
-        no_floor=no_floor,
-        map=gap_map(data, main, widths.get(main), shares),
-        sensitivity=shares,
-        together=together,
-        ran=(floor.cells if floor else 0) + sum(fit.cells for fit in together),
-        agreed=agreement.counts.get("agrees", 0),
-        scaled=frozenset(vary.label for vary in design.factors if vary.times),
-        only_rounding=rounding,
+        effects=tuple(found),
+        why_none=shares.why_none,
+        mean=shares.mean,
+        deviation=shares.deviation,
+        largest=_largest(cells.values, [point.values for point in points]),
+        settings=shares.settings,
+        left_out=len(points) - shares.settings,
+        left_out_values=shares.left_out,
+        failed=cells.failed,
+        missing=cells.missing,
     )
 
 
-def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
-    """The two engines that are compared."""
+def _share_or_less(effect: MainEffect) -> float:
+    """Return the share of an effect, and less than any where there is none."""
+    return -1.0 if effect.share is None else effect.share
+
+
+def _largest(values: Array, settings: Sequence[tuple[Value, ...]]) -> LargestCell:
+    """Return the cell with the largest of values (p, s), at p settings."""
+    place, seed = divmod(int(np.nanargmax(values)), values.shape[1])
+    return LargestCell(float(values[place, seed]), settings[place], seed)
+
+
+def _backends(there: Sequence[str], asked: Sequence[str]) -> tuple[str, ...]:
+    """Return the engine, or the two engines, that a report is about.
+
+    Raises:
+        UnknownNameError: The sweep has no such engine.
+        BadInputError: They are more than two.
+    """
     for name in asked:
         check_name("backend of this sweep", name, there)
-    chosen = list(dict.fromkeys(asked or there[:2]))
-    refuse(
-        (
-            len(there) > 2 != len(chosen),
-            f"a report is of two engines; this sweep has {listed(list(there))}: name two with "
-            "--backend",
-        ),
-        (len(chosen) != 2, f"a report is of two engines; got {listed(chosen)} alone"),
-    )
-    return chosen[0], chosen[1]
-
-
-def _together(
-    data: SweepData,
-    shares: Figures | None,
-    agreement: Figures,
-    width: Array | None,
-    facts: ModelFacts,
-    asked: Sequence[str],
-    varied: Varied | None,
-    runner: CellRunner | None,
-    progress: Progress,
-) -> tuple[Figures, ...]:
-    """The fit of each parameter that is asked for, else of the one that counts most."""
-    chosen = [vary for vary in data.design.factors if vary.label in asked]
-    if not asked:  # not the timestep, which is not a property of the robot
-        chosen = [
-            vary
-            for vary in ranked(data.design, shares)
-            if vary.numeric
-            and vary.name not in ("timestep", "substeps")
-            and (vary.bounds is not None or len(vary.values) >= 3)
-        ][:1]
-    floors = [] if width is None else width[np.isfinite(width)]
-    good = max(agreement.tolerance, float(np.median(floors)) if len(floors) else 0.0)
-    return tuple(
-        brought_together(
-            data, vary, agreement.name, good,
-            varied=varied or ("right" if vary.kind == "option" else "both"),
-            own=facts.own.get(vary.label), runner=runner,
-            progress=part_of(progress, k / len(chosen), 1 / len(chosen)),
+    chosen = tuple(dict.fromkeys(asked or there))
+    if len(chosen) > 2:
+        raise BadInputError(
+            f"a report is of one engine, or of the gap between two; got {listed(list(chosen))}: "
+            "name one or two with --backend"
         )
-        for k, vary in enumerate(chosen)
-    )  # fmt: skip
+    return chosen

@@ -264,16 +264,12 @@ class Design:
 
     Attributes:
         factors: What is varied; none for the experiment as it is.
-        samples: How many points of the ranges are drawn; for indices, in each block.
-        indices: Whether the samples are those of first-order and total Sobol indices (A. Saltelli
-            et al., Computer Physics Communications 181, 2010): a block A, a block B, and for each
-            range a block of A with that one from B.
+        samples: How many points of the ranges are drawn.
         seed: Of the scrambling of the Sobol sequence.
     """
 
     factors: tuple[Vary, ...] = ()
     samples: int = 0
-    indices: bool = False
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -287,9 +283,8 @@ class Design:
                 self.samples and not ranges,
                 "--samples is of ranges, NAME=from:to, and none is varied",
             ),
-            (self.indices and not ranges, "--indices wants ranges, NAME=from:to, and --samples"),
             (
-                len(ranges) * (1 + self.indices) > _DIMENSIONS,
+                len(ranges) > _DIMENSIONS,
                 f"{len(ranges)} ranges are more than can be sampled",
             ),
         )
@@ -307,8 +302,7 @@ class Design:
     @property
     def size(self) -> int:
         """Number of points; it may be too large for `len`."""
-        blocks = len(self.sampled) + 2 if self.indices else 1
-        count = blocks * self.samples if self.sampled else 1
+        count = self.samples if self.sampled else 1
         return count * math.prod(len(vary.values) for vary in self.listed)
 
     def points(self) -> Iterator[Figures]:
@@ -319,23 +313,18 @@ class Design:
             values: One for each `Vary`, in their order.
         """
         names = [vary.label for vary in self.factors]
-        for drawn in map(iter, self._drawn()):
+        for sample in self.sample_values().tolist():
+            drawn = iter(sample)
             choices = [vary.values or (next(drawn),) for vary in self.factors]
             for values in itertools.product(*choices):
                 yield Figures(id=digest(dict(zip(names, values, strict=True))), values=values)
 
-    def _drawn(self) -> list[list[Value]]:
-        """The values of each sample, block by block; one without any where nothing is sampled."""
-        width = len(self.sampled)
-        if not width:
-            return [[]]
-        unit = _sobol(width * (1 + self.indices), self.samples, self.seed)
+    def sample_values(self) -> Array:
+        """Return the values (n, r) of n samples of the r ranges; (1, 0) where there is no range."""
+        if not self.sampled:
+            return np.empty((1, 0))
         low, high = np.array([vary.bounds for vary in self.sampled]).T
-        blocks = [unit[:, :width]]
-        if self.indices:
-            a, b = unit[:, :width], unit[:, width:]
-            blocks = [a, b, *(np.where(np.arange(width) == k, b, a) for k in range(width))]
-        return (low + (high - low) * np.concatenate(blocks)).tolist()
+        return low + (high - low) * _sobol(len(self.sampled), self.samples, self.seed)
 
 
 def _sobol(width: int, count: int, seed: int) -> Array:

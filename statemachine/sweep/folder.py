@@ -156,7 +156,7 @@ def design_of(manifest: Mapping[str, Any]) -> Design:
         for factor in manifest["factors"]
     ]
     varied = tuple(Vary(**factor) for factor in factors)
-    return Design(varied, design["samples"], design["indices"], design["design_seed"])
+    return Design(varied, design["samples"], design["design_seed"])
 
 
 def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> None:

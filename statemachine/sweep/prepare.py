@@ -89,14 +89,10 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     models, backends, said = _loaded(sweep, [*places.values()], given)
     options = dict.fromkeys(name for model in models for name in model.capabilities.options)
     factors = with_kinds(typed, options, [name for name in parameters if name != "seed"])
-    design = Design(factors, sweep.samples, sweep.indices, sweep.design_seed)
+    design = Design(factors, sweep.samples, sweep.design_seed)
     cells = design.size * sweep.seeds * len(backends)
     no_power = sweep.samples & (sweep.samples - 1)
     refuse(
-        (
-            no_power and sweep.indices,
-            f"--indices wants a power of two of --samples; got {sweep.samples}",
-        ),
         (
             cells > _MOST,
             f"{cells:.3g} cells are more than a sweep can hold, which is {_MOST:,}: vary less, or "

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..compare.perturbed import Uncertainty, displaced
-from ..errors import BadInputError, StateMachineError, check_name
+from ..errors import BadInputError, check_name
 from ..interface import Array, JointType, Model
 from ..interface.options import index_of
 from ..interface.records import Defaults
@@ -22,11 +22,11 @@ from ..typed_numbers import is_count
 from .design import Design, Value, Vary, digest
 from .rows import columns_of
 
-MANIFEST_VERSION = 3
+MANIFEST_VERSION = 4
 # What a dataset is of, beside the experiment: cells of other values are of another sweep.
 REQUEST = ("model", "seconds", "every", "keyframe", "defaults", "spread", "moments")
 # What it may grow by.
-DESIGN = ("vary", "seeds", "samples", "indices", "design_seed")
+DESIGN = ("vary", "seeds", "samples", "design_seed")
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,6 @@ class Sweep:
         seeds: How many: 0, 1, …; seed 0 starts where the experiment does, and each other one
             nearby (`spread`).
         samples: Points that are drawn of ranges NAME=from:to.
-        indices: Whether they are those of Sobol indices; see `Design`.
         design_seed: Of what is drawn for that.
         model: Instead of the experiment's own; menagerie: where its name is looked up.
         menagerie: See model.
@@ -58,7 +57,6 @@ class Sweep:
     backends: Sequence[str] = ("all",)
     seeds: int = 1
     samples: int = 0
-    indices: bool = False
     design_seed: int = 0
     model: str | None = None
     menagerie: str | None = None
@@ -100,18 +98,16 @@ class SweepCell:
     Attributes:
         id: A digest of point, seed and backend.
         point: The digest of the values.
-        values: One for each factor of the sweep; None is the model's own.
+        values: One for each factor of the sweep.
         seed: What is drawn from; 0 draws no start.
         backend: The engine.
-        nudge: What a change of start and commands by rounding is drawn from; 0 for none.
     """
 
     id: str
     point: str
-    values: tuple[Value | None, ...]
+    values: tuple[Value, ...]
     seed: int
     backend: str
-    nudge: int = 0
 
 
 @dataclass(frozen=True)
@@ -245,20 +241,6 @@ def _place(model: Model, vary: Vary, owner: str, length: int) -> int:
         return index_of(owner, vary.place, getattr(model, f"{owner}_names"))
     check_name("axis", vary.place, _AXES)
     return _AXES.index(vary.place)
-
-
-def own_value(vary: Vary, model: Model) -> float | None:
-    """The value of an option that a model has itself; None if its parts have several."""
-    if vary.kind != "option" or not vary.numeric:
-        return None
-    if vary.times:
-        return 1.0
-    try:
-        own, place = _own(model, vary)
-    except StateMachineError:
-        return None
-    values = np.atleast_1d(own if place is None else own[place])
-    return float(values[0]) if len(values) and not np.ptp(values) else None
 
 
 def start_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> tuple[dict[int, float], ...]:

@@ -22,7 +22,6 @@ import numpy as np
 
 from .. import __version__
 from ..backends import load_to_run, on_default
-from ..compare.perturbed import nudged_controller, nudged_start
 from ..errors import BadInputError, StateMachineError, TimedOutError, one_line
 from ..installed import DEFAULT, silence
 from ..interface import Array, Data, Model, forward, make_data, reset
@@ -156,7 +155,7 @@ def _model(
     chosen |= {vary.name: value for vary, value in ready.settings(cell, "parameter")}
     scenario = sweep.scenario(chosen)
     name = next((value for _, value in ready.settings(cell, "model")), next(iter(ready.files)))
-    varied = [(v, value) for v, value in ready.settings(cell, "option") if value is not None]
+    varied = ready.settings(cell, "option")
     # A switch may be what lets an engine take the file at all: `load` is told.
     switches = {v.name: value for v, value in varied if isinstance(value, bool)}
     first = {**scenario.options, **switches}
@@ -257,10 +256,6 @@ def _run(
         for values, start in zip((qpos, qvel), starts, strict=True):
             values[list(start)] = list(start.values())
         qpos[:] = drawn_start(model, qpos, ready.spread, cell.seed)
-        if cell.nudge:
-            draw = np.random.default_rng([cell.nudge, cell.seed])
-            qpos[:], qvel[:] = nudged_start(model, qpos, qvel, draw)
-            controller = nudged_controller(controller, draw)
         at_start = qpos.copy(), qvel.copy()
         try:
             for k, (began, now) in enumerate(pairwise(drive(model, data, controller, total)), 1):

@@ -24,7 +24,6 @@ from ...page import (
     Code,
     Heading,
     Headline,
-    HeatMap,
     Interactive,
     Items,
     Section,
@@ -87,13 +86,13 @@ def _block(block: Block, stage: Html, level: int) -> Html:
             return quantity_row(block)
         case Interactive():
             return stage
-        case HeatMap() | Bars() | Traces():
+        case Bars() | Traces():
             return _picture(block)
         case _:
             return Html("")
 
 
-def _picture(picture: HeatMap | Bars | Traces) -> Html:
+def _picture(picture: Bars | Traces) -> Html:
     """What matplotlib draws, as an image within the page; nothing where it is not installed."""
     source = inline(picture)
     image = tag("img", src=source, alt=picture.title)
