@@ -193,12 +193,6 @@ ENGINE = (
     f"{DEFAULT})",
     {"action": "append"},
 )
-DEFAULTS = (
-    "--defaults",
-    None,
-    "engine: each engine as its own users meet it (default model)",
-    {"default": "model", "choices": ("model", "engine")},
-)
 SIDES = ("left", "right")
 PARTS = ("actuators", "floor")  # of a file, that another side can have, too
 JOBS = ("--jobs", "N", "parallel processes (default: one a processor)")

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from ._common import (
-    DEFAULTS,
     JOBS,
     NEEDS,
     REPEATED,
@@ -102,7 +101,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             "engines, tip[2] of one)",
         ),
     )
-    add_table(parser, DEFAULTS, *menagerie(), json_of("summary, or the report,"))
+    add_table(parser, *menagerie(), json_of("summary, or the report,"))
     add_rules(parser, ("quantity", NEEDS, "report"))
     shorten_help(
         parser,

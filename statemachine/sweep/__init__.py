@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..backends import parse_backend
 from ..errors import BadInputError, WorkerEndedError, refuse
 from ..installed import require_extra
 from ..page import Figures
@@ -164,7 +165,10 @@ def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Itera
 
     def of(backend: str) -> Iterator[Batch]:
         most = math.ceil((len(ready) - len(known)) / (_TASKS * jobs * len(ready.backends)))
-        size = min(_MOST, max(1, int(_BATCH / max(1e-6, ready.cost.get(backend, _BATCH)))))
+        size = min(
+            _MOST,
+            max(1, int(_BATCH / max(1e-6, ready.cost.get(parse_backend(backend).name, _BATCH)))),
+        )
         cells = (cell for cell in ready.cells(backend) if cell.id not in known)
         while batch := list(itertools.islice(cells, max(1, min(size, most)))):
             yield batch

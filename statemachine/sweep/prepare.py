@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..backends import backend_names, check_backend
+from ..backends import backend_names, parse_backend
 from ..backends.starts import overlap_warning, places_in
 from ..compare.perturbed import EXACT, parse_uncertainty
 from ..errors import MissingEngineError, StateMachineError, refuse
@@ -142,7 +142,7 @@ def _loaded(
     asked = list(dict.fromkeys(sweep.backends))
     for name in asked:
         if name != "all":
-            check_backend("backend", name)
+            parse_backend(name)
     models: list[Model] = []
     said: list[str] = []
     here: list[str] = []

@@ -13,7 +13,6 @@ from ..compare.perturbed import Uncertainty, displaced
 from ..errors import BadInputError, check_name
 from ..interface import Array, JointType, Model
 from ..interface.options import index_of
-from ..interface.records import Defaults
 from ..measures.text import command
 from ..runs.controllers import function_scenario, is_function
 from ..runs.robot import scalar_joint
@@ -24,7 +23,7 @@ from .rows import columns_of
 
 MANIFEST_VERSION = 4
 # What a dataset is of, beside the experiment: cells of other values are of another sweep.
-REQUEST = ("model", "seconds", "every", "keyframe", "defaults", "spread", "moments")
+REQUEST = ("model", "seconds", "every", "keyframe", "spread", "moments")
 # What it may grow by.
 DESIGN = ("vary", "seeds", "samples", "design_seed")
 
@@ -36,7 +35,7 @@ class Sweep:
     Attributes:
         what: An experiment, or FILE.py:FUNCTION, called as function(model, data, …).
         vary: Words like "timestep=0.001,0.005", "mass=0.8x:1.2x:5", "qpos[elbow_flex]=0:1".
-        backends: Names; ("all",) for every one whose engine is here.
+        backends: As `parse_backend` reads them; ("all",) for every one whose engine is here.
         seeds: How many: 0, 1, …; seed 0 starts where the experiment does, and each other one
             nearby (`spread`).
         samples: Points that are drawn of ranges NAME=from:to.
@@ -46,7 +45,6 @@ class Sweep:
         seconds: Instead of the experiment's own time [s].
         every: Steps for which what the function returns holds.
         keyframe: Where a function starts.
-        defaults: What `load` is given.
         spread: How far a seed puts the start away, as "1deg,1mm"; "0" for not at all.
         moments: How many moments of each run are kept.
         timeout: What a cell may take on the clock [s].
@@ -63,7 +61,6 @@ class Sweep:
     seconds: float | None = None
     every: int = 1
     keyframe: str | None = None
-    defaults: Defaults = "model"
     spread: str = "1deg,1mm"
     moments: int = 20
     timeout: float = 600.0

@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote, unquote
 
 from ..errors import BadInputError
 from ..installed import require_extra
@@ -129,7 +130,7 @@ class RowWriter:
         """Write what waits."""
         arrow, _ = require_parquet()
         for backend, rows in list(self._waiting.items()):
-            folder = self._folder / f"backend={backend}"
+            folder = self._folder / f"backend={quote(backend, safe='=')}"
             folder.mkdir(parents=True, exist_ok=True)
             table = arrow.Table.from_pylist(rows, schema=self._schema).sort_by("cell")
             _write(folder / f"part-{time.time_ns()}.parquet", table)
@@ -220,7 +221,7 @@ def read_cells(folder: str | Path) -> Any:
     tables: list[Any] = []
     for part in _parts(Path(folder)):
         table = _read(part)
-        backend = part.parent.name.partition("=")[2]
+        backend = unquote(part.parent.name.partition("=")[2])
         names = arrow.repeat(arrow.scalar(backend, arrow.string()), table.num_rows)
         tables.append(table.append_column("backend", names))
         if not tables[0].schema.equals(tables[-1].schema):

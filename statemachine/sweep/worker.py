@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .. import __version__
-from ..backends import load_to_run, on_default
+from ..backends import load_to_run, on_default, parse_backend
 from ..errors import BadInputError, StateMachineError, TimedOutError, one_line
 from ..installed import DEFAULT, silence
 from ..interface import Array, Data, Model, forward, make_data, reset
@@ -181,8 +181,14 @@ def _model(
 
 def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, Any]) -> Model:
     """A model of a sweep as all of its cells load it."""
-    defaults, menagerie = sweep.defaults, sweep.menagerie
-    return load_to_run(place, backend=backend, defaults=defaults, menagerie=menagerie, **options)
+    chosen = parse_backend(backend)
+    return load_to_run(
+        place,
+        backend=chosen.name,
+        defaults=chosen.defaults,
+        menagerie=sweep.menagerie,
+        **options,
+    )
 
 
 _LATEST: dict[str, Any] = {}
@@ -280,9 +286,8 @@ def _run(
         states = np.array([at_start[0], qpos]), np.array([at_start[1], qvel])
         row["sample_tip"] = tips = _tips(model, data, samples)
         row["tip"] = tips[-1] if tips else None
-    both, _ = energies(
-        model, sweep.defaults, *states, options.get("gravity"), _on_default, _used_before
-    )
+    defaults = parse_backend(cell.backend).defaults
+    both, _ = energies(model, defaults, *states, options.get("gravity"), _on_default, _used_before)
     row["energy_start"], row["energy"] = map(known, both.sum(axis=1))
 
 
