@@ -25,7 +25,7 @@ from statemachine.robots.records import read_table
 from statemachine.runs import controllers, read
 from statemachine.sweep import read_manifest
 
-from .conftest import ROOT, Cli, refused, written
+from .conftest import ROOT, Cli, of_python, refused, written
 
 pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
 
@@ -313,3 +313,24 @@ def test_ctrl_c_at_any_time_prints_no_traceback_of_ours(
     starting = "statemachine" not in said and ("<frozen" in said or "runpy" in said)
     assert starting or "Traceback" not in said, said
     assert starting or process.returncode in (0, 130, -signal.SIGINT)
+
+
+_THREAD_TAKES_IT = """
+import os, signal, threading, time
+from statemachine.processes.signals import sigint_blocked
+
+threading.Thread(target=time.sleep, args=(30,), daemon=True).start()
+try:
+    with sigint_blocked():
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.1)
+        print("held")
+    print("lost")
+except KeyboardInterrupt:
+    print("raised")
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no masks of signals")
+def test_a_ctrl_c_is_held_back_though_another_thread_takes_it() -> None:
+    assert of_python("-c", _THREAD_TAKES_IT, code=0).stdout.split() == ["held", "raised"]
