@@ -1,0 +1,47 @@
+"""What users can type is in `surface.toml`: a new option or name is a decision, and seen there."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from collections.abc import Iterator
+
+import pytest
+
+import statemachine as sm
+from statemachine import cli
+from statemachine.interface import OPTIONS
+
+from .conftest import ROOT
+
+SURFACE = tomllib.loads((ROOT / "surface.toml").read_text("utf-8"))
+
+
+def options_of(parser: argparse.ArgumentParser) -> Iterator[str]:
+    """Give the options of a parser and of those below it, hidden ones too."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                yield from options_of(below)
+        elif action.option_strings:
+            yield max(action.option_strings, key=len)
+
+
+def test_the_commands_are_those_of_the_surface() -> None:
+    assert list(SURFACE["options"]) == sorted(cli.COMMANDS)
+
+
+@pytest.mark.parametrize("command", SURFACE["options"])
+def test_a_command_has_as_many_options_as_the_surface_says(command: str) -> None:
+    parser = cli._parser([command])
+    (commands,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    names = {*options_of(commands.choices[command])} - {"--help", "--help-all"}
+    assert len(names) == SURFACE["options"][command], sorted(names)
+
+
+def test_a_side_has_as_many_options_as_the_surface_says() -> None:
+    assert len(OPTIONS) == SURFACE["side"]["options"], OPTIONS
+
+
+def test_the_public_names_are_those_of_the_surface() -> None:
+    assert SURFACE["names"]["public"] == sorted(dir(sm))
