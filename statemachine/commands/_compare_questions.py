@@ -228,7 +228,6 @@ OF_MODELS: tuple[Row, ...] = (
         {"nargs": "*"},
     ),
     ("--frame", "LEFT=RIGHT", "a frame of the left and what the right calls it", REPEATED),
-    ("--digits", "N", "equal means to so many digits (6)"),
     ("--all", "", "a row for every figure that differs"),
 )
 
@@ -242,7 +241,6 @@ def run_models(options: argparse.Namespace) -> int:
     from ..runs.controllers import is_function
     from ..runs.scenarios import SCENARIOS
 
-    digits = 6 if options.digits is None else options.digits
     refuse(
         (
             any(word in SCENARIOS or is_trace(word) or is_function(word) for word in options.what),
@@ -250,7 +248,6 @@ def run_models(options: argparse.Namespace) -> int:
             f"{' '.join(options.what[1:] or ['LEFT', 'RIGHT'])}; to run something, type "
             f"{PROGRAM} compare {' '.join([*options.what, *options.models])}",
         ),
-        (not 1 <= digits <= 17, f"--digits wants a number from 1 to 17; got {digits}"),
         (options.seed < 0, f"--seed must not be negative; got {options.seed}"),
     )
     words = [*options.what, *options.models]
@@ -283,7 +280,6 @@ def run_models(options: argparse.Namespace) -> int:
             engines=(engines[0], engines[1]),
             frames=pairs_of(options.frame, "--frame"),
             rename=pairs_of(options.map, "--map"),
-            digits=digits,
             seed=options.seed,
             menagerie=options.menagerie,
         )

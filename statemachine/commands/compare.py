@@ -145,7 +145,7 @@ RULES: tuple[Rule, ...] = (
     ("measure finer budget jobs", NEEDS, "why"),
     ("quantity", NEEDS, "why html"),
     ("no_why", NEEDS, "html"),
-    ("frame all digits", NEEDS, "models"),
+    ("frame all", NEEDS, "models"),
     ("uncertainty", EXCLUDES, "no_chaos"),
     ("one_step converge", EXCLUDES, "why html plot film models uncertainty tolerance"),
     ("versions", EXCLUDES, "why html film models uncertainty backend"),
