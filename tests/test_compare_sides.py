@@ -151,6 +151,7 @@ def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
     ("words", "says"),
     [
         (["so101@mujco"], "no backend named 'mujco'.*Did you mean 'mujoco'"),
+        (["so101@pybullet:engin"], "way to load a file on pybullet.*Did you mean 'engine'"),
         (["so101", "timstep=1"], "no option named 'timstep'.*Did you mean 'timestep'"),
         (["timestep=1", "so101"], "timestep=1 stands before any side"),
         (["so101", "timestep="], "timestep= has no value"),

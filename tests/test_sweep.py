@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -21,7 +22,12 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.errors import BadInputError, MissingEngineError, StateMachineError
+from statemachine.errors import (
+    BadInputError,
+    EngineWarning,
+    MissingEngineError,
+    StateMachineError,
+)
 from statemachine.runs import record_scenario
 from statemachine.runs.scenarios import scenario
 from statemachine.sweep import (
@@ -101,6 +107,21 @@ def in_process(sweep: Sweep) -> list[dict[str, Any]]:
 def values(folder: Path) -> Any:
     """The dataset, without what is measured."""
     return read_cells(folder).drop_columns(["wall_seconds"])
+
+
+@pytest.mark.usefixtures("bullet")
+def test_an_engine_as_it_comes_is_a_backend_of_a_sweep(tmp_path: Path) -> None:
+    """Its cells are those of `load(defaults="engine")`, in a folder that Windows takes, too."""
+    engines = ("pybullet", "pybullet:engine")
+    folder = tmp_path / "cells"
+    with warnings.catch_warnings(action="ignore", category=EngineWarning):  # of what is dropped
+        run_sweep(small("hold", backends=engines), folder, jobs=1)
+        model = sm.load("so101", backend="pybullet", defaults="engine")
+    alone = record_scenario(dataclasses.replace(scenario("hold"), seconds=0.05), model)
+    rows = {row["backend"]: row["qpos"] for row in read_cells(folder).to_pylist()}
+    assert rows.keys() == set(engines)
+    assert rows["pybullet:engine"] == alone.qpos[-1].tolist() != rows["pybullet"]
+    assert not [path for path in folder.rglob("*") if ":" in path.name]
 
 
 def test_the_guide_lists_the_columns() -> None:

@@ -146,7 +146,10 @@ def effects(
     return SweepEffects(
         what=manifest["request"]["what"],
         folder=str(folder),
-        versions={name: manifest["versions"].get(name, "") for name in ("statemachine", *sides)},
+        versions={
+            name: manifest["versions"].get(name.removesuffix(":engine"), "")
+            for name in ("statemachine", *sides)
+        },
         backends=sides,
         quantity=str(asked),
         unit=asked.unit,
