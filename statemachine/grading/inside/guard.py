@@ -24,8 +24,8 @@ from ...models import models_dir
 
 # What a student's code may import of this package, beside its top.
 PUBLIC = (
-    "backends", "compare", "conformance", "errors", "interface", "kinematics", "models",
-    "rotations", "runs", "worlds",
+    "backends", "compare", "conformance", "errors", "freshness", "interface", "kinematics",
+    "models", "rotations", "runs", "worlds",
 )  # fmt: skip
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
