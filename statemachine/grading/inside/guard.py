@@ -24,13 +24,13 @@ from ...models import models_dir
 
 # What a student's code may import of this package, beside its top.
 PUBLIC = (
-    "backends", "compare", "conformance", "errors", "freshness", "interface", "kinematics",
-    "models", "rotations", "runs", "worlds",
+    "backends", "compare", "conformance", "errors", "interface", "kinematics", "models",
+    "rotations", "runs", "worlds",
 )  # fmt: skip
 # What these stand on: the floors below `grading`, and the models inside a wheel.
 ROOMS = (
-    *PUBLIC, "_models", "drawing", "engines", "installed", "measures", "model_files", "page",
-    "probes", "processes", "releases", "typed_numbers", "witness",
+    *PUBLIC, "_models", "drawing", "engines", "freshness", "installed", "measures", "model_files",
+    "page", "probes", "processes", "releases", "typed_numbers", "witness",
 )  # fmt: skip
 
 _PROCESS, _PROGRAM = "it starts another process", "it starts another program"
