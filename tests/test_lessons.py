@@ -817,7 +817,7 @@ def test_what_follows_the_path_is_shown_a_screenful_at_a_time(
 ) -> None:
     prompts: list[str] = []
     monkeypatch.setattr("builtins.input", lambda prompt: prompts.append(prompt) or "")
-    monkeypatch.setattr(shutil, "get_terminal_size", lambda: os.terminal_size((80, 24)))
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda **_: os.terminal_size((80, 24)))
     assert main(["lesson", "--from", "speed"]) == 0
     said = capsys.readouterr().out
     assert said.index("The fingertip, and an independent witness") < said.index("Where to go next")
