@@ -23,8 +23,8 @@ from .cases import HERE, MODELS, PAIRS, Case, of_model, of_pair
 from .figures import Figures, curve, differences, of_output
 
 KEPT = HERE / "figures"
-# In `make test`: about half a minute.
-QUICK = ("engines", "inverted pendulum", "pair damping", "pair contact, radius", "worlds")
+# In `make test`.
+QUICK = ("engines", "pair damping", "pair contact, radius", "worlds")
 _BACKENDS = ("mujoco", "pybullet")
 
 

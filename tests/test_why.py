@@ -474,7 +474,8 @@ def explanations() -> dict[tuple[str, str], Explanation]:
     for name, defaults in product(("hold", "gravity", "box"), ("model", "engine")):
         experiment = scenario(name)
         one, two = sm.load(experiment.model), quietly(experiment.model, defaults=defaults)
-        results[name, defaults] = explain(one, two, experiment, uncertain=None)
+        # What is tested holds of few drawn orders as of many.
+        results[name, defaults] = explain(one, two, experiment, uncertain=None, budget=40)
     return results
 
 
@@ -541,7 +542,7 @@ def test_pages_fit_and_say_what_was_found(explanations: Any) -> None:
 def test_the_two_ways_to_have_pybullet_end_in_the_same_bits() -> None:
     one, two = quietly("so101/scene"), quietly("so101/scene", defaults="engine")
     for sides in ((one, two), (two, one)):
-        result = explain(*sides, HOLD, uncertain=None)
+        result = explain(*sides, HOLD, uncertain=None, budget=20)
         assert result.gap > 0.1
         assert result.brought == 0.0
 
