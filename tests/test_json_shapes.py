@@ -20,7 +20,7 @@ from .conftest import QUICK, ROOT, need_engine, of_python
 
 TABLE = Path(__file__).with_suffix(".json")
 MAY_BE_NULL = {"data_bytes", "world_bytes"}  # memory grows by pages, and freed ones are used again
-ITSELF = "--backends mujoco mujoco --seconds 0.2"
+ITSELF = "--backend mujoco --backend mujoco --seconds 0.2"
 COMMANDS = [
     *(shlex.join(("lesson", name, *QUICK.get(name, ()))) for name in LESSONS),
     "doctor",

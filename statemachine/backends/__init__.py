@@ -19,6 +19,7 @@ from typing import Any, Protocol, cast
 from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
+from ..interface.options import as_switch
 from ..interface.records import Defaults
 from ..model_files import checked_file
 from ..models import AnyPath
@@ -189,10 +190,16 @@ def load(
         ModelFileError: The file is not there.
         ModelError: The engine cannot read the file, or it is a binary model that is not trusted.
     """
+    if isinstance(backend, str) and backend.endswith(":engine"):
+        name = backend.removesuffix(":engine")
+        raise BadInputError(
+            f'{backend!r} is typed on the command line; here it is backend="{name}", '
+            'defaults="engine"'
+        )
     place = _find(backend)
     check_name("defaults", defaults, ("model", "engine"))
     path = checked_file(model, menagerie)
-    if trust_binary and is_binary(path):
+    if as_switch(trust_binary, "trust_binary") and is_binary(path):
         read_binary(path, trust=True)  # the loader knows its bytes then
     if backend in ENGINES:
         require(backend)

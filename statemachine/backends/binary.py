@@ -15,7 +15,7 @@ from ..errors import EngineWarning, ModelError
 from ..models import AnyPath
 
 SUFFIX = ".mjb"
-TRUST = "STATEMACHINE_TRUST_BINARY"  # set for a command and its children by --trust-binary
+TRUST = "STATEMACHINE_TRUST_BINARY"  # "1" for a command and its children, by --trust-binary
 # SHA-256 in hexadecimal digits: what works on a model that was loaded reads its file again.
 _trusted: set[str] = set()
 
@@ -43,7 +43,7 @@ def read_binary(path: AnyPath, trust: bool = False) -> bytes:
     digest = hashlib.sha256(content).hexdigest()
     if digest in _trusted:
         return content
-    if not (trust or os.environ.get(TRUST)):
+    if not (trust or os.environ.get(TRUST) == "1"):
         raise ModelError(
             f"{path} is a binary model, and a damaged one can crash or harm this process: load "
             "the XML it was made from, or, if you trust who made it, say trust_binary=True "

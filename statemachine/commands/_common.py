@@ -182,15 +182,15 @@ def add_table(parser: Any, *rows: Row) -> None:
 BACKEND = (
     "--backend",
     "NAME",
-    "mujoco, pybullet:engine (as its own users meet it) or a release, mujoco==3.3.7; all: those "
-    f"that are installed; may be repeated (default {DEFAULT})",
+    "mujoco, pybullet or a release, mujoco==3.3.7; pybullet:engine: as its own users meet it; all: "
+    f"those that are installed; may be repeated (default {DEFAULT})",
     {"action": "append"},
 )
 ENGINE = (
     "--backend",
     "NAME",
-    "mujoco, pybullet:engine (as its own users meet it) or a release, mujoco==3.3.7 (default "
-    f"{DEFAULT})",
+    "mujoco, pybullet or a release, mujoco==3.3.7; pybullet:engine: as its own users meet it "
+    f"(default {DEFAULT})",
     {"action": "append"},
 )
 SIDES = ("left", "right")

@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ..errors import StateMachineError
+from ..errors import BadInputError, StateMachineError
 from ..installed import PAIR
 from ._common import (
     JOBS,
@@ -274,6 +274,11 @@ def run_models(options: argparse.Namespace) -> int:
         )
     )
     files = [side.file for side in sides]
+    if engines[0] is not None and (files[0], engines[0]) == (files[1], engines[1]):
+        raise BadInputError(
+            f"both sides are what {engines[0]} itself makes of {files[0]}: name two engines, or "
+            "two files"
+        )
     with progress("compare"):
         result = compare(
             *files,

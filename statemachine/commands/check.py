@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
+from ..installed import DEFAULT
 from ._common import (
-    ENGINE,
     NEEDS,
     REPEATED,
     SAYS_NO,
@@ -44,7 +44,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             "class, each in the folder or in a folder of its own there",
             {"nargs": "*"},
         ),
-        ENGINE,
+        ("--backend", "NAME", f"mujoco or pybullet (default {DEFAULT})", {"action": "append"}),
         (
             "--time-limit",
             "S",

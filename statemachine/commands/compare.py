@@ -67,8 +67,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         (
             "--backend",
             "NAME",
-            "the left's engine, and once more the right's: mujoco, pybullet:engine (as its own "
-            "users meet it) or a release, mujoco==3.3.7 (default mujoco and pybullet)",
+            "the left's engine, and once more the right's: mujoco, pybullet, pybullet:engine (as "
+            "its own users meet it) or a release, mujoco==3.3.7 (default mujoco and pybullet)",
             {"action": "append"},
         ),
         *run_options(),

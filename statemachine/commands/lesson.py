@@ -12,15 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
+from ..installed import DEFAULT
 from ..lessons import BESIDE, LESSONS, PATH, Lesson
 from ..page import Heading
 from ._common import (
-    BACKEND,
     MISSING,
     PROGRAM,
     SAYS_NO,
     Row,
     add_table,
+    chosen_backends,
     complain,
     json_of,
     menagerie,
@@ -50,9 +51,18 @@ def add(parser: argparse.ArgumentParser) -> None:
         _add_lesson(named, lesson)
 
 
+_BACKEND = (
+    "--backend",
+    "NAME",
+    "mujoco, pybullet or a release, mujoco==3.3.7; all: those that are installed; may be repeated "
+    f"(default {DEFAULT})",
+    {"action": "append"},
+)
+
+
 def _shared() -> Iterator[Row]:
     """Options that come before a lesson's name or after it; the later one counts."""
-    yield from (BACKEND, *menagerie(), json_of())
+    yield from (_BACKEND, *menagerie(), json_of())
     yield "--calls", "", "show which of the engine's own functions the code made it run"
     yield "--no-questions", "", "do not ask for predictions, do not wait"
     yield "--record", "FILE", "keep your predictions in this file, with a score, to hand in"
@@ -214,6 +224,11 @@ def _compute(
     from ..lessons.pictures import with_picture
     from ..lessons.session import page_of_lesson, take
 
+    for backend in chosen_backends(options.backend):
+        if backend.defaults == "engine":
+            raise BadInputError(
+                f"lessons are about engines that keep the contract: type --backend {backend.name}"
+            )
     if options.json:
         values |= dict.fromkeys(lesson.more, True)
     taken = on_each_backend(

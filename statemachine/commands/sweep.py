@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from ..errors import BadInputError
 from ._common import (
     JOBS,
     NEEDS,
@@ -16,6 +17,7 @@ from ._common import (
     add_rules,
     add_table,
     complain,
+    flag_of,
     json_of,
     menagerie,
     model_of,
@@ -110,6 +112,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
 
 
+# Options that change what is run, or where.
+_OF_A_RUN = (
+    *("model", "vary", "seeds", "spread", "samples", "design_seed", "seconds", "keyframe", "every"),
+    *("moments", "timeout", "jobs", "scheduler", "extend"),
+)
+
+
 def run(options: argparse.Namespace) -> int:
     """Run what is missing, and say what there is, or what moves a quantity of it."""
     _check(options)
@@ -138,7 +147,12 @@ def run(options: argparse.Namespace) -> int:
     if not (options.report and options.json):
         show(words.summary_page(ready, summary), summary, options.json)
     if options.report:
-        answer, page = _report(options, out)
+        try:
+            answer, page = _report(options, out)
+        except BadInputError as error:
+            if not summary.failed:
+                raise
+            return complain(error, SAYS_NO)  # there is nothing that it could be about
         show(page, {"summary": summary, "report": answer}, options.json)
     return SAYS_NO if summary.failed else 0
 
@@ -159,6 +173,8 @@ def _check(options: argparse.Namespace) -> None:
     """
     runs = options.what is not None and options.out is not None
     there = options.report not in (None, True)
+    given = [name for name in _OF_A_RUN if getattr(options, name) != options.usual[name]]
+    named = {name for name in options.backend or () if name != "all"}
     refuse(
         (
             "" in (options.out, options.report),
@@ -180,7 +196,19 @@ def _check(options: argparse.Namespace) -> None:
             there and options.retry_failed,
             "--retry-failed is of a sweep that runs: say WHAT and --out DIR",
         ),
+        *(
+            (there and name in given, f"{flag_of(name)} is of a run, and --report DIR runs nothing")
+            for name in _OF_A_RUN
+        ),
+        (
+            options.report is not None and len(named) > 2,
+            "a report is of one engine, or of the gap between two: name one or two with --backend",
+        ),
     )
+    if options.quantity is not None:
+        from ..sweep.quantities import parse_quantity
+
+        parse_quantity(options.quantity)
 
 
 def _report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:

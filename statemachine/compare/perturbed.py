@@ -249,6 +249,8 @@ def nudged_controller(controller: Controller | None, draw: np.random.Generator) 
 
 
 _WINDOW = 0.025  # of the common time, to either side
+_LATER = 0.05  # of the common time, by which an event may come later in another run
+_SETTLED = 0.1  # of the common time, at its end
 _FIRST_TOUCH = ", first touch"
 
 
@@ -262,9 +264,8 @@ class Band:
         end: The width at the last moment.
         inside_from: The time from which on the gap between the two sides lies inside [s]; None if
             it does not at the end. Of a first touch 0 or None.
-        chance: Where the gap leaves its tolerance, whether rounding alone can make it: "beyond" if
-            at any such moment the gap is more than three times the width there; "inside" if at none
-            it reaches the width; "cannot be told" else. None of a quantity that agrees.
+        chance: Whether rounding alone can make a gap that leaves its tolerance, as
+            `_chance_of` tells; None of a quantity that agrees.
         width: (n,) at each moment that the sides have in common; (1,) of a first touch.
     """
 
@@ -492,16 +493,7 @@ def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Ban
     last = int(outside[-1]) + 1 if len(outside) else 0
     chance: Chance | None = None
     if agreement.verdict != "agrees":
-        beyond = ~(gap <= agreement.tolerance)  # what is not a number never agrees
-        found = {
-            against_floor(*pair)
-            for pair in zip(gap[beyond].tolist(), width[beyond].tolist(), strict=True)
-        }
-        chance = "inside"
-        if "beyond" in found:
-            chance = "beyond"
-        elif "cannot be told" in found:
-            chance = "cannot be told"
+        chance = _chance_of(gap, width, agreement.tolerance)
     return Band(
         name=agreement.name,
         kind=agreement.kind,
@@ -512,3 +504,33 @@ def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Ban
         chance=chance,
         width=width,
     )
+
+
+def _chance_of(gap: Array, width: Array, tolerance: float) -> Chance:
+    """Tell whether rounding alone can make a gap that leaves its tolerance.
+
+    Two things are held against three times the floor. The largest gap so far, at each moment,
+    against the largest width until a twentieth of the common time later: so a gap that was there
+    before the motion became chaotic counts, and an event that comes a little earlier in one run
+    does not. And the mean gap of the last tenth against the largest width there: a robot whose
+    servos pull it back forgets where it started, and what then remains is a difference.
+
+    Args:
+        gap: (n,) how far apart the sides are; not all within the tolerance.
+        width: (n,) of the band.
+        tolerance: In the same unit.
+    """
+    largest_gap = np.maximum.accumulate(np.nan_to_num(gap, nan=np.inf))
+    largest_width = np.maximum.accumulate(width)
+    later = min(round(_LATER * len(gap)), len(gap) - 1)
+    ahead = np.append(largest_width[later:], np.full(later, largest_width[-1]))
+    beyond = largest_gap > tolerance
+    pairs = list(zip(largest_gap[beyond].tolist(), ahead[beyond].tolist(), strict=True))
+    tail = slice(len(gap) - max(1, round(_SETTLED * len(gap))), None)
+    settled = float(gap[tail].mean())
+    if not settled <= tolerance:
+        pairs.append((settled, float(width[tail].max())))
+    found = {against_floor(*pair) for pair in pairs}
+    if "beyond" in found:
+        return "beyond"
+    return "cannot be told" if "cannot be told" in found else "inside"

@@ -372,7 +372,7 @@ def split_words(
     alone = len(sides) == 1 and sides[0].file == _split_options(rest[0])[0]
     other = next(name for name in reversed(PAIR) if not sides or name != sides[0].engine)
     another = [f"{side.file}@{other}" for side in sides if len(sides) == 1]
-    named = command(word for word in (*rest, *another) if "=" not in word)
+    named = command(word for word in (*rest, *another) if not _OPTION.fullmatch(word))
     run = ["hold" if is_side else what[0], *rest, *([] if alone else another)]
     typed = command(["statemachine", "compare", *run])
     refuse(

@@ -222,7 +222,10 @@ class Task:
             world = world_of(self.model, data, goal)
             shape = as_numbers(observe(world), "observe(world)").shape
             self.observation_space = Box(-HUGE, HUGE, shape, dtype=np.float64)
-            self.observation(world)
+            if outside(self.observation(world)):
+                raise BadInputError(
+                    f"observe(world) must be within ±{HUGE:.0e} where an episode starts"
+                )
             self.outcome(world)
             self.facts(world)
             self.start_poses = data.xpos.copy(), data.xquat.copy()
@@ -309,7 +312,12 @@ class Task:
         facts = self.info(world)
         if not isinstance(facts, dict):
             raise BadInputError(f"info(world) must return a dict; got {shown(facts)}")
-        return {**facts, "diverged": False}
+        # What a WorldView gave is the Data's own, which goes on.
+        own = {
+            name: fact.copy() if isinstance(fact, np.ndarray) else fact
+            for name, fact in facts.items()
+        }
+        return {**own, "diverged": False}
 
 
 def outside(observation: Array) -> bool:

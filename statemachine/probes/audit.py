@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import BadInputError, DivergedError
+from ..errors import BadInputError, DivergedError, shown
 from ..interface import Array, Data, Model, State, get_state, make_data, reset, set_state, step
 from ..interface.options import as_count
 from ..measures import JointPlaces, farthest, largest_or_inf, turns
@@ -147,9 +147,12 @@ def audit(model: Model, steps: int = 60, seed: int = 0) -> Audit:
         seed: Of the commands.
 
     Raises:
+        TypeError: `model` is no Model.
         BadInputError: `steps` or `seed` is invalid, or nothing in the model moves.
         DivergedError: The run does not stay finite.
     """
+    if not isinstance(model, Model):
+        raise TypeError(f"audit wants a Model; got {shown(model)}")
     steps = as_count(steps, "steps")
     if seed < 0:
         raise BadInputError(f"seed must not be negative; got {seed}")

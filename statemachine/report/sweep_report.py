@@ -9,6 +9,9 @@ from ..sweep.analysis import SweepEffects
 from . import template
 from .template import if_true, versions_of
 
+# Of a range that is sampled, in the sentence of what is missing to 1.
+_WITHIN = ", and what the quantity does within the classes into which samples are divided"
+
 
 def page(sweep: SweepEffects) -> Page:
     """Return the page of a report."""
@@ -45,6 +48,7 @@ def page(sweep: SweepEffects) -> Page:
         seed=sweep.largest.seed,
         table=table,
         shares=if_true(not sweep.why_none),
+        classes=_WITHIN if sweep.samples else "",
         no_error=if_true(not sweep.why_none and all(each.error is None for each in sweep.effects)),
         why_none=sweep.why_none or None,
         lost="; ".join([*failed, *missing]) or None,

@@ -21,7 +21,7 @@ from ..measures.text import listed
 from .design import Value
 from .folder import design_of, read_manifest
 from .main_effects import main_effects
-from .quantities import cell_values, default_quantity, parse_quantity
+from .quantities import CellValues, cell_values, default_quantity, parse_quantity
 from .rows import read_cells
 
 
@@ -71,6 +71,7 @@ class SweepEffects:
         units: The unit of each parameter that has one.
         scaled: The parameters whose values are times the model's own.
         seeds: How many starts each setting has; of its seeds the median counts.
+        samples: How many samples its ranges have; 0 without a range.
         effects: One for each parameter, the largest share first.
         why_none: Why no parameter has a share; "" where one has.
         mean: The mean over the settings that the shares are of, in the unit of the quantity.
@@ -94,6 +95,7 @@ class SweepEffects:
     units: Mapping[str, str]
     scaled: tuple[str, ...]
     seeds: int
+    samples: int
     effects: tuple[MainEffect, ...]
     why_none: str
     mean: float
@@ -107,7 +109,7 @@ class SweepEffects:
 
 
 def effects(
-    folder: str | Path, quantity: str | None = None, backends: Sequence[str] = ()
+    folder: str | Path, quantity: str | None = None, backends: str | Sequence[str] = ()
 ) -> SweepEffects:
     """Compute how much each parameter of a sweep moves a quantity, and where it is largest.
 
@@ -127,7 +129,8 @@ def effects(
     """
     manifest = read_manifest(folder)
     design, seeds = design_of(manifest), int(manifest["design"]["seeds"])
-    sides = _backends(manifest["design"]["backends"], backends)
+    asked_for = (backends,) if isinstance(backends, str) else backends
+    sides = _backends(manifest["design"]["backends"], asked_for)
     table = read_cells(folder)
     asked = default_quantity(table, sides) if quantity is None else parse_quantity(quantity)
     points = list(design.points())
@@ -135,8 +138,8 @@ def effects(
     if not np.isfinite(cells.values).any():
         both = "both " if len(sides) > 1 else ""
         raise BadInputError(
-            f"no setting of this sweep has {asked} on {both}{' and '.join(sides)}; of cells that "
-            "failed, the column error says why"
+            f"no setting of this sweep has {asked} on {both}{' and '.join(sides)}: "
+            f"{_why_nothing(cells)}"
         )
     shares = main_effects(design, cells.values, cells.rounding)
     found = [
@@ -157,6 +160,7 @@ def effects(
         units={vary.label: vary.unit_on() for vary in design.factors if vary.unit_on()},
         scaled=tuple(vary.label for vary in design.factors if vary.times),
         seeds=seeds,
+        samples=design.samples if design.sampled else 0,
         effects=tuple(found),
         why_none=shares.why_none,
         mean=shares.mean,
@@ -168,6 +172,16 @@ def effects(
         failed=cells.failed,
         missing=cells.missing,
     )
+
+
+def _why_nothing(cells: CellValues) -> str:
+    """Return why no cell has a value."""
+    failed = sum(cells.failed.values())
+    if failed:
+        return f"{failed} cells failed, and the column error says why"
+    if cells.missing:
+        return f"{cells.missing} cells have not run; the same command runs them"
+    return "the cells ran, and it came in none"
 
 
 def _share_or_less(effect: MainEffect) -> float:

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, check_name
+from ..errors import BadInputError, check_name, shown
 from ..interface import Array, Ints
 from .rows import COLUMNS, DONE, require_parquet
 
-_NAME = re.compile(r"(\w+)(?:\[(\d+)\])?")
+_NAME = re.compile(r"(\w+)(?:\[([0-9]+)\])?")
 _NUMBERS = ("int64", "double", "list<double>", "list<list<double>>")
 _NO_RESULT = ("seed", "sample_time")  # columns of numbers that say what was asked for
 _KINDS = {name: kind for name, kind, *_ in COLUMNS if kind in _NUMBERS and name not in _NO_RESULT}
@@ -72,7 +72,10 @@ def parse_quantity(text: str) -> SweepQuantity:
 
     Raises:
         UnknownNameError: The dataset has no such column of numbers.
+        BadInputError: It is no text.
     """
+    if not isinstance(text, str):
+        raise BadInputError(f"a quantity is a name, such as energy or tip[2]; got {shown(text)}")
     match = _NAME.fullmatch(text)
     column = match[1] if match else text
     check_name("quantity", column, _KINDS)
@@ -218,6 +221,8 @@ def _numbers(table: Any, quantity: SweepQuantity) -> Array:
         return numbers
     if not kind.startswith("list"):
         raise BadInputError(f"there is no {quantity}: {quantity.column} is one number")
+    if np.isnan(numbers).all():
+        return numbers[..., :1]  # nothing is there, of any index
     if quantity.index >= numbers.shape[-1]:
         raise BadInputError(
             f"there is no {quantity}: {quantity.column} has {numbers.shape[-1]} numbers, from 0"
