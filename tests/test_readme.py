@@ -102,6 +102,10 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
         words += ["--seconds", "1", "--port", "0"]
     if {"waves.npz", "played.npz", "my_controller.py"} & set(words):
         _make_traces(cli, tmp_path, words)
+    if words[:2] == ["sweep", "--report"]:  # of a sweep that the line before has made
+        made = COMMANDS[COMMANDS.index(command) - 1]
+        assert f"--out {words[2]}" in made
+        assert cli(*shlex.split(made)[1:]).returncode == 0
     done = of_python(*words) if command.startswith("python") else cli(*words)
     no = command in SAYS_NO or DIFFERS.match(command)
     assert done.returncode == (1 if no else 0), done.stderr
