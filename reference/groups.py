@@ -76,7 +76,7 @@ def _sweep() -> dict[str, Figures]:
     """A small sweep and what it says."""
     vary = ("--vary", "timestep=0.002,0.005", "--vary", "damping=0.5x:2x:3", "--seeds", "2")
     sweep = ("sweep", "hold", *vary, "--seconds", "0.5", "--out", "cells", "--jobs", "1", "--json")
-    report = ("sweep", "--report", "cells", "--jobs", "1", "--json")
+    report = ("sweep", "--report", "cells", "--json")
     return {"sweep": _of(Case("", "sweep", sweep)), "report": _of(Case("", "report", report))}
 
 

@@ -271,7 +271,7 @@ def test_a_report_is_of_the_gap_between_two_engines(tmp_path: Path) -> None:
     assert_in(
         text_of(answer),
         "Sweep of made up: the gap of sample_tip between mujoco and pybullet",
-        "largest at 6.00 mm, at seed 1",
+        "The largest of all runs is 6.00 mm, at seed 1",
         "x 0.90 – 4 y 0.10 – 1x",
         "it takes three seeds",
         "2 cells failed with DivergedError",
@@ -293,7 +293,7 @@ def test_a_report_is_of_a_quantity_on_one_engine(tmp_path: Path) -> None:
         {"x": 1.0, "model": 0.0}
     )
     assert_in(
-        text_of(answer), "Sweep of made up: max_qvel on mujoco", "largest at 8.00 rad/s or m/s",
+        text_of(answer), "Sweep of made up: max_qvel on mujoco", "The largest of all runs is 8.00 rad/s or m/s",
         "x 1.00 – 4 model 0.00 – a",
     )  # fmt: skip
 
