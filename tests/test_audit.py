@@ -32,6 +32,12 @@ def of_pybullet() -> Audit:
     return audit(sm.load(SCENE, backend="pybullet"))
 
 
+@pytest.mark.parametrize("wrong", [None, "so101"])
+def test_it_wants_a_model(wrong: Any) -> None:
+    with pytest.raises(TypeError, match="audit wants a Model"):
+        audit(wrong)
+
+
 def test_mujoco_needs_its_warm_start_in_contact(of_mujoco: Audit) -> None:
     """It shows in the first step, and is below a millionth."""
     parts = {part.name: part for part in of_mujoco.parts}

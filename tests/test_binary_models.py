@@ -12,7 +12,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends import binary
-from statemachine.errors import EngineWarning, ModelError
+from statemachine.errors import BadInputError, EngineWarning, ModelError
 
 from .conftest import Cli, after, in_its_own_python, need_engine, one_line, refused
 
@@ -56,6 +56,19 @@ def test_it_is_read_when_asked_and_said_once(strange: Path) -> None:
         assert sm.load(strange).nq == 6  # the same bytes, by what works on that model
     strange.write_bytes(strange.read_bytes() + b"\0")
     refused((ModelError, REFUSED, lambda: sm.load(strange)))
+
+
+@pytest.mark.parametrize("value", ["", "0", "no", "true"])
+def test_the_environment_trusts_by_one_value_alone(
+    strange: Path, value: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(binary.TRUST, value)
+    refused((ModelError, REFUSED, lambda: sm.load(strange)))
+
+
+def test_trust_is_true_or_false(strange: Path) -> None:
+    trust: Any = "False"
+    refused((BadInputError, "must be True or False", lambda: sm.load(strange, trust_binary=trust)))
 
 
 def test_trust_is_of_one_process(strange: Path) -> None:

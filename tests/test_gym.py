@@ -487,3 +487,19 @@ def test_seeds_may_be_an_array_of_numbers(tmp_path: Path) -> None:
         seeds: list[Any] = [[3, 4], np.array([3, 4])]
         listed, as_array = (envs.reset(seed=seed)[0] for seed in seeds)
         assert np.array_equal(listed, as_array)
+
+
+def test_what_info_gave_stays_as_it_was(tmp_path: Path) -> None:
+    """A view of a Data that goes on would have the last value everywhere."""
+    path = written(tmp_path / "cart.xml", mjcf(CART, PUSH))
+    given: dict[str, Any] = {**BALANCE, "info": lambda world: {"qpos": world.qpos}}
+    with closing(make_env(path, **given)) as env:
+        env.reset(seed=0)
+        told = [env.step(np.ones(1, dtype=np.float32))[4]["qpos"] for _ in range(3)]
+    assert not np.array_equal(told[0], told[2])
+
+
+def test_an_episode_starts_within_the_bounds(tmp_path: Path) -> None:
+    path = written(tmp_path / "cart.xml", mjcf(CART, PUSH))
+    given: dict[str, Any] = {**BALANCE, "observe": lambda _world: [1e11]}
+    refused((BadInputError, "within", lambda: make_env(path, **given)))

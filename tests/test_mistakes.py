@@ -275,6 +275,15 @@ def needed(command: str, request: pytest.FixtureRequest) -> None:
         ("view --seconds 0.1 arm.xml ball.xml", "view shows one model; got arm.xml and ball.xml"),
         ("view --seconds 0.1 run.npz arm.xml", "another model than arm.xml"),
         ("compare --models so101 bad.urdf", "bad.urdf: it is not XML"),
+        ("compare --models so101@mujoco so101@mujoco", "both sides are what mujoco itself makes"),
+        ("lesson state --backend pybullet:engine", "lessons are about engines that keep"),
+        ("sweep --report somewhere --seconds 2", "--seconds is of a run"),
+        ("sweep --report somewhere --quantity nonsense", "no quantity named 'nonsense'"),
+        (
+            "sweep hold --out t --report --backend mujoco --backend pybullet "
+            "--backend pybullet:engine",
+            "a report is of one engine, or of the gap between two",
+        ),
         ("compare --models so101 so102", "no model named 'so102'"),
         (
             "compare --models so101",

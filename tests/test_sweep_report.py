@@ -293,7 +293,8 @@ def test_a_report_is_of_a_quantity_on_one_engine(tmp_path: Path) -> None:
         {"x": 1.0, "model": 0.0}
     )
     assert_in(
-        text_of(answer), "Sweep of made up: max_qvel on mujoco", "The largest of all runs is 8.00 rad/s or m/s",
+        text_of(answer), "Sweep of made up: max_qvel on mujoco",
+        "The largest of all runs is 8.00 rad/s or m/s",
         "x 1.00 – 4 model 0.00 – a",
     )  # fmt: skip
 
