@@ -56,9 +56,8 @@ class Side:
     menagerie: str | None = None
     taken: TakenParts | None = None
 
-    @property
-    def backend(self) -> BackendChoice:
-        """The engine and its defaults, as one types them behind --backend."""
+    def chosen_backend(self) -> BackendChoice:
+        """Return the engine and its defaults, as one types them behind --backend."""
         return BackendChoice(self.engine, self.defaults)
 
     @property
@@ -70,7 +69,7 @@ class Side:
     def label(self) -> str:
         """As one types it, without folders: "so101@mujoco timestep=0.002"."""
         options = (typed_option(name, value) for name, value in self.options.items())
-        return " ".join([f"{_typed(self.file)}@{self.backend}", *options])
+        return " ".join([f"{_typed(self.file)}@{self.chosen_backend()}", *options])
 
     def load(self, **options: Any) -> Model:
         """The Model; `options` are those of an experiment, over which its own win.

@@ -259,15 +259,16 @@ def _opened(request: Request, progress: Progress) -> SidesRun:
     if both:
         return SidesRun(traces[0], traces[1], traces[1])
     side, what = _other_side(request, _side_of(request, 0, traces[0])), request.what[0]
+    backend = side.chosen_backend()
     played = play(
         traces[0],
         side.load(),
-        command=command(["statemachine", "trace", "play", what, "--backend", str(side.backend)]),
+        command=command(["statemachine", "trace", "play", what, "--backend", str(backend)]),
         defaults=side.defaults,
         options=dict(side.options),
         progress=progress,
     )
-    said = f"the ctrl of {what} was played on {side.backend}, from the state it starts in"
+    said = f"the ctrl of {what} was played on {backend}, from the state it starts in"
     return SidesRun(traces[0], played, played, said=(said,))
 
 
@@ -277,7 +278,9 @@ def _with_recorded(request: Request, progress: Progress) -> SidesRun:
     for side in request.both_sides(scenario.model):
         try:
             rerun = rerun_of(scenario, side.load(), defaults=side.defaults)
-            trace = rerun.record(command=_command(request, side.backend), progress=progress)
+            trace = rerun.record(
+                command=_command(request, side.chosen_backend()), progress=progress
+            )
         except MissingEngineError as error:
             try:
                 rerun, trace = None, shipped(scenario.name, side.engine, side.defaults)
@@ -371,9 +374,9 @@ def _other_side(request: Request, own: Side) -> Side:
     backends = [parse_backend(word) for word in request.backends]
     backends.sort(key=lambda backend: backend.name == own.engine)  # another engine first
     for backend in backends:
-        if backend != own.backend:
+        if backend != own.chosen_backend():
             return replace(own, engine=backend.name, defaults=backend.defaults)
-    raise BadInputError(f"the trace is of {own.backend}: name another with --backend")
+    raise BadInputError(f"the trace is of {own.chosen_backend()}: name another with --backend")
 
 
 def _refuse_of_run(request: Request, **given: bool) -> None:
