@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import statemachine as sm
-from statemachine.gym import RobotVectorEnv
+from statemachine.gym import RobotVectorEnv, make_vec
 
 Array = NDArray[np.float64]
 Policy = Callable[[Array], NDArray[np.float32]]  # actions (n, nu) for observations (n, k)
@@ -120,3 +121,16 @@ def play(envs: RobotVectorEnv, policy: Policy, seed: int) -> Episodes:
         steps += going
         going &= ~(terminated | truncated)
     return Episodes(returned, distance, steps)
+
+
+def show(
+    name: str,
+    backend: str,
+    task: Callable[[str], dict[str, Any]],
+    policies: Callable[[sm.Model], dict[str, Policy]],
+) -> None:
+    """Play 16 episodes of a task with each of its policies, and print a line of them."""
+    envs = make_vec(num_envs=16, **task(backend))
+    for kind, policy in policies(envs.model).items():
+        print(f"{name} on {backend}, {kind}: {play(envs, policy, seed=0)}")
+    envs.close()

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 import statemachine as sm
-from examples.arm import TIP, Array, Policy, fingertip, play, random_policy, scripted_policy
-from statemachine.gym import Start, WorldView, make_vec
+from examples.arm import TIP, Array, Policy, fingertip, random_policy, scripted_policy, show
+from statemachine.gym import Start, WorldView
 
 NEAR = 0.01  # m; a success is nearer
 
@@ -67,14 +67,5 @@ def policies(model: sm.Model) -> dict[str, Policy]:
     return {"random": random_policy(model.nu, seed=0), "scripted": scripted}
 
 
-def main() -> None:
-    """Play 16 episodes with each policy, and print a line of them."""
-    backend = sys.argv[1] if len(sys.argv) > 1 else "mujoco"
-    envs = make_vec(num_envs=16, **task(backend))
-    for name, policy in policies(envs.model).items():
-        print(f"reach on {backend}, {name}: {play(envs, policy, seed=0)}")
-    envs.close()
-
-
 if __name__ == "__main__":
-    main()
+    show("reach", sys.argv[1] if len(sys.argv) > 1 else "mujoco", task, policies)

@@ -21,7 +21,6 @@ from types import ModuleType
 from typing import Any
 
 from .errors import MissingEngineError, unknown_name
-from .processes.signals import sigint_blocked
 
 # Keep what C code prints off the terminal, and have it for an error message.
 
@@ -228,6 +227,8 @@ def require(name: str) -> ModuleType:
             that works.
         UnknownNameError: There is no such engine.
     """
+    from .processes.signals import sigint_blocked  # here: a help text needs no processes
+
     engine = ENGINES.get(name)
     if engine is None:
         raise unknown_name("engine", name, ENGINES)

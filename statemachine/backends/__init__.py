@@ -97,6 +97,10 @@ class BackendChoice:
     def __str__(self) -> str:
         return f"{self.name}:engine" if self.defaults == "engine" else self.name
 
+    def load_to_run(self, model: AnyPath, **arguments: Any) -> Model:
+        """Load a model on it, as the function of this name does."""
+        return load_to_run(model, self.name, defaults=self.defaults, **arguments)
+
 
 def parse_backend(word: str) -> BackendChoice:
     """Read a backend as it is typed behind --backend, or behind the @ of a side.

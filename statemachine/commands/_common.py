@@ -179,20 +179,19 @@ def add_table(parser: Any, *rows: Row) -> None:
 
 
 # What several commands have.
-BACKEND = (
-    "--backend",
-    "NAME",
-    "mujoco, pybullet or a release, mujoco==3.3.7; pybullet:engine: as its own users meet it; all: "
-    f"those that are installed; may be repeated (default {DEFAULT})",
-    {"action": "append"},
-)
-ENGINE = (
-    "--backend",
-    "NAME",
-    "mujoco, pybullet or a release, mujoco==3.3.7; pybullet:engine: as its own users meet it "
-    f"(default {DEFAULT})",
-    {"action": "append"},
-)
+_RUNS = "mujoco, pybullet or a release, mujoco==3.3.7"
+_AS_IT_COMES = f"{_RUNS}; pybullet:engine: as its own users meet it"
+_EACH = f"all: those that are installed; may be repeated (default {DEFAULT})"
+
+
+def backend_of(says: str) -> Row:
+    """The option --backend, which may be repeated; the command says how often."""
+    return "--backend", "NAME", says, {"action": "append"}
+
+
+ENGINE = backend_of(f"{_AS_IT_COMES} (default {DEFAULT})")  # one
+BACKEND = backend_of(f"{_AS_IT_COMES}; {_EACH}")  # one or several
+LESSON_BACKEND = backend_of(f"{_RUNS}; {_EACH}")  # the same, each with the contract
 SIDES = ("left", "right")
 PARTS = ("actuators", "floor")  # of a file, that another side can have, too
 JOBS = ("--jobs", "N", "parallel processes (default: one a processor)")
@@ -227,12 +226,12 @@ def seed_of(what: str) -> Row:
     return "--seed", "N", f"random seed of {what} (0)", {"default": 0}
 
 
-def chosen_backends(words: Sequence[str] | None, usual: str = DEFAULT) -> list[BackendChoice]:
+def chosen_backends(words: Sequence[str] | None) -> list[BackendChoice]:
     """Return the backends that --backend names, as they were typed.
 
     Args:
-        words: What was typed; "all" are those of all engines, whether or not they are installed.
-        usual: Where nothing was typed.
+        words: What was typed, MuJoCo where nothing was; "all" are those of all engines, whether or
+            not they are installed.
 
     Raises:
         UnknownNameError: There is no such backend.
@@ -240,7 +239,7 @@ def chosen_backends(words: Sequence[str] | None, usual: str = DEFAULT) -> list[B
     from ..backends import BackendChoice, backend_names, parse_backend
 
     chosen: list[BackendChoice] = []
-    for word in words or [usual]:
+    for word in words or [DEFAULT]:
         if word == "all":
             chosen += [BackendChoice(name) for name in backend_names()]
         else:
@@ -276,7 +275,6 @@ def on_each_backend(
         model: A model's name or file.
         run: Called with the Model, the backend's name and what is told the fraction that is done.
     """
-    from ..backends import load_to_run
     from ..report.terminal import progress
 
     words = options.backend
@@ -285,12 +283,7 @@ def on_each_backend(
     missing: list[StateMachineError] = []
     for backend in dict.fromkeys(chosen_backends(words)):
         try:
-            loaded = load_to_run(
-                model,
-                backend=backend.name,
-                defaults=backend.defaults,
-                menagerie=options.menagerie,
-            )
+            loaded = backend.load_to_run(model, menagerie=options.menagerie)
         except (MissingEngineError, ModelError, UnsupportedError) as error:
             if not everyone:
                 raise

@@ -14,6 +14,7 @@ from ._common import (
     SAYS_NO,
     add_rules,
     add_table,
+    backend_of,
     file_name,
     json_of,
     one_backend,
@@ -44,7 +45,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             "class, each in the folder or in a folder of its own there",
             {"nargs": "*"},
         ),
-        ("--backend", "NAME", f"mujoco or pybullet (default {DEFAULT})", {"action": "append"}),
+        backend_of(f"mujoco or pybullet (default {DEFAULT})"),
         (
             "--time-limit",
             "S",

@@ -22,6 +22,7 @@ from ._common import (
     Rule,
     add_rules,
     add_table,
+    backend_of,
     chosen_backends,
     complain,
     json_of,
@@ -64,12 +65,9 @@ def add(parser: argparse.ArgumentParser) -> None:
             "model for both engines, two sides, or a second trace",
             {"nargs": "*"},
         ),
-        (
-            "--backend",
-            "NAME",
+        backend_of(
             "the left's engine, and once more the right's: mujoco, pybullet, pybullet:engine (as "
-            "its own users meet it) or a release, mujoco==3.3.7 (default mujoco and pybullet)",
-            {"action": "append"},
+            "its own users meet it) or a release, mujoco==3.3.7 (default mujoco and pybullet)"
         ),
         *run_options(),
         (
@@ -229,7 +227,7 @@ def _backends(options: argparse.Namespace, what: tuple[str, ...]) -> tuple[str, 
         return chosen[0], chosen[0]
     if len(chosen) != 2:
         raise BadInputError(
-            f"compare takes two engines, as in --backend mujoco --backend pybullet:engine; "
+            "compare takes two engines, as in --backend mujoco --backend pybullet:engine; "
             f"got {' and '.join(chosen)}"
         )
     return chosen[0], chosen[1]

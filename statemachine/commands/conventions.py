@@ -6,7 +6,7 @@ import argparse
 
 from ..errors import MissingEngineError
 from ..installed import ENGINES, available
-from ._common import EXCLUDES, PROGRAM, add_rules, add_table, json_of, say_missing, show
+from ._common import EXCLUDES, PROGRAM, add_rules, add_table, backend_of, json_of, say_missing, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -25,12 +25,7 @@ def add(parser: argparse.ArgumentParser) -> None:
             {"nargs": "*"},
         ),
         ("--calls", "", "which call does what, each run"),
-        (
-            "--backend",
-            "NAME",
-            "an engine, or all; may be repeated (default all)",
-            {"action": "append"},
-        ),
+        backend_of("an engine, or all; may be repeated (default all)"),
         json_of(),
     )
     add_rules(

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
-from ..installed import DEFAULT
 from ..lessons import BESIDE, LESSONS, PATH, Lesson
 from ..page import Heading
 from ._common import (
+    LESSON_BACKEND,
     MISSING,
     PROGRAM,
     SAYS_NO,
@@ -51,18 +51,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         _add_lesson(named, lesson)
 
 
-_BACKEND = (
-    "--backend",
-    "NAME",
-    "mujoco, pybullet or a release, mujoco==3.3.7; all: those that are installed; may be repeated "
-    f"(default {DEFAULT})",
-    {"action": "append"},
-)
-
-
 def _shared() -> Iterator[Row]:
     """Options that come before a lesson's name or after it; the later one counts."""
-    yield from (_BACKEND, *menagerie(), json_of())
+    yield from (LESSON_BACKEND, *menagerie(), json_of())
     yield "--calls", "", "show which of the engine's own functions the code made it run"
     yield "--no-questions", "", "do not ask for predictions, do not wait"
     yield "--record", "FILE", "keep your predictions in this file, with a score, to hand in"

@@ -16,6 +16,7 @@ from ._common import (
     SECONDS,
     add_rules,
     add_table,
+    backend_of,
     complain,
     flag_of,
     json_of,
@@ -58,7 +59,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         model_of("the model, instead of the experiment's own"),
         ("--vary", "NAME=VALUES", "what changes; see above", REPEATED),
         ("--out", "DIR", "the folder of the dataset; a new one, or to go on"),
-        ("--backend", "NAME", "an engine, or all; may be repeated (all)", {"action": "append"}),
+        backend_of("an engine, or all; may be repeated (all)"),
         ("--seeds", "N", "starts for each setting: seeds 0 to N-1 (1)", {"default": 1}),
         (
             "--spread",

@@ -108,7 +108,6 @@ def run_record(options: argparse.Namespace) -> int:
             f"record what? An experiment ({', '.join(EXPERIMENTS)}) or FILE.py:FUNCTION",
         )
     )
-    from ..backends import load_to_run
     from ..compare import Request
     from ..report.terminal import progress
     from ..runs import record_scenario
@@ -118,11 +117,8 @@ def run_record(options: argparse.Namespace) -> int:
     name = function_file(options.what).stem
     backend = one_backend(options.backend, "trace record")
     target = _target(options.output, f"{name}.{_in_a_name(backend)}.npz")
-    model = load_to_run(
-        options.model or asked.model or "so101/scene",
-        backend=backend.name,
-        defaults=backend.defaults,
-        menagerie=options.menagerie,
+    model = backend.load_to_run(
+        options.model or asked.model or "so101/scene", menagerie=options.menagerie
     )
     with progress(f"record {name} on {backend}") as bar:
         trace = record_scenario(
@@ -140,7 +136,6 @@ def run_record(options: argparse.Namespace) -> int:
 
 def run_play(options: argparse.Namespace) -> int:
     """Play a trace's commands on an engine, and write what came of it."""
-    from ..backends import load_to_run
     from ..report.terminal import progress
     from ..runs import model_file, play, read
 
@@ -152,12 +147,7 @@ def run_play(options: argparse.Namespace) -> int:
         if options.model
         else model_file(trace.header, options.menagerie, options.file)
     )
-    model = load_to_run(
-        file,
-        backend=backend.name,
-        defaults=backend.defaults,
-        menagerie=options.menagerie if options.model else None,
-    )
+    model = backend.load_to_run(file, menagerie=options.menagerie if options.model else None)
     if not same:
         complain(
             f"{trace.header.provenance.model_file} as it is here is not the file that the trace "

@@ -17,6 +17,7 @@ from ..typed_numbers import is_count, typed_float
 from ._common import (
     PROGRAM,
     add_table,
+    backend_of,
     chosen_backends,
     complain,
     menagerie,
@@ -44,11 +45,8 @@ def add(parser: argparse.ArgumentParser) -> None:
             "the model if it is not its own",
             {"nargs": "*"},
         ),
-        (
-            "--backend",
-            "NAME",
-            f"an engine (default {DEFAULT}); a second one, under the same commands, is the ghost",
-            {"action": "append"},
+        backend_of(
+            f"an engine (default {DEFAULT}); a second one, under the same commands, is the ghost"
         ),
         (
             "--keyframe",
@@ -99,7 +97,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _simulate(options: argparse.Namespace, name: str, port: int) -> int:
     """A session on one engine or two."""
-    from ..backends import load_to_run
     from ..backends.starts import overlap_warning, places_in
     from ..drawing import drawing_of
     from ..releases import engine_of
@@ -108,10 +105,7 @@ def _simulate(options: argparse.Namespace, name: str, port: int) -> int:
     chosen = chosen_backends(options.backend)
     if len(chosen) > 2:
         raise BadInputError(f"view shows one engine or two; got {len(chosen)}")
-    models = [
-        load_to_run(name, backend=each.name, defaults=each.defaults, menagerie=options.menagerie)
-        for each in chosen
-    ]
+    models = [each.load_to_run(name, menagerie=options.menagerie) for each in chosen]
     keyframe = _keyframe(options.keyframe, models[0])
     if text := overlap_warning(models[0], places_in(models[0], keyframe)):
         complain(text, 0)

@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..backends.starts import asleep_from_the_start
 from ..errors import BadInputError, EngineError, EngineWarning, TraceError, refuse
@@ -27,7 +28,7 @@ from ..runs import Rerun, Trace, beginning_with
 from ..runs.drive import Progress, part_of, silent
 from ..runs.scenarios import Controller
 from .agreement import Agreement, Comparison
-from .series import NORMAL, series, touches
+from .series import NORMAL, at_the_end, series, touches
 
 RUNS = 8  # of each side
 CLEAR = 3.0  # times the floor: a larger gap is more than chance
@@ -250,7 +251,6 @@ def nudged_controller(controller: Controller | None, draw: np.random.Generator) 
 
 _WINDOW = 0.025  # of the common time, to either side
 _LATER = 0.05  # of the common time, by which an event may come later in another run
-_SETTLED = 0.1  # of the common time, at its end
 _FIRST_TOUCH = ", first touch"
 
 
@@ -493,7 +493,7 @@ def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Ban
     last = int(outside[-1]) + 1 if len(outside) else 0
     chance: Chance | None = None
     if agreement.verdict != "agrees":
-        chance = _chance_of(gap, width, agreement.tolerance)
+        chance = _chance_of(gap, width, agreement.tolerance, at_the_end(moments))
     return Band(
         name=agreement.name,
         kind=agreement.kind,
@@ -506,7 +506,7 @@ def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Ban
     )
 
 
-def _chance_of(gap: Array, width: Array, tolerance: float) -> Chance:
+def _chance_of(gap: Array, width: Array, tolerance: float, tail: NDArray[np.bool_]) -> Chance:
     """Tell whether rounding alone can make a gap that leaves its tolerance.
 
     Two things are held against three times the floor. The largest gap so far, at each moment,
@@ -519,6 +519,7 @@ def _chance_of(gap: Array, width: Array, tolerance: float) -> Chance:
         gap: (n,) how far apart the sides are; not all within the tolerance.
         width: (n,) of the band.
         tolerance: In the same unit.
+        tail: (n,) which moments are of the last tenth.
     """
     largest_gap = np.maximum.accumulate(np.nan_to_num(gap, nan=np.inf))
     largest_width = np.maximum.accumulate(width)
@@ -526,7 +527,6 @@ def _chance_of(gap: Array, width: Array, tolerance: float) -> Chance:
     ahead = np.append(largest_width[later:], np.full(later, largest_width[-1]))
     beyond = largest_gap > tolerance
     pairs = list(zip(largest_gap[beyond].tolist(), ahead[beyond].tolist(), strict=True))
-    tail = slice(len(gap) - max(1, round(_SETTLED * len(gap))), None)
     settled = float(gap[tail].mean())
     if not settled <= tolerance:
         pairs.append((settled, float(width[tail].max())))

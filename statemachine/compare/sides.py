@@ -78,13 +78,7 @@ class Side:
             StateMachineError: As `load` does.
         """
         options |= self.options
-        load_it = partial(
-            load_to_run,
-            self.file,
-            backend=self.engine,
-            defaults=self.defaults,
-            menagerie=self.menagerie,
-        )
+        load_it = partial(self.chosen_backend().load_to_run, self.file, menagerie=self.menagerie)
         if self.taken is None:
             return load_it(**options)
         model = self.taken.given_to(load_it())

@@ -163,7 +163,7 @@ def audit(model: Model, steps: int = 60, seed: int = 0) -> Audit:
         _start(model, run, random)
         step(model, run, _BEFORE)
         saved = get_state(model, run)
-        going_on = _future(model, run, steps)
+        going_on = future(model, run, steps)
         _start(model, other, random)
         step(model, other, _BEFORE + _LONGER)
         left = get_state(model, other)
@@ -197,7 +197,7 @@ def _start(model: Model, data: Data, random: np.random.Generator) -> None:
     data.ctrl[:] = np.clip(data.ctrl + stir, *model.actuator_ctrlrange.T)
 
 
-def _future(model: Model, data: Data, steps: int) -> Array:
+def future(model: Model, data: Data, steps: int) -> Array:
     """Go on; return qpos and qvel (steps + 1, nq + nv) here and after each step."""
     rows = [np.concatenate((data.qpos, data.qvel))]
     for _ in range(steps):
@@ -210,7 +210,7 @@ def _restored(model: Model, data: Data, state: State, steps: int) -> Array:
     """Return the future of a State in a Data; NaN where it diverges."""
     set_state(model, data, state)
     try:
-        return _future(model, data, steps)
+        return future(model, data, steps)
     except DivergedError:
         return np.full((steps + 1, model.nq + model.nv), np.nan)
 

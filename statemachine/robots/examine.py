@@ -14,8 +14,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..backends import backend_names, load_to_run
 from ..backends.starts import overlaps_in
 from ..engines import room
@@ -30,9 +28,10 @@ from ..errors import (
     one_line,
 )
 from ..installed import DEFAULT, WITNESS, require
-from ..interface import Array, Data, Model, get_state, make_data, reset, set_state, step
+from ..interface import Data, Model, get_state, make_data, reset, set_state, step
 from ..lessons.fingertip import certify
 from ..lessons.in_turns import Ratio, in_turns
+from ..probes.audit import future
 from ..runs import record_scenario
 from ..runs.scenarios import scenario
 from ..runs.whole import replace_bytes
@@ -170,11 +169,11 @@ class _Examination:
         with self._started(model) as data:
             step(model, data, _FUTURE)
             state = get_state(model, data)
-            going_on = _future(model, data)
+            going_on = future(model, data, _FUTURE)
             set_state(model, data, state)
-            once = _future(model, data)
+            once = future(model, data, _FUTURE)
             set_state(model, data, state)
-            twice = _future(model, data)
+            twice = future(model, data, _FUTURE)
         if once.tobytes() != twice.tobytes():
             return False
         return once.tobytes() == going_on.tobytes() or not model.capabilities.exact_restore
@@ -229,15 +228,6 @@ class _Examination:
             }
             times = in_turns(ways, _ROUNDS, seed=self.seed)
         return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
-
-
-def _future(model: Model, data: Data) -> Array:
-    """Go on; positions and velocities (n, nq + nv) after each step."""
-    rows = []
-    for _ in range(_FUTURE):
-        step(model, data)
-        rows.append(np.concatenate((data.qpos, data.qvel)))
-    return np.array(rows)
 
 
 def _witness_row(model: Model, seed: int) -> WitnessRow:

@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .. import __version__
-from ..backends import load_to_run, on_default, parse_backend
+from ..backends import on_default, parse_backend
 from ..errors import BadInputError, StateMachineError, TimedOutError, one_line
 from ..installed import DEFAULT, silence
 from ..interface import Array, Data, Model, forward, make_data, reset
@@ -181,14 +181,7 @@ def _model(
 
 def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, Any]) -> Model:
     """A model of a sweep as all of its cells load it."""
-    chosen = parse_backend(backend)
-    return load_to_run(
-        place,
-        backend=chosen.name,
-        defaults=chosen.defaults,
-        menagerie=sweep.menagerie,
-        **options,
-    )
+    return parse_backend(backend).load_to_run(place, menagerie=sweep.menagerie, **options)
 
 
 _LATEST: dict[str, Any] = {}
