@@ -27,6 +27,12 @@ class Figures(SimpleNamespace):
     """
 
 
+class Markdown(str):
+    """Trusted Markdown: a text whose markup is meant; values in it are escaped."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True)
 class Heading:
     """A heading within a page."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 from ..engines import room
 from ..installed import DEFAULT, ENGINES, engine_version, wheel_here
-from ..page import Figures, Page, Table, Text
-from . import template
+from ..page import Page, Table
+from ..show.templates import PageContent, render
 
 _PATIENCE = 60  # seconds for an import
 
@@ -25,6 +25,63 @@ class HealthCheck:
     found: str
     next_step: str = ""
     optional: bool = False
+
+
+@dataclass(frozen=True)
+class OptionalPackage:
+    """A package that nothing needs but what an extra of this library is for.
+
+    Attributes:
+        name: As pip calls it.
+        role: What it is for.
+        extras: Those that bring it.
+        version: That is installed; None where it is not.
+    """
+
+    name: str
+    role: str
+    extras: tuple[str, ...]
+    version: str | None
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What works on this machine.
+
+    Attributes:
+        findings: What was looked at, each with its state.
+        packages: The optional ones.
+        healthy: Whether everything that is not optional works.
+    """
+
+    findings: tuple[HealthCheck, ...]
+    packages: tuple[OptionalPackage, ...]
+    healthy: bool
+
+
+@dataclass(frozen=True)
+class DoctorPage(PageContent):
+    """What the page of a diagnosis shows.
+
+    Attributes:
+        diagnosis: Of this machine.
+        findings: Table of what was looked at.
+        packages: Table of the optional packages.
+        python: Version of Python; system, machine: what it runs on.
+    """
+
+    template = "doctor.md.j2"
+    diagnosis: Diagnosis
+    findings: Table
+    packages: Table
+    python: str = platform.python_version()
+    system: str = platform.system()
+    machine: str = platform.machine()
+
+    @property
+    def next_steps(self) -> list[HealthCheck]:
+        """What is to be done about what is not well."""
+        return [finding for finding in self.diagnosis.findings if finding.next_step]
 
 
 # A package that nothing needs but what an extra of this library is for: as pip calls it, what it
@@ -48,46 +105,42 @@ _PACKAGES = (
 )
 
 
-def examine() -> Figures:
-    """Look at Python, the engines, rendering, the viewer, the import name and the extras.
-
-    Returns:
-        findings: A HealthCheck each.
-        packages: The optional ones: name, role, extras, and the version that is here.
-        healthy: Whether everything that is not optional works.
-    """
+def examine() -> Diagnosis:
+    """Look at Python, the engines, rendering, the viewer, the import name and the extras."""
     python = HealthCheck("python", True, f"{platform.python_version()}, {sys.executable}")
     drawing = HealthCheck("rendering", *room(DEFAULT).drawing_diagnosis(), optional=True)
     findings = [python, *map(_engine, ENGINES), drawing, _viewer(), _clash()]
-    return Figures(
-        findings=tuple(findings),
-        packages=tuple(
-            Figures(name=name, role=role, extras=extras, version=_version(name))
-            for name, role, extras in _PACKAGES
-        ),
-        healthy=all(finding.works or finding.optional for finding in findings),
-    )
+    packages = [
+        OptionalPackage(name, role, extras, _version(name)) for name, role, extras in _PACKAGES
+    ]
+    healthy = all(finding.works or finding.optional for finding in findings)
+    return Diagnosis(tuple(findings), tuple(packages), healthy)
 
 
-def page(diagnosis: Figures) -> Page:
-    """The diagnosis as a page."""
-    findings, packages = diagnosis.findings, diagnosis.packages
-    machine = [(f.name, "works" if f.works else "no", f.found) for f in findings]
-    optional = [(p.name, p.version or "no", p.role, ", ".join(p.extras)) for p in packages]
-    words = frozenset(range(4))
-    return template.page(
-        "doctor",
-        python=platform.python_version(),
-        system=platform.system(),
-        machine=platform.machine(),
-        tables=[
-            Table(("what", "state", "found"), machine, "What this machine has", words),
-            Table(("package", "found", "for", "extra"), optional, "Optional packages", words),
-        ],
-        steps=[Text(f"{f.name}: {f.next_step}") for f in findings if f.next_step],
-        healthy=True if diagnosis.healthy else None,
-        unhealthy=None if diagnosis.healthy else False,
+def page(diagnosis: Diagnosis) -> Page:
+    """Return the diagnosis as a page."""
+    findings = Table.of(
+        diagnosis.findings,
+        {
+            "what": lambda finding: finding.name,
+            "state": lambda finding: "works" if finding.works else "no",
+            "found": lambda finding: finding.found,
+        },
+        "What this machine has",
+        words={"state", "found"},
     )
+    packages = Table.of(
+        diagnosis.packages,
+        {
+            "package": lambda package: package.name,
+            "found": lambda package: package.version or "no",
+            "for": lambda package: package.role,
+            "extra": lambda package: ", ".join(package.extras),
+        },
+        "Optional packages",
+        words={"found", "for", "extra"},
+    )
+    return render(DoctorPage(diagnosis, findings, packages))
 
 
 def _engine(name: str) -> HealthCheck:

@@ -28,6 +28,7 @@ from ..page import (
     Heading,
     Interactive,
     Items,
+    Markdown,
     Page,
     Picture,
     Printed,
@@ -327,4 +328,6 @@ def _fenced(text: str, language: str) -> str:
 
 
 def _escaped(text: str) -> str:
+    if isinstance(text, Markdown):
+        return text
     return _SPECIAL.sub(lambda match: match[1] or f"\\{match[2]}", text)

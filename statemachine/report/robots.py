@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 
-from ..measures.text import NONE, count, few, figure, grouped, listed, rough, sentence
-from ..page import Block, Page, Table, Text, Verdict
+from ..measures.text import NONE, count, figure, grouped, rough
+from ..page import Page, Table
 from ..robots.examine import TRIED
 from ..robots.gaps import STEPS
 from ..robots.records import (
@@ -19,20 +20,147 @@ from ..robots.records import (
     Survey,
     WitnessRow,
 )
-from . import template
+from ..show.templates import PageContent, render
 
 _WIDEST = 28  # characters of a name
 _LISTED = 20  # of what is wrong, and of features
 
-SUMS = (
-    "How many of {total} models load, and of how many the gap without contacts to {default} is "
-    "within {tolerance:g} rad or m, no more than rounding makes, or vanishes with the timestep"
-)
 _MARKS = {None: NONE, True: "✓", False: "✗"}
 
 
+@dataclass(frozen=True)
+class _Refusals:
+    """What a backend refuses.
+
+    Attributes:
+        backend: Its name.
+        features: Table of what it refuses, how often, and for how many models it alone stands in
+            the way.
+    """
+
+    backend: str
+    features: Table
+
+
+@dataclass(frozen=True)
+class RobotsPage(PageContent):
+    """What the page of many models shows.
+
+    Attributes:
+        survey: What was found.
+        models: Table with a row for each model.
+        engines: Table with a row for each engine.
+        grades: Table of what the witness read how often.
+        refusals: Of each backend but the default one.
+    """
+
+    template = "robots.md.j2"
+    survey: Survey
+    models: Table
+    engines: Table
+    grades: Table
+    refusals: Sequence[_Refusals]
+    steps: int = STEPS
+    tolerance: float = TOLERANCE
+    most_listed: int = _LISTED
+    experiments: Sequence[str] = TRIED
+
+    @property
+    def model_count(self) -> int:
+        """Number of models."""
+        return len(self.survey.models)
+
+    @property
+    def has_experiments(self) -> bool:
+        """Whether experiments were tried."""
+        return _has_experiments(self.survey)
+
+    @property
+    def backends(self) -> list[str]:
+        """Names of the backends that are here."""
+        return _backends(self.survey)
+
+    @property
+    def inside(self) -> list[str]:
+        """Models whose shapes are inside each other at the start, each with the deepest pair."""
+        return [f"{row.file}, {row.inside[0]}" for row in self.survey.models if row.inside]
+
+    @property
+    def wrong(self) -> list[str]:
+        """All that contradicts, each with its model's file."""
+        wrong = self.survey.wrong.items()
+        return [f"{file}: {text}" for file, texts in wrong for text in texts]
+
+    @property
+    def wrong_listed(self) -> list[str]:
+        """The first of what contradicts."""
+        return self.wrong[:_LISTED]
+
+    @property
+    def wrong_unlisted(self) -> int:
+        """How much more contradicts."""
+        return max(len(self.wrong) - _LISTED, 0)
+
+
+@dataclass(frozen=True)
+class _Stop:
+    """Experiments that a backend does not run, and why."""
+
+    experiments: Sequence[str]
+    reason: str
+
+
+@dataclass(frozen=True)
+class _BackendRefusals:
+    """What a backend refuses of one model, and of what it warns.
+
+    Attributes:
+        name: Of the backend.
+        refusal: Why it does not load the model; "" if it does.
+        refusal_without: The same with contacts off; "" if that is the same.
+        warnings: What it told when it loaded the model.
+        stops: Experiments that it does not run.
+    """
+
+    name: str
+    refusal: str
+    refusal_without: str
+    warnings: Sequence[str]
+    stops: Sequence[_Stop]
+
+
+@dataclass(frozen=True)
+class RobotPage(PageContent):
+    """What the page of one model shows.
+
+    Attributes:
+        model: What was found.
+        witness: What the witness says.
+        facts: Table with a row for each fact and a column for each backend.
+        backends: What each refuses.
+        wrong: What contradicts.
+    """
+
+    template = "robots_one.md.j2"
+    model: ExaminedModel
+    witness: WitnessRow
+    facts: Table
+    backends: Sequence[_BackendRefusals]
+    wrong: Sequence[str]
+
+    @property
+    def was_loaded(self) -> bool:
+        """Whether an engine told the sizes of the model."""
+        return self.model.nq is not None
+
+    @property
+    def witness_places(self) -> bool:
+        """Whether the witness placed frames that the engine placed, too."""
+        return self.witness.gap is not None
+
+
 def page(survey: Survey, widest: int = _WIDEST) -> Page:
-    """The table; of one model alone, all that was found of it.
+    """Return the table as a page; of one model alone, all that was found of it.
 
     Args:
         survey: What was found.
@@ -40,91 +168,92 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
     """
     models = survey.models
     if len(models) == 1 and not survey.parts:
-        return _one(survey, models[0])
-    backends = list(dict.fromkeys(name for row in models for name in row.backends))
-    others = [name for name in backends if name != survey.default]
-    tried = any(backend.scenarios for row in models for backend in row.backends.values())
-    wrong = [f"{file}: {text}" for file, texts in survey.wrong.items() for text in texts]
-    inside = [f"{row.file}, {row.inside[0]}" for row in models if row.inside]
-    grades = Counter(row.witness.grade or "refused" for row in models if row.witness is not None)
-    return template.page(
-        "robots",
-        models=count(len(models), "model"),
-        made_with=survey.made_with,
-        table=_table(survey, others, widest, tried),
-        default=survey.default,
-        steps=STEPS,
-        tried=", ".join(TRIED) if tried else None,
-        backends=listed(backends),
-        sums=_sums(survey, others),
-        inside=len(inside) or None,
-        total=len(models),
-        pairs=few(inside, _LISTED, "; "),
-        grades=Table(
-            ("the witness's reading", "models"),
-            [(grade, str(number)) for grade, number in sorted(grades.items())],
-        ),
-        refused=[_refused(models, other) for other in others],
-        parts=count(len(survey.parts), "file") if survey.parts else None,
-        wrong=[Verdict(text, False) for text in wrong[:_LISTED]],
-        more=max(len(wrong) - _LISTED, 0) or None,
-        fine=None if wrong else True,
+        return _page_of_one(survey, models[0])
+    others = [name for name in _backends(survey) if name != survey.default]
+    content = RobotsPage(
+        survey,
+        models=_table(survey, others, widest),
+        engines=_engines_table(survey, others),
+        grades=_grades_table(models),
+        refusals=[_Refusals(other, _refused_features(models, other)) for other in others],
     )
+    return render(content)
 
 
-def _table(survey: Survey, others: Sequence[str], widest: int, tried: bool) -> Table:
-    """A row for each model."""
-    columns: dict[str, Callable[[ExaminedModel], str]] = {
+def _backends(survey: Survey) -> list[str]:
+    """Return the names of the backends that any model was tried on."""
+    return list(dict.fromkeys(name for row in survey.models for name in row.backends))
+
+
+def _has_experiments(survey: Survey) -> bool:
+    """Tell whether experiments were tried of any model."""
+    rows = [row for model in survey.models for row in model.backends.values()]
+    return any(row.scenarios for row in rows)
+
+
+def _grades_table(models: Sequence[ExaminedModel]) -> Table:
+    """Return how many models the witness read in which way."""
+    grades = Counter(row.witness.grade or "refused" for row in models if row.witness is not None)
+    rows = [(grade, str(number)) for grade, number in sorted(grades.items())]
+    return Table(("the witness's reading", "models"), rows)
+
+
+def _table(survey: Survey, others: Sequence[str], widest: int) -> Table:
+    """Return a row for each model."""
+
+    def shortened(row: ExaminedModel) -> str:
         # The end of a long name tells more than its beginning.
-        "model": lambda row: row.file if len(row.file) <= widest else f"…{row.file[1 - widest :]}",
-        "bits": lambda row: _bits(survey, row),
+        return row.file if len(row.file) <= widest else f"…{row.file[1 - widest :]}"
+
+    columns: dict[str, Callable[[ExaminedModel], str]] = {
+        "model": shortened,
+        "bits": partial(_bits, survey),
     }
     for other in others:
         of = f"{other}, " if len(others) > 1 else ""
         columns[f"{of}no contacts"] = partial(_gap, other=other, without=True)
         columns[f"{of}contacts"] = partial(_gap, other=other, without=False)
     columns["witness"] = _witness
-    if tried:
-        columns |= {
-            "runs": lambda row: (
-                " ".join(
-                    str(list(backend.scenarios.values()).count(RUNS))
-                    for backend in row.backends.values()
-                    if backend.scenarios
-                )
-                or NONE
-            ),
-            "cost": lambda row: (
-                " ".join(
-                    f"{backend.cost:.3g}"
-                    for backend in row.backends.values()
-                    if backend.cost is not None
-                )
-                or NONE
-            ),
-        }
-    return Table.of(
-        survey.models, columns, words={"model", "bits", "witness", "runs"}, wide={"cost"}
-    )
+    if _has_experiments(survey):
+        columns |= {"runs": _runs, "cost": _costs}
+    words = {"model", "bits", "witness", "runs"}
+    return Table.of(survey.models, columns, words=words, wide={"cost"})
+
+
+def _runs(row: ExaminedModel) -> str:
+    """Return how many experiments run, by backend."""
+    tried = [backend.scenarios.values() for backend in row.backends.values() if backend.scenarios]
+    numbers = [str(list(words).count(RUNS)) for words in tried]
+    return " ".join(numbers) if numbers else NONE
+
+
+def _costs(row: ExaminedModel) -> str:
+    """Return what a step costs over the engine's own, by backend."""
+    costs = [backend.cost for backend in row.backends.values() if backend.cost is not None]
+    return " ".join(f"{cost:.3g}" for cost in costs) if costs else NONE
 
 
 def _bits(survey: Survey, row: ExaminedModel) -> str:
+    """Return whether all that must be equal to the bit is."""
     if row.ended:
         return "ended"
     first = row.backends.get(survey.default)
     if first is None or (first.refusal and first.refusal_without):
         return "no"
-    exact = [
-        v for backend in row.backends.values() for v in (backend.equals_engine, backend.restores)
-    ]
-    return "✗" if False in exact else "✓" if True in exact else NONE
+    exact: list[bool | None] = []
+    for backend in row.backends.values():
+        exact += [backend.equals_engine, backend.restores]
+    if False in exact:
+        return "✗"
+    return "✓" if True in exact else NONE
 
 
 def _gap(row: ExaminedModel, other: str, without: bool) -> str:
     backend = row.backends.get(other, BackendRow())
     gap = backend.without_contacts if without else backend.with_contacts
     if gap is None:
-        return "refused" if (backend.refusal_without if without else backend.refusal) else NONE
+        refusal = backend.refusal_without if without else backend.refusal
+        return "refused" if refusal else NONE
     outcomes = {
         "still": not row.nv,
         "explodes": gap.explodes,
@@ -143,115 +272,116 @@ def _witness(row: ExaminedModel) -> str:
     return f"{row.witness.grade.partition(' ')[0]} {rough(row.witness.gap)}"
 
 
-def _sums(survey: Survey, others: Sequence[str]) -> Table:
-    """How many models each engine loads, and what becomes of them."""
-    rows = grouped(pair for row in survey.models for pair in row.backends.items())
-
-    def counted(of: Callable[[BackendRow], object], name: str) -> str:
-        return str(sum(bool(of(row)) for row in rows.get(name, ())))
-
-    def gaps(of: Callable[[RunGap], bool], name: str) -> str:
-        """Of runs that did not end early, against the default engine; which has none."""
+def _engines_table(survey: Survey, others: Sequence[str]) -> Table:
+    """Return how many models each engine loads, and what becomes of them."""
+    rows_by_backend = grouped(pair for row in survey.models for pair in row.backends.items())
+    rows: list[tuple[str, ...]] = []
+    for name in (survey.default, *others):
+        backends = rows_by_backend.get(name, [])
+        loads = sum(row.loads for row in backends)
+        without = sum(not row.loads and not row.refusal_without for row in backends)
         if name == survey.default:
-            return NONE
-        runs = [row.without_contacts for row in rows.get(name, ()) if row.without_contacts]
-        return str(sum(of(gap) for gap in runs if not gap.ended))
-
-    return Table.of(
-        (survey.default, *others),
-        {
-            "engine": str,
-            "loads": partial(counted, lambda row: row.loads),
-            "only without contacts": partial(
-                counted, lambda row: not row.loads and not row.refusal_without
-            ),
-            "bits of the engine": lambda name: (
-                counted(lambda row: row.equals_engine, name) if name == survey.default else NONE
-            ),
-            "within": partial(gaps, lambda gap: gap.largest <= TOLERANCE),
-            "rounding": partial(gaps, lambda gap: gap.is_rounding),
-            "vanishes": partial(gaps, lambda gap: gap.first_order),
-        },
-        SUMS.format(total=len(survey.models), default=survey.default, tolerance=TOLERANCE),
-    )
+            same_bits = str(sum(row.equals_engine is True for row in backends))
+            gaps = (NONE, NONE, NONE)  # it has none to itself
+        else:
+            same_bits = NONE
+            gaps = _gap_counts(backends)
+        rows.append((name, str(loads), str(without), same_bits, *gaps))
+    return Table(_ENGINE_HEADERS, rows)
 
 
-def _refused(models: Sequence[ExaminedModel], other: str) -> Table:
-    """What is refused, how often, and for how many models it alone stands in the way."""
+_ENGINE_HEADERS = (
+    "engine",
+    "loads",
+    "only without contacts",
+    "bits of the engine",
+    "within",
+    "rounding",
+    "vanishes",
+)
+
+
+def _gap_counts(backends: Sequence[BackendRow]) -> tuple[str, str, str]:
+    """Return how many gaps are within the tolerance, rounding, and vanish with the timestep.
+
+    Runs that ended early are left out.
+    """
+    gaps = [row.without_contacts for row in backends if row.without_contacts]
+    whole = [gap for gap in gaps if not gap.ended]
+    within = sum(gap.largest <= TOLERANCE for gap in whole)
+    rounding = sum(gap.is_rounding for gap in whole)
+    vanishing = sum(gap.first_order for gap in whole)
+    return str(within), str(rounding), str(vanishing)
+
+
+def _refused_features(models: Sequence[ExaminedModel], other: str) -> Table:
+    """Return what is refused, how often, and for how many models it alone stands in the way."""
     rows = [row.backends[other] for row in models if other in row.backends]
     refused = [row for row in rows if row.refusal]
     features = Counter(name for row in refused for name in row.features)
     alone = Counter(row.features for row in refused)
     solved = Counter(n for row in refused for n in row.features if not row.refusal_without)
-    return Table.of(
-        [name for name, _ in features.most_common(_LISTED)],
-        {
-            "feature": str,
-            "models": lambda name: str(features[name]),
-            "the only one in": lambda name: str(alone[(name,)]),
-            "not with contacts off in": lambda name: str(solved[name]),
-        },
-        f"What {other} refuses",
+    headers = ("feature", "models", "the only one in", "not with contacts off in")
+    cells: list[tuple[str, ...]] = []
+    for name, number in features.most_common(_LISTED):
+        cells.append((name, str(number), str(alone[(name,)]), str(solved[name])))
+    return Table(headers, cells)
+
+
+def _page_of_one(survey: Survey, row: ExaminedModel) -> Page:
+    """Return all that was found of one model."""
+    content = RobotPage(
+        row,
+        row.witness or WitnessRow(),
+        facts=_facts_table(row),
+        backends=[_refusals(name, backend) for name, backend in row.backends.items()],
+        wrong=row.wrong(survey.default),
     )
+    return render(content)
 
 
-def _one(survey: Survey, row: ExaminedModel) -> Page:
-    """All that was found of one model."""
-    wrong, witness = row.wrong(survey.default), row.witness or WitnessRow()
-    reason = sentence(witness.refusal) if witness.refusal else None
-    facts: dict[str, Callable[[BackendRow], str]] = {
-        "loads": lambda backend: (
-            "✓" if backend.loads else "no" if backend.refusal_without else "with contacts off"
-        ),
-        "the bits of the engine without us": lambda backend: _MARKS[backend.equals_engine],
-        "two futures of a State are one": lambda backend: _MARKS[backend.restores],
-        "gap without contacts": lambda backend: _gap_in_full(backend.without_contacts),
-        "gap with contacts": lambda backend: _gap_in_full(backend.with_contacts),
-        **{f"experiment {name}": partial(_scenario, name) for name in TRIED},
-        "cost of a step over the engine's own, here": lambda backend: (
-            NONE if backend.cost is None else f"{backend.cost:.3g} ×"
-        ),
-    }
+def _loads(row: BackendRow) -> str:
+    if row.loads:
+        return "✓"
+    return "no" if row.refusal_without else "with contacts off"
+
+
+def _cost(row: BackendRow) -> str:
+    return NONE if row.cost is None else f"{row.cost:.3g} ×"
+
+
+def _facts_table(row: ExaminedModel) -> Table:
+    """Return a row for each fact that is known on any backend."""
+    facts: dict[str, Callable[[BackendRow], str]] = {"loads": _loads}
+    facts["the bits of the engine without us"] = lambda row: _MARKS[row.equals_engine]
+    facts["two futures of a State are one"] = lambda row: _MARKS[row.restores]
+    facts["gap without contacts"] = lambda row: _gap_in_full(row.without_contacts)
+    facts["gap with contacts"] = lambda row: _gap_in_full(row.with_contacts)
+    facts |= {f"experiment {name}": partial(_scenario, name) for name in TRIED}
+    facts["cost of a step over the engine's own, here"] = _cost
     rows = [(fact, *map(cell, row.backends.values())) for fact, cell in facts.items()]
-    rows = [cells for cells in rows if set(cells[1:]) != {NONE}]
-    return template.page(
-        "robots_one",
-        file=row.file,
-        made_with=row.made_with,
-        **{name: getattr(row, name) for name in ("nq", "nv", "nu", "nbody", "ngeom", "took")},
-        table=Table(("what", *row.backends), rows, words=frozenset(range(9))),
-        backends=[block for name in row.backends for block in _refusals(name, row.backends[name])],
-        refusal=None if witness.gap is not None else reason,
-        grade=witness.grade,
-        frames=count(witness.frames, "frame"),
-        gap=None if witness.gap is None else rough(witness.gap),
-        no_reading=sentence(witness.refusal)
-        if witness.gap is not None and witness.refusal
-        else None,
-        wrong=[Verdict(text, False) for text in wrong],
-        fine=None if wrong else True,
-    )
+    known = [cells for cells in rows if set(cells[1:]) != {NONE}]
+    return Table(("what", *row.backends), known, words=frozenset(range(9)))
 
 
-def _refusals(name: str, row: BackendRow) -> list[Block]:
-    """What an engine refuses of a model, and of what it warns."""
-    warnings = [f"{name} warns: {text}" for text in row.warnings or row.warnings_without]
+def _refusals(name: str, row: BackendRow) -> _BackendRefusals:
+    """Return what an engine refuses of a model, and of what it warns."""
     reasons = grouped((word, scenario) for scenario, word in row.scenarios.items() if word != RUNS)
-    stops = [f"{', '.join(names)} on {name}: {why}" for why, names in reasons.items()]
-    without = row.refusal_without if row.refusal_without != row.refusal else ""
-    return template.blocks(
-        "robots_backend",
-        name=name,
-        refusal=row.refusal or None,
-        refusal_without=without or None,
-        further=[Text(text) for text in (*warnings, *stops)],
+    return _BackendRefusals(
+        name,
+        row.refusal,
+        row.refusal_without if row.refusal_without != row.refusal else "",
+        row.warnings or row.warnings_without,
+        [_Stop(experiments, reason) for reason, experiments in reasons.items()],
     )
 
 
 def _scenario(name: str, row: BackendRow) -> str:
     """Whether an experiment runs."""
     word = row.scenarios.get(name)
-    return NONE if word is None else "✓" if word == RUNS else "no"
+    if word is None:
+        return NONE
+    return "✓" if word == RUNS else "no"
 
 
 def _gap_in_full(gap: RunGap | None) -> str:

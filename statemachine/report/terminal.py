@@ -63,7 +63,6 @@ ASCII = str.maketrans(
 )
 # What would make a terminal do something instead of showing it (a student's text may hold it).
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
-_CODE = re.compile(r"`([^`\n]+)`")
 # A blank between a figure and its unit or sign.
 _INSIDE = re.compile(
     r"(?<=\d) (?=(?:%|deg|[mµu]?s|[cm]?m[²³]?|k?N|J|W|V|kg|rad|Hz|[kMG]?B)(?!\w))"
@@ -161,7 +160,7 @@ def _write(tell: Callable[[str], object], blocks: Sequence[Page | Block]) -> Non
     console.width = _WIDTH_PIPED if piped else min(console.width, _WIDTH_MOST)
     with console.capture() as captured:
         for block in _unfolded(blocks):
-            for line in _drawn(block, plain, console.width):
+            for line in _drawn(block, plain, piped, console.width):
                 console.print(line, soft_wrap=isinstance(block, Code | Printed))
     text = captured.get().replace(_NO_BREAK, " ")
     if piped and text:  # cells are padded with blanks that only a terminal needs
@@ -189,24 +188,27 @@ def _unfolded(blocks: Sequence[Page | Block]) -> Iterator[Page | Block]:
             yield from _unfolded(inside)
 
 
-def _drawn(block: Page | Block, plain: bool, width: int) -> list[RenderableType]:
+def _drawn(block: Page | Block, plain: bool, piped: bool, width: int) -> list[RenderableType]:
     """What a block looks like, from top to bottom; nothing of a picture. Of a page the heading."""
     from rich.text import Text as RichText
+
+    def coded(text: str, style: str = "") -> RichText:
+        return _coded(text, plain, piped, style)
 
     match block:
         case Page(title, origin):
             return [
                 "",
                 RichText(_shown(title, plain), "bold"),
-                _coded(_shown(origin, plain), "dim"),
+                coded(origin, "dim"),
             ]
         case Heading(text):
-            return ["", _coded(_shown(text, plain), "bold")]
+            return ["", coded(text, "bold")]
         case Text(text, (_, linked)):
-            return ["", _coded(_shown(f"{text} {linked}." if linked else text, plain))]
+            return ["", coded(f"{text} {linked}." if linked else text)]
         case Items(texts, ordered):
             marks = (f"{k}." if ordered else "-" for k in itertools.count(1))
-            return ["", *map(_hanging, marks, (_shown(text, plain) for text in texts))]
+            return ["", *map(_hanging, marks, map(coded, texts))]
         case Code(lines):
             return ["", *(RichText(f"    {_shown(line, plain)}", "cyan") for line in lines)]
         case Printed(by_engine):
@@ -221,16 +223,27 @@ def _drawn(block: Page | Block, plain: bool, width: int) -> list[RenderableType]
             return ["", *title, _grid(block.narrow(), plain, width)]
         case Verdict(text, holds):
             mark = RichText(_shown("✓" if holds else "✗", plain), "green" if holds else "red")
-            return ["", _hanging(mark, _shown(text, plain))]
+            return ["", _hanging(mark, coded(text))]
     return []
 
 
-def _coded(text: str, style: str = "") -> RichText:
-    """A text in which what stands between backticks is shown as code."""
+# How a terminal shows what is no plain text.
+_LOOKS = {"text": "", "code": "cyan", "emphasis": "italic", "strong": "bold", "link": "underline"}
+
+
+def _coded(text: str, plain: bool, piped: bool, style: str) -> RichText:
+    """Return a text with its code in a colour; where there is none, between backticks."""
     from rich.text import Text as RichText
 
-    parts = enumerate(_CODE.split(text))  # every second part is code
-    return RichText.assemble(*((part, "cyan" if k % 2 else "") for k, part in parts), style=style)
+    from ..show.markdown import spans
+
+    line = RichText(style=style)
+    for span in spans(text):
+        shown = _shown(span.text, plain)
+        if piped and span.kind == "code":
+            shown = f"`{shown}`"
+        line.append(shown, _LOOKS[span.kind])
+    return line
 
 
 def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:
@@ -298,13 +311,13 @@ def _widths(rows: Sequence[Sequence[str]], words: Container[int], width: int) ->
     return least
 
 
-def _hanging(mark: str | RichText, text: str) -> RenderableType:
+def _hanging(mark: str | RichText, text: RichText) -> RenderableType:
     from rich.table import Table as Grid
 
     grid = Grid.grid(padding=(0, 1))
     grid.add_column(no_wrap=True)
     grid.add_column()
-    grid.add_row(mark, _coded(text))
+    grid.add_row(mark, text)
     return grid
 
 

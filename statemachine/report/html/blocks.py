@@ -26,6 +26,7 @@ from ...page import (
     Headline,
     Interactive,
     Items,
+    Markdown,
     Section,
     Table,
     TableCell,
@@ -33,6 +34,7 @@ from ...page import (
     Traces,
     Verdict,
 )
+from ...show.markdown import inline_html
 from ..figures import INK, SIDES, chart
 from ..film import inline
 from ..over_time import QuantityChart
@@ -66,20 +68,18 @@ def drawn(blocks: Iterable[Block], stage: Html, level: int = 2) -> Html:
 def _block(block: Block, stage: Html, level: int) -> Html:
     match block:
         case Heading(text):
-            return tag("h3", text)
+            return tag("h3", prose(text))
         case Text(text, (name, heading), small):
             link = (" ", tag("a", heading, href=f"#{name}"), ".") if name else ()
-            return tag("p", non_breaking(text), *link, class_="foot" if small else None)
+            return tag("p", prose(text), *link, class_="foot" if small else None)
         case Items(texts, ordered):
-            return tag(
-                "ol" if ordered else "ul", *(tag("li", non_breaking(text)) for text in texts)
-            )
+            return tag("ol" if ordered else "ul", *(tag("li", prose(text)) for text in texts))
         case Code(lines):
             return tag("pre", tag("code", "\n".join(lines)))
         case Table():
             return table(block)
         case Verdict(text, holds):
-            return tag("p", f"{'✓' if holds else '✗'} {text}", class_="verdict")
+            return tag("p", "✓ " if holds else "✗ ", prose(text), class_="verdict")
         case Section():
             return _section(block, stage, level)
         case QuantityChart():
@@ -294,6 +294,13 @@ def escaped(text: object) -> Html:
 def with_minus(text: str) -> str:
     """A text whose figures have the sign minus, not a hyphen."""
     return re.sub(r"(?<![\w\-–)\].])-(?=\d)|(?<=\de)-(?=\d)", "−", text)
+
+
+def prose(text: str) -> str:
+    """A text whose figures stay on one line with their units; of Markdown its markup."""
+    if not isinstance(text, Markdown):
+        return non_breaking(text)
+    return Html(inline_html(Markdown(non_breaking(with_minus(text)))))
 
 
 def literal(text: object) -> Html:
