@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from platform import python_version
 
-from ._common import PROGRAM, add_table, json_of
+from ._common import PROGRAM, add_table, json_of, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -31,28 +30,11 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """What is here."""
-    from ..installed import available, engine_version
-    from ..measures.text import NONE
-    from ..page import Page, Table, Text
-    from ..releases import folder, releases
-    from ..report import terminal
-    from ..report.as_json import dumps
+    from ..releases import releases
+    from ..report.engines import page
 
     here = list(releases())
-    if options.json:
-        print(dumps(here))
-        return 0
-    own = [(f"{name}=={engine_version(name)}", python_version(), NONE) for name in available()[0]]
-    rows = [(r.name, r.python, f"{r.size / 1e6:.0f} MB") for r in here]
-    table = Table(("release", "python", "size"), [*rows, *own])
-    terminal.show(
-        Page(
-            "Releases of engines",
-            f"those with a size are in {folder()}, the others beside this program",
-            [table, Text(f"To add one: {PROGRAM} engines add mujoco==3.3.7")],
-        )
-    )
-    return 0
+    return show(page(here), here, options.json)
 
 
 def run_add(options: argparse.Namespace) -> int:

@@ -170,7 +170,7 @@ def run_play(options: argparse.Namespace) -> int:
 
 def run_show(options: argparse.Namespace) -> int:
     """What is in a trace."""
-    from ..report.sides import trace_page
+    from ..report.trace import trace_page
     from ..runs import read
 
     trace = read(options.file)

@@ -1,11 +1,9 @@
-"""Sides of a comparison: their commands, what made them, their contacts; the page of one trace."""
+"""Sides of a comparison: their commands, what made them, their contacts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from ..compare import Agreement, Comparison, SidesRun
 from ..compare.alike import commands_alike
@@ -19,11 +17,11 @@ from ..measures.text import (
     sentence,
     short_time,
 )
-from ..page import Block, Figures, Headline, Items, Page, Section, Table, TableCell, Text
-from ..runs import COLUMNS, Header, Trace
+from ..page import Block, Figures, Headline, Items, Section, Table, TableCell, Text
+from ..runs import Header, Trace
 from . import template
 from .finding import long_labels, moment, name_of, short_labels, traces_of, window
-from .template import if_true, versions_of
+from .template import if_true
 from .why import missing
 
 _PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
@@ -214,54 +212,3 @@ def facts_of(header: Header) -> dict[str, str]:
         "energies by": header.energy_by or NONE,
         "made again by": TableCell(header.command, code=True),
     }
-
-
-def trace_page(trace: Trace, name: str) -> Page:
-    """What was done on what, then every column with its range."""
-    header = trace.header
-    facts = {
-        "experiment": header.experiment,
-        "engine": header.label,
-        "time": f"{trace.time[0]:g} to {trace.time[-1]:g} s, {len(trace)} rows",
-        "versions": versions_of(header.provenance.versions),
-        **facts_of(header),
-        "rewritten": f"the controller wrote into the state in {header.rewritten} rows"
-        * bool(header.rewritten),
-        "ended": header.ended,
-    }
-    touches = [
-        (
-            pair,
-            short_time(trace.time[int(np.argmax(rows))] - trace.time[0]),
-            f"{int(rows.sum())} of {len(trace)}",
-        )
-        for pair, rows in trace.touches().items()
-    ]
-    columns = [_row(column, trace) for column in COLUMNS if column in trace]
-    tables = [
-        Table(
-            ("what", "is"),
-            [fact for fact in facts.items() if fact[1]],
-            "What it is of",
-            words=frozenset({0, 1}),
-        ),
-        Table(("column", "shape", "smallest", "largest"), columns, "What is in it"),
-        Table(("bodies", "first touch", "rows"), touches, "What touches what"),
-    ]
-    return template.page(
-        "trace",
-        name=name,
-        experiment=header.experiment,
-        engine=header.label,
-        says=header.says or None,
-        tables=tables,
-        nothing=if_true("contact_row" in trace and not touches),
-    )
-
-
-def _row(column: str, trace: Trace) -> tuple[str, ...]:
-    array = trace[column]
-    shape = " × ".join(str(length) for length in array.shape)
-    if not array.size or not np.isfinite(array).any():
-        return (column, shape, "not told" if array.size else "", "")
-    return (column, shape, figure(float(np.nanmin(array))), figure(float(np.nanmax(array))))
