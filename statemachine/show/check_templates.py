@@ -142,6 +142,7 @@ class _Checker:
             tested = tested.expr
         if not isinstance(tested, (nodes.Name, nodes.Getattr)):
             self._fault(test, "a condition tests one field or named property")
+            return
         self._type_of(tested, scope, depth)
 
     def _check_literal(

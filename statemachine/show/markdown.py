@@ -57,8 +57,10 @@ def code(value: object) -> Markdown:
     text = _CONTROL.sub("?", str(value))
     longest = max((len(run) for run in _BACKTICKS.findall(text)), default=0)
     fence = "`" * (longest + 1)
-    # CommonMark takes one blank off each side where a span begins or ends with a backtick.
-    padding = " " if text.startswith("`") or text.endswith("`") else ""
+    # CommonMark takes one blank off each side where a span has one on both.
+    begins, ends = text[:1], text[-1:]
+    is_padded = "`" in (begins, ends) or (begins == ends == " " and text.strip() != "")
+    padding = " " if is_padded else ""
     return Markdown(f"{fence}{padding}{text}{padding}{fence}")
 
 

@@ -1,0 +1,209 @@
+"""Pages from templates: what is escaped, what a renderer makes of it, what the check reports."""
+
+from __future__ import annotations
+
+import html
+import io
+import re
+from contextlib import redirect_stdout
+from dataclasses import dataclass, field
+from typing import Literal
+
+import jinja2
+import pytest
+
+from statemachine.page import Items, Markdown, Page, Section, Table, Text, Verdict
+from statemachine.report import terminal
+from statemachine.report.html.blocks import Html, drawn
+from statemachine.report.notebook import markdown
+from statemachine.show.check_templates import faults_of
+from statemachine.show.markdown import code, escape, inline_html, plain_text, spans
+from statemachine.show.templates import FILTERS, PageContent, environment, render
+from tools import check_templates
+
+HOSTILE = (
+    "a|b",
+    "back`tick",
+    "two ``backticks``",
+    "<script>alert(1)</script>",
+    "__init__",
+    "snake_case_name",
+    "*stars*",
+    "[link](javascript:alert(1))",
+    "![image](http://example.org/x.png)",
+    "<http://example.org>",
+    "# heading",
+    "- item",
+    "1. first",
+    "---",
+    "> quote",
+    "&lt;b&gt;",
+    "$x$ and {role}`x`",
+    "~~struck~~",
+    "trailing\\",
+    "{{ braces }} {% if x %}",
+    "long" * 500,
+)
+
+
+@dataclass(frozen=True)
+class _Part:
+    name: str
+    size: float | None = None
+
+
+@dataclass(frozen=True)
+class _Content(PageContent):
+    template = "made_up.md.j2"
+    name: str
+    size: float = 0.25
+    holds: bool = True
+    state: Literal["inside", "beyond"] = "inside"
+    parts: tuple[_Part, ...] = ()
+    sizes: Table = field(default_factory=lambda: Table(("what", "size"), []))
+
+
+def page_of(source: str, content: _Content, monkeypatch: pytest.MonkeyPatch) -> Page:
+    """The page of a template that is no file."""
+    jinja = environment(_Content.__module__)
+    monkeypatch.setattr(jinja, "loader", jinja2.DictLoader({_Content.template: source}))
+    monkeypatch.setattr(jinja, "cache", None)
+    return render(content)
+
+
+def printed(page: Page) -> str:
+    out = io.StringIO()
+    with redirect_stdout(out):
+        terminal.show(page)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_an_escaped_value_is_read_as_it_is(text: str) -> None:
+    assert plain_text(escape(text)) == text
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_an_escaped_value_makes_no_element(text: str) -> None:
+    shown = inline_html(escape(text))
+    assert not re.search(r"<(?!/?(?:code|em|strong)\b)", shown)
+    assert not re.search("<(?:em|code|strong)>", shown)
+    assert html.unescape(shown) == text
+
+
+@pytest.mark.parametrize("text", [*HOSTILE, "`", "``", " ` "])
+def test_code_is_one_span_whatever_it_holds(text: str) -> None:
+    (span,) = spans(code(text))
+    assert (span.text, span.kind) == (text, "code")
+
+
+def test_a_line_break_in_a_value_ends_no_paragraph() -> None:
+    assert escape("a\n\n# b\x1b[31m") == "a??# b?\\[31m"
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_a_name_is_shown_as_it_is_in_every_medium(
+    text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = (
+        "# of {{ name }}\n\n*{{ name }}*\n\n{{ name }}: is it.\n\n- {{ name }}\n\n"
+        "{{ table(sizes) }}"
+    )
+    content = _Content(text, sizes=Table(("what",), [(text,)]))
+    page = page_of(source, content, monkeypatch)
+    assert page.title == f"of {text}"
+    assert plain_text(page.origin) == text
+    paragraph, items, table = page.blocks
+    assert isinstance(paragraph, Text)
+    assert plain_text(paragraph.text) == f"{text}: is it."
+    assert isinstance(items, Items)
+    assert [plain_text(item) for item in items.texts] == [text]
+    assert isinstance(table, Table)
+    assert table.rows[0][0] == text
+    letters = "".join(printed(page).split())
+    assert letters.count("".join(text.split())) >= 4
+    web = drawn(page.blocks, Html(""))
+    assert not re.search(r"<(?:script|img|a|h1|blockquote)\b", web)
+    assert "<script" not in markdown(page, lambda _: "").replace("\\<script", "")
+
+
+def test_blocks_stand_where_the_template_places_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = (
+        "# T\n\nfirst\n\n{{ table(sizes) }}\n\n"
+        "{% call verdict(holds) %}\nit\nholds\n{% endcall %}\n"
+        "{% call section('More') %}\ninside\n{% endcall %}\n"
+        "{% call small() %}\none\n\ntwo\n{% endcall %}\n"
+    )
+    content = _Content("x", sizes=Table(("a",), [("1",)]))
+    first, table, verdict, section, *notes = page_of(source, content, monkeypatch).blocks
+    assert first == Text(Markdown("first"))
+    assert table is content.sizes
+    assert verdict == Verdict(Markdown("it holds"), True)
+    assert section == Section("", "More", [Text(Markdown("inside"))])
+    assert notes == [Text(Markdown("one"), small=True), Text(Markdown("two"), small=True)]
+
+
+def test_a_table_without_rows_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert page_of("{{ table(sizes) }}", _Content("x"), monkeypatch).blocks == []
+
+
+@pytest.mark.parametrize("expression", ["size", "holds", "parts[0].size"])
+def test_what_needs_a_filter_or_a_condition_is_refused(
+    expression: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = _Content("x", parts=(_Part("p"),))
+    with pytest.raises(TypeError, match="a page shows no"):
+        page_of(f"{{{{ {expression} }}}}", content, monkeypatch)
+
+
+def test_a_figure_comes_through_its_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+    (text,) = page_of("{{ size | millimetres }}", _Content("x"), monkeypatch).blocks
+    assert text == Text(Markdown("250.00 mm"))
+
+
+FAULTS = {
+    "{{ nam }}": "no field 'nam'. Did you mean name?",
+    "{% if holds %}{{ name }}{% else %}{{ parts2 }}{% endif %}": "no field 'parts2'",
+    "{% for part in parts %}{{ part.nme }}{% endfor %}": "_Part has no field 'nme'",
+    "{{ size | milimetres }}": "no filter 'milimetres'. Did you mean millimetres?",
+    "{% if size > 2 %}a{% endif %}": "a condition compares a field with a constant text alone",
+    "{% if holds and name %}a{% endif %}": "a condition tests one field or named property",
+    "{% if state == 'insde' %}a{% endif %}": "no value 'insde'",
+    "{{ size + 1 }}": "Add has no place in a template",
+    "{% if holds %}{% if name %}{% if size %}a{% endif %}{% endif %}{% endif %}": "a condition "
+    "stands in a condition that stands in a condition",
+    "{{ 'a' if holds or name else 'b' }}": "a condition tests one field or named property",
+    "{{ open(name) }}": "a template calls table",
+    "{{ table(sizs) }}": "no field 'sizs'",
+    "{% call verdict(hold) %}x{% endcall %}": "no field 'hold'",
+    "{% call verdict(holds) %}{{ nam }}{% endcall %}": "no field 'nam'",
+}
+
+
+@pytest.mark.parametrize("source", FAULTS)
+def test_a_fault_of_a_template_is_reported_without_a_run(source: str) -> None:
+    (fault,) = faults_of(_Content, source)
+    assert FAULTS[source] in str(fault)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "{% if not holds %}a{% elif state == 'beyond' %}b{% else %}c{% endif %}",
+        "{% for part in parts %}{% if part.size is not none %}{{ part.size | rough }}{% endif %}"
+        "{% endfor %}",
+        "{{ name if holds else 'nobody' }}",
+    ],
+)
+def test_what_chooses_words_is_no_fault(source: str) -> None:
+    assert faults_of(_Content, source) == []
+
+
+def test_every_template_names_fields_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    assert check_templates.main() == 0, capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", sorted(FILTERS))
+def test_a_filter_is_documented(name: str) -> None:
+    filter_ = FILTERS[name]
+    assert isinstance(filter_, type) or filter_.__doc__
