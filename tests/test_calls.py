@@ -22,10 +22,12 @@ from statemachine import backends, installed
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.engines.call_watch import CLOSED, NEW
 from statemachine.errors import BadInputError, UnknownNameError
-from statemachine.page import Figures, Page, Table
+from statemachine.page import Page, Table
 from statemachine.probes import calls
 from statemachine.probes.calls import (
     CallRecorder,
+    RecordedStatement,
+    Recording,
     record,
     recorded_engines,
 )
@@ -81,14 +83,14 @@ def engine(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
-def short(engine: str, code: str) -> list[Figures]:
+def short(engine: str, code: str) -> list[RecordedStatement]:
     """What each line of some code did, after a Data was made."""
     recording = record(SHORT.format(engine=engine, code=code), engine)
     assert recording.error is None
     return list(recording.statements[3:])
 
 
-def counts(recording: Figures) -> Counter[str]:
+def counts(recording: Recording) -> Counter[str]:
     calls = [call for statement in recording.statements for call in statement.calls]
     return Counter(itertools.chain(*([call.function] * call.count for call in calls)))
 

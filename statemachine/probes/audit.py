@@ -124,8 +124,8 @@ class Audit:
         ]
         width = max(len(part.name) for part in self.parts)
         for part in self.parts:
-            said = part.gap or "the same in both runs: not tried"
-            lines.append(f"all but {part.name:{width}} ({part.size:3} numbers): {said}")
+            future = "the same in both runs: not tried" if part.gap is None else str(part.gap)
+            lines.append(f"all but {part.name:{width}} ({part.size:3} numbers): {future}")
         decides = ", ".join(self.decides) or "nothing"
         lines += textwrap.wrap(f"What decides the future: {decides}.", _WIDTH)
         return "\n".join(lines)
@@ -174,10 +174,10 @@ def audit(model: Model, steps: int = 60, seed: int = 0) -> Audit:
             if not size:
                 continue
             without = _without(saved, left, name)
-            found = None
+            gap = None
             if without is not None:
-                found = _gap(model, whole, _restored(model, other, without, steps))
-            parts.append(PartLeftOut(name, size, found))
+                gap = _gap(model, whole, _restored(model, other, without, steps))
+            parts.append(PartLeftOut(name, size, gap))
     return Audit(
         backend=model.backend,
         engine_version=model.engine_version,
@@ -226,19 +226,18 @@ def _without(saved: State, left: State, name: str) -> State | None:
 
 
 def _gap(model: Model, first: Array, second: Array) -> FutureGap:
-    """Return the gap between two futures, of rows as `_future` gives them."""
+    """Return the gap between two futures, of rows as `future` gives them."""
     # As integers: what is compared are bytes, in which 0 is not -0, and NaN is NaN.
     differs = (first.view(np.int64) != second.view(np.int64)).any(axis=1)
     if not differs.any():
         return FutureGap(None, 0.0, 0.0)
     places = JointPlaces.of(model.jnt_type, model.jnt_qposadr)
-    straight = np.concatenate((places.slides, places.positions))
+    hinge_gap = largest_or_inf(farthest(first[:, places.hinges], second[:, places.hinges]))
     quats = places.quats[:, None] + np.arange(4)
+    orientation_gap = largest_or_inf(turns(first[:, quats], second[:, quats]))
+    straight = np.concatenate((places.slides, places.positions))
     return FutureGap(
         first=int(np.argmax(differs)),
-        angle=max(
-            largest_or_inf(farthest(first[:, places.hinges], second[:, places.hinges])),
-            largest_or_inf(turns(first[:, quats], second[:, quats])),
-        ),
+        angle=max(hinge_gap, orientation_gap),
         length=largest_or_inf(farthest(first[:, straight], second[:, straight])),
     )

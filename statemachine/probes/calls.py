@@ -12,32 +12,133 @@ import functools
 import io
 import linecache
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from ..engines import room, rooms_with
 from ..engines.call_watch import NEW, CallWatch, WatchedObject
 from ..errors import BadInputError, StateMachineError, check_name, one_line
 from ..installed import engine_version, require
 from ..interface import Model
-from ..page import Figures
+
+
+@dataclass(frozen=True)
+class Call:
+    """Calls of one function of an engine on one thing, made by a statement.
+
+    Attributes:
+        function: Its name; a method after its class.
+        on: What it was called on: the variable that leads there, or a role; "" for nothing.
+        count: How often.
+        changed: What differs, bit by bit, after at least one of the calls from before it. All of
+            the engine's own names; `NEW` or `CLOSED` for the thing as a whole.
+        engine: Whose function it is.
+    """
+
+    function: str
+    on: str
+    count: int
+    changed: tuple[str, ...]
+    engine: str
+
+
+@dataclass(frozen=True)
+class RecordedStatement:
+    """Statement of the code that ran, and what it did.
+
+    Attributes:
+        source: As it was typed, several lines for a loop.
+        line: Its first line, from 1.
+        calls: What it made the engine do, in the order of their first appearance: each function of
+            an engine, as often as it ran on one thing.
+        changed: What changed outside any call, as code would spell it: "data.qpos[1]". Where the
+            interface has arrays of its own, theirs are here too. Writes into objects that no
+            variable leads to are left out; arrays of a model beyond 64 kB (meshes, pictures) are
+            compared at the statement's ends only, and so end up here.
+        printed: What it printed.
+        due: Each Data of which all that is derived now belongs to another moment, and is computed
+            when it is read.
+    """
+
+    source: str
+    line: int
+    calls: tuple[Call, ...]
+    changed: tuple[str, ...]
+    printed: str
+    due: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Run of some code, and the calls that it made to an engine.
+
+    Attributes:
+        engine: Whose calls were recorded.
+        version: Of the engine.
+        statements: Those that ran, the failed one included.
+        printed: All that was printed.
+        error: What the library had to say where it refused to go on, in one line; None where it
+            did not.
+    """
+
+    engine: str
+    version: str
+    statements: tuple[RecordedStatement, ...]
+    printed: str
+    error: str | None
+
+
+class CodeStatement(NamedTuple):
+    """Statement of some code.
+
+    Attributes:
+        source: As it is typed.
+        line: Its first line, from 1.
+        run: Runs it in a namespace.
+    """
+
+    source: str
+    line: int
+    run: Callable[[dict[str, Any]], None]
+
+
+class _Target(NamedTuple):
+    """A function, and what it was called on.
+
+    Attributes:
+        engine: Whose function it is.
+        function: Its name.
+        on: The object; None for nothing.
+    """
+
+    engine: str
+    function: str
+    on: WatchedObject | None
+
+
+class _Field(NamedTuple):
+    """A field of an object."""
+
+    of: WatchedObject
+    name: str
 
 
 class CallRecorder:
-    """Looks at the functions of engines while they are `replaced`; one in a process."""
+    """Recorder of the calls of engines' functions while they are `replaced`; one in a process."""
 
     _active = False
 
     def __init__(self, watches: Mapping[str, CallWatch]) -> None:
-        """Of watches by engine."""
+        """Take the watches by engine."""
         self._watches = watches
         self.begin()
         self._listening = False  # only while a statement runs, and not within a call
 
     @contextmanager
     def replaced(self) -> Iterator[None]:
-        """Until the end of the block the functions tell this recorder that they are called."""
+        """Let the functions tell this recorder that they are called, until the end of the block."""
         if CallRecorder._active:
             raise BadInputError("a run that is recorded cannot record another")
         with ExitStack() as restore:
@@ -64,35 +165,23 @@ class CallRecorder:
         return counted
 
     def begin(self) -> None:
-        """A statement is about to run."""
-        # By engine, function and what it was called on: how often, and what it changed there.
-        self._counts: Counter[tuple[str, str, WatchedObject | None]] = Counter()
-        self._changed = defaultdict[Any, dict[tuple[WatchedObject, str], None]](dict)
-        self._written = defaultdict[tuple[WatchedObject, str], set[str]](set)
+        """Forget the statement before: another is about to run."""
+        self._counts: Counter[_Target] = Counter()
+        # What changed in a call, in the order of the first changes; the values say nothing.
+        self._changed = defaultdict[_Target, dict[_Field, None]](dict)
+        self._written = defaultdict[_Field, set[str]](set)
         self._listening = True
 
-    def end(self, source: str, line: int, printed: str, namespace: Mapping[str, Any]) -> Figures:
-        """A statement of the code has run, and printed something.
+    def end(
+        self, source: str, line: int, printed: str, namespace: Mapping[str, Any]
+    ) -> RecordedStatement:
+        """Return what was recorded since `begin`: a statement of the code has run.
 
-        Returns:
-            source: As it was typed, several lines for a loop; line: its first line, from 1.
-            calls: What it made the engine do, in the order of their first appearance: each
-                function of an engine, as often as it ran on one thing; see below.
-            changed: What changed outside any call, as code would spell it: "data.qpos[1]". Where
-                the interface has arrays of its own, theirs are here too. Writes into objects that
-                no variable leads to are left out; arrays of a model beyond 64 kB (meshes,
-                pictures) are compared at the statement's ends only, and so end up here.
+        Args:
+            source: As it was typed.
+            line: Its first line, from 1.
             printed: What it printed.
-            due: Each Data of which all that is derived now belongs to another moment, and is
-                computed when it is read.
-
-            Of a call:
-            function: Its name; a method after its class.
-            on: What it was called on: the variable that leads there, or a role; "" for nothing.
-            count: How often.
-            changed: What differs, bit by bit, after at least one of the calls from before it.
-                All of the engine's own names; `NEW` or `CLOSED` for the thing as a whole.
-            engine: Whose function it is.
+            namespace: Variables of the code.
         """
         self._listening = False
         due: list[str] = []
@@ -104,64 +193,75 @@ class CallRecorder:
                 self._note_writes(watched, thoroughly=True)
                 if watched.due():
                     due.append(watched.title)
-        counts, names = Counter[tuple[str, str, str]](), defaultdict[Any, dict[str, None]](dict)
-        for called, count in self._counts.items():
-            engine, function, on = called
-            titled = engine, function, on.title if on else ""
-            counts[titled] += count
-            for watched, field in self._changed[called]:
-                names[titled][field if watched is on else watched.spelled(field)] = None
-        calls = tuple(
-            Figures(
-                function=function,
-                on=title,
-                count=count,
-                changed=tuple(names[engine, function, title]),
-                engine=engine,
-            )
-            for (engine, function, title), count in counts.items()
-        )
-        changed = tuple(
-            watched.spelled(field if len(entries) > 1 else next(iter(entries)))
-            for (watched, field), entries in self._written.items()
-            if watched.named
-        )
-        return Figures(
-            source=source, line=line, calls=calls, changed=changed, printed=printed, due=tuple(due)
+        return RecordedStatement(
+            source, line, self._calls(), self._changed_outside(), printed, tuple(due)
         )
 
+    def _calls(self) -> tuple[Call, ...]:
+        """Return the calls since `begin`; those on objects of one title are taken together."""
+        counts: Counter[tuple[str, str, str]] = Counter()
+        changed = defaultdict[tuple[str, str, str], dict[str, None]](dict)
+        for target, count in self._counts.items():
+            title = target.on.title if target.on else ""
+            key = (target.engine, target.function, title)
+            counts[key] += count
+            for field in self._changed[target]:
+                name = field.name if field.of is target.on else field.of.spelled(field.name)
+                changed[key][name] = None
+        return tuple(
+            Call(function, title, count, tuple(changed[engine, function, title]), engine)
+            for (engine, function, title), count in counts.items()
+        )
+
+    def _changed_outside(self) -> tuple[str, ...]:
+        """Return what changed outside any call since `begin`, as code would spell it."""
+        changed: list[str] = []
+        for field, entries in self._written.items():
+            if field.of.named:
+                # Where several entries changed one after the other, the field as a whole.
+                name = field.name if len(entries) > 1 else next(iter(entries))
+                changed.append(field.of.spelled(name))
+        return tuple(changed)
+
     def _call(
-        self, engine: str, function: str, bare: Callable[..., Any], args: Any, kwargs: Any
+        self,
+        engine: str,
+        function: str,
+        bare: Callable[..., Any],
+        args: tuple[Any, ...],
+        kwargs: dict[str, Any],
     ) -> Any:
-        watch, self._listening = self._watches[engine], False
+        """Call a function of an engine, and note what it changes."""
+        watch = self._watches[engine]
+        self._listening = False
         try:
-            objects = watch.concerned(function, args, kwargs)
+            objects: Sequence[WatchedObject] | None = watch.concerned(function, args, kwargs)
             if objects is None:
                 return bare(*args, **kwargs)
             for watched in objects:
                 self._note_writes(watched)
-            created = None
+            created: WatchedObject | None = None
             try:
                 result = bare(*args, **kwargs)
                 created = watch.created(function, args, result)
                 return result
             finally:
-                called = engine, function, created or next(iter(objects), None)
-                self._counts[called] += 1
+                target = _Target(engine, function, created or next(iter(objects), None))
+                self._counts[target] += 1
                 if created:
                     created.look_again()
-                    self._changed[called][created, NEW] = None
+                    self._changed[target][_Field(created, NEW)] = None
                 for watched in objects:
                     for field in watched.look_again():
-                        self._changed[called][watched, field] = None
+                        self._changed[target][_Field(watched, field)] = None
         finally:
             self._listening = True
 
     def _note_writes(self, watched: WatchedObject, thoroughly: bool = False) -> None:
-        """Whatever differs from the last look was changed by no call."""
+        """Note what differs from the last look: no call changed it."""
         if not watched.gone:
             for field, entry in watched.look_again(thoroughly).items():
-                self._written[watched, field].add(entry)
+                self._written[_Field(watched, field)].add(entry)
 
 
 def recorded_engines() -> list[str]:
@@ -169,7 +269,7 @@ def recorded_engines() -> list[str]:
     return rooms_with("call_watch")
 
 
-def record(code: str, engine: str) -> Figures:
+def record(code: str, engine: str) -> Recording:
     """Run code in a fresh namespace and record the calls that it makes to an engine.
 
     What is recorded are calls of functions in the engine's Python module, of methods of its
@@ -179,12 +279,6 @@ def record(code: str, engine: str) -> Figures:
     Args:
         code: Statements, as they are typed; they name their backend themselves.
         engine: One of `recorded_engines()`, the engine of that backend.
-
-    Returns:
-        engine: Whose calls were recorded; version: its.
-        statements: Those that ran, the failed one included; see `CallRecorder.end`.
-        printed: All that was printed.
-        error: What the library had to say where it refused to go on, in one line.
 
     Raises:
         UnknownNameError: No recorder knows this engine.
@@ -198,19 +292,19 @@ def record(code: str, engine: str) -> Figures:
     watch = room(engine).call_watch()
     helpers = {helper: room(helper).call_watch() for helper in watch.words.helpers}
     namespace: dict[str, Any] = {"__name__": "__main__"}
-    done: list[Figures] = []
-    error = None
+    done: list[RecordedStatement] = []
+    error: str | None = None
     recorder = CallRecorder({engine: watch, **helpers})
     with recorder.replaced():
-        for source, line, run in statements(code):
+        for statement in statements(code):
             out = io.StringIO()
             recorder.begin()
             try:
                 with redirect_stdout(out):
-                    run(namespace)
+                    statement.run(namespace)
             except StateMachineError as refusal:
                 error = one_line(refusal)
-            done.append(recorder.end(source, line, out.getvalue(), namespace))
+            done.append(recorder.end(statement.source, statement.line, out.getvalue(), namespace))
             if error is not None:
                 break
     for name, value in namespace.items():
@@ -218,7 +312,7 @@ def record(code: str, engine: str) -> Figures:
             raise BadInputError(
                 f"the code's {name} is on {value.backend}, and {engine} was to be recorded"
             )
-    return Figures(
+    return Recording(
         engine=engine,
         version=engine_version(engine),
         statements=tuple(done),
@@ -227,21 +321,25 @@ def record(code: str, engine: str) -> Figures:
     )
 
 
-def statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]], None]]]:
-    """Source, first line, and a function that runs it in a namespace, of each statement."""
+def statements(code: str) -> Iterator[CodeStatement]:
+    """Yield the statements of some code."""
     name = "<lesson>"
     lines = code.splitlines()
     linecache.cache[name] = (len(code), None, [f"{line}\n" for line in lines], name)
     body = ast.parse(code, name).body
-    firsts = [
-        min([node.lineno, *(own.lineno for own in getattr(node, "decorator_list", []))])
-        for node in body
-    ]
+    firsts = [_first_line(node) for node in body]
     ends = [node.end_lineno or node.lineno for node in body]
     for k, (node, first, end) in enumerate(zip(body, firsts, ends, strict=True)):
-        shared = (k > 0 and ends[k - 1] == first) or firsts[k + 1 : k + 2] == [end]
-        text = "\n".join(lines[first - 1 : end])
-        source = (ast.get_source_segment(code, node) or text) if shared else text
+        source = "\n".join(lines[first - 1 : end])
+        begins_where_another_ends = k > 0 and ends[k - 1] == first
+        if begins_where_another_ends or firsts[k + 1 : k + 2] == [end]:
+            source = ast.get_source_segment(code, node) or source
         compiled = compile(ast.Module([node], []), name, "exec", dont_inherit=True)
 
-        yield source, first, functools.partial(exec, compiled)
+        yield CodeStatement(source, first, functools.partial(exec, compiled))
+
+
+def _first_line(node: ast.stmt) -> int:
+    """Return the first line of a statement, that of its first decorator where it has one."""
+    decorators: Sequence[ast.expr] = getattr(node, "decorator_list", ())
+    return min([node.lineno, *(decorator.lineno for decorator in decorators)])

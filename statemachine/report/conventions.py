@@ -14,8 +14,9 @@ from ..engines.call_watch import CallWords
 from ..engines.measured import Measurement
 from ..interface import DERIVED
 from ..measures.text import NONE, capital, few, grouped, reading, significant
-from ..page import Block, Code, Figures, Page, Section, Table, Text, Verdict
-from ..probes.conventions import CONCEPTS
+from ..page import Block, Code, Page, Section, Table, Text, Verdict
+from ..probes.calls import Call, RecordedStatement, Recording
+from ..probes.conventions import CONCEPTS, Convention, Conventions, Phrasebook
 from . import template
 from .template import if_true, versions_of
 
@@ -23,7 +24,7 @@ _ZERO = 1e-12
 _NOT_ASKED = "not asked"
 
 
-def page(result: Figures) -> Page:
+def page(result: Conventions) -> Page:
     """One table for each question, and why it matters."""
     answers = [(_table(answered), Text(answered.question.why)) for answered in result.questions]
     return template.page(
@@ -31,7 +32,7 @@ def page(result: Figures) -> Page:
     )
 
 
-def calls_page(result: Figures) -> Page:
+def calls_page(result: Phrasebook) -> Page:
     """For each concept what to type on each engine, and whether all of it did what it should."""
     calls = [(engine, call) for engine, those in result.engines.items() for call in those]
     wrong = [f"{engine}, {call.concept}: {call.said}" for engine, call in calls if not call.works]
@@ -46,7 +47,7 @@ def calls_page(result: Figures) -> Page:
     )
 
 
-def _concept(concept: str, result: Figures) -> Section:
+def _concept(concept: str, result: Phrasebook) -> Section:
     """What to type for a concept, engine by engine."""
     shown: list[Block] = []
     for engine, calls in result.engines.items():
@@ -57,7 +58,7 @@ def _concept(concept: str, result: Figures) -> Section:
     return Section("", capital(concept), shown)
 
 
-def _table(answered: Figures) -> Table:
+def _table(answered: Convention) -> Table:
     """Answers by engine, with a column for the parts of the question if it has any."""
     rows = []
     for engine, findings in answered.findings.items():
@@ -116,7 +117,7 @@ REMEMBER = (
 )
 
 
-def cheat_sheet(table: Figures) -> str:
+def cheat_sheet(table: Phrasebook) -> str:
     """The page as Markdown, with a table in HTML.
 
     Args:
@@ -151,7 +152,7 @@ _NAMES_SHOWN = 8  # of what a call changed
 _ROWS_SHOWN = 6  # of the calls on one thing, before those that changed nothing share one
 
 
-def recorded_calls(recordings: Mapping[str, Figures]) -> list[Block]:
+def recorded_calls(recordings: Mapping[str, Recording]) -> list[Block]:
     """Blocks for the recordings of one code, by engine; the code's backend may differ."""
     prefix = {name: f"{name}: " if len(recordings) > 1 else "" for name in recordings}
     looks = [
@@ -185,7 +186,7 @@ def not_asked(backend: str) -> Text:
     return Text(f"{backend}: not asked which of its own functions it ran.")
 
 
-def _answers(ran: Mapping[str, Figures]) -> list[Block]:
+def _answers(ran: Mapping[str, RecordedStatement]) -> list[Block]:
     """What a line made each engine do; once, if nothing and the same of all."""
     silent = {name: _unheard(statement) for name, statement in ran.items() if not statement.calls}
     if len(silent) == len(ran) and len({*silent.values()}) == 1:
@@ -196,7 +197,7 @@ def _answers(ran: Mapping[str, Figures]) -> list[Block]:
     ]
 
 
-def _unheard(statement: Figures) -> str:
+def _unheard(statement: RecordedStatement) -> str:
     """What a line did that ran nothing of the engine."""
     changed = ", ".join(statement.changed) or None
     (text,) = template.texts(
@@ -209,7 +210,7 @@ def _unheard(statement: Figures) -> str:
     return text
 
 
-def _calls_table(engine: str, statement: Figures) -> Table:
+def _calls_table(engine: str, statement: RecordedStatement) -> Table:
     """The calls, those on one thing under its name; then what changed outside of them."""
     rows: list[tuple[str, str, str]] = []
     titles: set[int] = set()
@@ -231,7 +232,7 @@ def _calls_table(engine: str, statement: Figures) -> Table:
     )
 
 
-def _rows(calls: Sequence[Figures]) -> list[tuple[str, str, str]]:
+def _rows(calls: Sequence[Call]) -> list[tuple[str, str, str]]:
     """The calls on one thing; where they are many, those without effect in one row."""
     idle = [call for call in calls if not call.changed]
     if len(calls) <= _ROWS_SHOWN or len(idle) < 2:
@@ -257,7 +258,7 @@ def _words(engine: str) -> CallWords:
     return room(engine).call_watch().words
 
 
-def _legend(recording: Figures) -> list[Text]:
+def _legend(recording: Recording) -> list[Text]:
     """What the roles are that appear, with what this run says of them."""
     words = _words(recording.engine)
     calls = [call for statement in recording.statements for call in statement.calls]

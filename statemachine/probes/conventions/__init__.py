@@ -9,22 +9,22 @@ that keep our contract. An engine whose room measures nothing is not asked.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType
 from typing import Any
 
 from ...engines import room, room_names
 from ...engines.measured import Absent, Measurement, Phrases
 from ...errors import check_name
 from ...installed import ENGINES, engine_version, require, silence
-from ...page import Figures
 from ...runs.drive import Progress, silent
 from . import answers, frames, motion
-from .answers import NO_ANSWER, Answers, EngineAnswer
+from .answers import NO_ANSWER, Answers, EngineAnswer, Question, Wording
 
 # In the order in which a newcomer meets them.
-QUESTIONS: dict[str, Figures] = {  # as `answers.question` gives them
+QUESTIONS: dict[str, Question[Any]] = {
     "quaternion": frames.quaternion,
     "velocity": frames.velocity,
     "gravity": motion.gravity,
@@ -42,8 +42,36 @@ QUESTIONS: dict[str, Figures] = {  # as `answers.question` gives them
 }
 
 
+@dataclass(frozen=True)
+class Convention:
+    """Question that was asked, and what each engine does about it.
+
+    Attributes:
+        name: A key of `QUESTIONS`.
+        question: Its words.
+        findings: Answers by engine; None of one that was not asked.
+    """
+
+    name: str
+    question: Wording
+    findings: Mapping[str, Answers | None]
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """What some engines take for granted.
+
+    Attributes:
+        versions: Version of each engine that was asked; "" of one of another package.
+        questions: Those that were asked, in their order.
+    """
+
+    versions: Mapping[str, str]
+    questions: tuple[Convention, ...]
+
+
 def ask(question: str, engine: str) -> Answers | None:
-    """What one engine does about one question; None if its room has no measurement for it.
+    """Return what one engine does about one question; None if its room has no measurement for it.
 
     Args:
         question: One of `QUESTIONS`.
@@ -59,21 +87,25 @@ def ask(question: str, engine: str) -> Answers | None:
     if measure is None:
         return None
     asked = QUESTIONS[question]
-    measured = measure(*asked.given)
-    return _absent(measured) if isinstance(measured, Absent) else asked.answer(measured)
+    measured = measure(*asked.inputs)
+    if isinstance(measured, Absent):
+        return (_answer_of_absent(measured),)
+    return asked.answer(measured)
 
 
-def _absent(looked: Absent) -> Answers:
-    count = Measurement(f"functions called …{'…, …'.join(looked.words)}…:", len(looked.names))
-    words = ", ".join(looked.names) or NO_ANSWER
-    return (EngineAnswer(words, (count, *looked.figures), looked.part),)
+def _answer_of_absent(absent: Absent) -> EngineAnswer:
+    """Return the answer of an engine for which the question does not arise."""
+    patterns = "…, …".join(absent.words)
+    count = Measurement(f"functions called …{patterns}…:", len(absent.names))
+    words = ", ".join(absent.names) or NO_ANSWER
+    return EngineAnswer(words, (count, *absent.figures), absent.part)
 
 
 def probe(
     engines: Sequence[str],
     questions: Iterable[str] = QUESTIONS,
     progress: Progress = silent,
-) -> Figures:
+) -> Conventions:
     """Ask each engine each question.
 
     Args:
@@ -81,28 +113,20 @@ def probe(
         questions: Some of `QUESTIONS`.
         progress: Told the fraction that is done.
 
-    Returns:
-        versions: That were asked.
-        questions: Of each its name, its words, and what was found, by engine; None of one that was
-            not asked.
-
     Raises:
         MissingEngineError: An engine is not installed here.
         UnknownNameError: There is no such question, or no such engine.
     """
-    asked: dict[str, dict[str, Answers | None]] = {name: {} for name in questions}
-    check_questions(asked)
-    pairs = [(name, engine) for name in asked for engine in engines]
-    for done, (name, engine) in enumerate(pairs):
-        progress(done / len(pairs))
-        asked[name][engine] = ask(name, engine)
-    return Figures(
-        versions=versions(engines),
-        questions=tuple(
-            Figures(name=name, question=QUESTIONS[name].question, findings=findings)
-            for name, findings in asked.items()
-        ),
-    )
+    names = list(dict.fromkeys(questions))
+    check_questions(names)
+    conventions: list[Convention] = []
+    for number, name in enumerate(names):
+        findings: dict[str, Answers | None] = {}
+        for done, engine in enumerate(engines):
+            progress((number + done / len(engines)) / len(names))
+            findings[engine] = ask(name, engine)
+        conventions.append(Convention(name, QUESTIONS[name].wording, findings))
+    return Conventions(versions(engines), tuple(conventions))
 
 
 def check_questions(questions: Iterable[str]) -> None:
@@ -122,7 +146,7 @@ def check_engine(name: str) -> None:
 
 
 def versions(engines: Sequence[str]) -> dict[str, str]:
-    """Version of each engine; "" of one of another package."""
+    """Return the version of each engine; "" of one of another package."""
     return {name: engine_version(name) if name in ENGINES else "" for name in engines}
 
 
@@ -146,54 +170,78 @@ CONCEPTS = (
 )
 
 
-def run_phrases(engines: Sequence[str], progress: Progress = silent) -> Figures:
+@dataclass(frozen=True)
+class Phrase:
+    """Lines that are typed for a concept on one engine, and whether it happened.
+
+    Attributes:
+        concept: One of `CONCEPTS`.
+        code: What is typed.
+        works: Whether it ran, and the concept happened.
+        said: What was wrong; "" where nothing was.
+    """
+
+    concept: str
+    code: str
+    works: bool
+    said: str
+
+
+@dataclass(frozen=True)
+class Phrasebook:
+    """What is typed for each concept on some engines, after every line of it was run.
+
+    Attributes:
+        versions: Version of each engine; "" of one of another package.
+        engines: Phrases by engine, in the order of `CONCEPTS`.
+    """
+
+    versions: Mapping[str, str]
+    engines: Mapping[str, tuple[Phrase, ...]]
+
+
+def run_phrases(engines: Sequence[str], progress: Progress = silent) -> Phrasebook:
     """Run every cell of some engines.
 
     Args:
         engines: Keys of `installed.ENGINES`.
         progress: Told the fraction that is done.
 
-    Returns:
-        versions: That were asked.
-        engines: The phrases of each; see `_phrase`.
-
     Raises:
         MissingEngineError: An engine is not installed here.
         UnknownNameError: There is no such engine.
     """
-    phrases: dict[str, tuple[Figures, ...]] = {}
+    phrases: dict[str, tuple[Phrase, ...]] = {}
     for done, engine in enumerate(engines):
         check_engine(engine)
-        own = room(engine).phrases()
-        concepts = [concept for concept in CONCEPTS if concept in own.cells]
-        said = []
+        cells = room(engine).phrases()
+        concepts = [concept for concept in CONCEPTS if concept in cells.cells]
+        tried: list[Phrase] = []
         for count in range(1, len(concepts) + 1):
-            said.append(_phrase(own, concepts[:count]))
+            tried.append(_run_phrase(cells, concepts[:count]))
             progress((done + count / len(concepts)) / len(engines))
-        phrases[engine] = tuple(said)
-    return Figures(versions=versions(engines), engines=phrases)
+        phrases[engine] = tuple(tried)
+    return Phrasebook(versions(engines), phrases)
 
 
-def _phrase(own: Phrases, concepts: Sequence[str]) -> Figures:
-    """Run the cells up to the last concept, so that its check may do what it likes.
-
-    Returns:
-        concept: The last one; code: what was typed for it.
-        works: Whether it ran, and the concept happened; said: what was wrong.
-    """
-    cell = own.cells[concepts[-1]]
-    said = ""
+def _run_phrase(phrases: Phrases, concepts: Sequence[str]) -> Phrase:
+    """Run the cells up to the last concept, so that its check may do what it likes."""
+    cell = phrases.cells[concepts[-1]]
+    fault = ""
     with tempfile.TemporaryDirectory() as folder, silence():
-        file = Path(folder) / own.file[0]
-        file.write_text(own.file[1], encoding="utf-8")
-        names: dict[str, Any] = {"file": str(file)}
+        name, text = phrases.file
+        file = Path(folder) / name
+        file.write_text(text, encoding="utf-8")
+        program = ModuleType("phrases")
+        names = vars(program)
+        names["file"] = str(file)
         try:
             for concept in concepts:
-                exec(own.cells[concept].code, names)
-            if not cell.happened(SimpleNamespace(**names)):
-                said = "it ran, and what it should do did not happen"
+                exec(phrases.cells[concept].code, names)
+            if not cell.happened(program):
+                fault = "it ran, and what it should do did not happen"
         except Exception as error:  # whatever an engine raises is the finding
-            said = f"{type(error).__name__}: {error}"
+            fault = f"{type(error).__name__}: {error}"
         finally:
-            own.close(SimpleNamespace(**names))
-    return Figures(concept=concepts[-1], code=cell.code, works=not said, said=said)
+            phrases.close(program)
+    return Phrase(concepts[-1], cell.code, works=not fault, said=fault)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from ...engines.measured import Futures, Measurement, ReadTwice
 from ...interface import Array
-from ...page import Figures
 
 NO_ANSWER = "–"  # the question does not arise on this engine
 UNDECIDED = "undecided"  # no hypothesis explains what was measured
@@ -34,35 +33,84 @@ class EngineAnswer:
 Answers = tuple[EngineAnswer, ...]
 
 
+@dataclass(frozen=True)
+class Wording:
+    """Words of a question to the engines.
+
+    Attributes:
+        title: The question.
+        why: What goes wrong for a student who takes the answer for granted, in a sentence or two.
+    """
+
+    title: str
+    why: str
+
+
+Input = float | Sequence[float] | Sequence[Sequence[float]] | Array  # of a measurement
+M = TypeVar("M")  # what an engine's measurement returns
+
+
+@dataclass(frozen=True)
+class Question(Generic[M]):
+    """Question to the engines, and how its answers follow from a measurement.
+
+    Attributes:
+        wording: What is asked, and why.
+        inputs: Arguments of an engine's measurement.
+        answers: Draws the answers from what was measured, one for each part of the question.
+    """
+
+    wording: Wording
+    inputs: tuple[Input, ...]
+    answers: Callable[[M], Iterable[EngineAnswer]]
+
+    def answer(self, measured: M) -> Answers:
+        """Return the answers of the engine that measured this."""
+        return tuple(self.answers(measured))
+
+
 def question(
-    title: str, why: str, *given: Any
-) -> Callable[[Callable[[Any], Iterator[EngineAnswer]]], Figures]:
-    """The question of a function that lets its answers follow from a measurement.
+    title: str, why: str, *inputs: Input
+) -> Callable[[Callable[[M], Iterable[EngineAnswer]]], Question[M]]:
+    """Make a Question of a function that draws answers from a measurement.
 
     Args:
         title: The question.
         why: What goes wrong for a student who takes the answer for granted, in a sentence or two.
-        *given: The arguments of an engine's measurement.
-
-    Returns:
-        question: Its words, title and why.
-        given: The same.
-        answer: From what was measured to the Answers.
+        *inputs: Arguments of an engine's measurement.
     """
-    return lambda answers: Figures(
-        question=Figures(title=title, why=why),
-        given=given,
-        answer=lambda measured: tuple(answers(measured)),
-    )
+
+    def make(answers: Callable[[M], Iterable[EngineAnswer]]) -> Question[M]:
+        return Question(Wording(title, why), inputs, answers)
+
+    return make
 
 
-def closest(distances: Mapping[str, float]) -> tuple[str, float, float]:
-    """The hypothesis that explains a measurement, how far off it is, and how far the next.
+@dataclass(frozen=True)
+class Explanation:
+    """Hypothesis that explains a measurement best.
 
-    It is `UNDECIDED` unless its distance is below a quarter of the next one's.
+    Attributes:
+        hypothesis: Its name; `UNDECIDED` unless its error is below a quarter of the next one's.
+        error: How far it is from what was measured [the measurement's unit].
+        next_error: How far the second best is [the measurement's unit].
     """
-    (best, name), (following, _), *_ = sorted((off, key) for key, off in distances.items())
-    return (name if best < following / 4 else UNDECIDED), best, following
+
+    hypothesis: str
+    error: float
+    next_error: float
+
+
+def closest(errors: Mapping[str, float]) -> Explanation:
+    """Return the hypothesis with the smallest error.
+
+    Args:
+        errors: By hypothesis, how far it is from what was measured; at least two.
+    """
+    (error, hypothesis), (next_error, _), *_ = sorted((off, name) for name, off in errors.items())
+    if error < next_error / 4:
+        return Explanation(hypothesis, error, next_error)
+    return Explanation(UNDECIDED, error, next_error)
 
 
 # What an engine keeps: derived values after a write and a step, a past after a reset, a save.
@@ -71,14 +119,24 @@ _SAME = 1e-6  # m; PyBullet tells a link's frame in single precision
 
 
 def _stale_or_fresh(readings: Sequence[ReadTwice]) -> Iterator[EngineAnswer]:
-    """How far off is what is read, and what is recomputed then?"""
+    """Tell for each reading whether it is of the state before or of this one."""
     for part, read, recomputed, true in readings:
-        off, again = (
-            float(np.linalg.norm(np.subtract(value, true))) for value in (read, recomputed)
+        error = float(np.linalg.norm(np.subtract(read, true)))
+        error_recomputed = float(np.linalg.norm(np.subtract(recomputed, true)))
+        figures = (
+            Measurement("off by", error, "m"),
+            Measurement("recomputed", error_recomputed, "m"),
         )
-        words = "fresh" if off < _SAME else "stale" if again < _SAME else UNDECIDED
-        figures = Measurement("off by", off, "m"), Measurement("recomputed", again, "m")
-        yield EngineAnswer(words, figures, part)
+        yield EngineAnswer(_age(error, error_recomputed), figures, part)
+
+
+def _age(error: float, error_recomputed: float) -> str:
+    """Return "fresh" or "stale" by the errors [m] of a reading before and after a recomputation."""
+    if error < _SAME:
+        return "fresh"
+    if error_recomputed < _SAME:
+        return "stale"
+    return UNDECIDED
 
 
 write = question(
@@ -103,38 +161,44 @@ step = question(
     "leaves alone has to be set by hand.",
 )
 def reset(still_there: Mapping[str, Mapping[str, bool]]) -> Iterator[EngineAnswer]:
-    """What each way to reset keeps of what was written before."""
-    for way, there in still_there.items():
-        left, gone = _split(there)
-        gone = [f"{name} (gone)" if name == "bodies" else name for name in gone]
-        words = f"keeps {', '.join(left) or 'nothing'}"
-        yield EngineAnswer(words, (Measurement("sets back", tuple(gone)),), way)
+    """Tell what each way to reset keeps.
+
+    Args:
+        still_there: By way, whether each quantity that was written before is still there.
+    """
+    for way, stays in still_there.items():
+        words = f"keeps {_listed(name for name, stayed in stays.items() if stayed)}"
+        lost = []
+        for name, stayed in stays.items():
+            if not stayed:
+                lost.append("bodies (gone)" if name == "bodies" else name)
+        yield EngineAnswer(words, (Measurement("sets back", tuple(lost)),), way)
 
 
-def _split(names: Mapping[str, bool]) -> tuple[list[str], list[str]]:
-    """Those that hold, and the others."""
-    return [name for name in names if names[name]], [name for name in names if not names[name]]
+def _listed(names: Iterable[str]) -> str:
+    """Return names in a row, or "nothing"."""
+    return ", ".join(names) or "nothing"
 
 
 @question(
     "You save, go on, and restore: what does not come back?",
     "What is not in the saved state keeps the value of the run that you wanted to undo.",
 )
-def save(back: Mapping[str, Mapping[str, bool]] | float) -> Iterator[EngineAnswer]:
-    """What each way to save does not bring back.
+def save(restored: Mapping[str, Mapping[str, bool]] | float) -> Iterator[EngineAnswer]:
+    """Tell what each way to save does not bring back.
 
     Args:
-        back: By way, whether each quantity comes back. Of a Data that holds no state, by how much
-            a used one computes an acceleration otherwise than a new one [rad/s²].
+        restored: By way, whether each quantity comes back. Of a Data that holds no state, by how
+            much a used one computes an acceleration otherwise than a new one [rad/s²].
     """
-    if not isinstance(back, Mapping):
-        shown = Measurement("a used Data's acceleration is off by", back, "rad/s²")
-        yield EngineAnswer("forgets a Data's past" if back else NO_ANSWER, (shown,))
+    if not isinstance(restored, Mapping):
+        error = Measurement("a used Data's acceleration is off by", restored, "rad/s²")
+        yield EngineAnswer("forgets a Data's past" if restored else NO_ANSWER, (error,))
         return
-    for way, comes in back.items():
-        back_again, forgotten = _split(comes)
-        words = f"forgets {', '.join(forgotten) or 'nothing'}"
-        yield EngineAnswer(words, (Measurement("brings back", tuple(back_again)),), way)
+    for way, comes_back in restored.items():
+        words = f"forgets {_listed(name for name, back in comes_back.items() if not back)}"
+        kept = tuple(name for name, back in comes_back.items() if back)
+        yield EngineAnswer(words, (Measurement("brings back", kept),), way)
 
 
 @question(
@@ -145,25 +209,25 @@ def save(back: Mapping[str, Mapping[str, bool]] | float) -> Iterator[EngineAnswe
     200,  # steps of the futures
 )
 def future(trials: Mapping[str, Sequence[Futures]] | float) -> Iterator[EngineAnswer]:
-    """Whether each way back, to the start or to moments in the middle, is exact, bit by bit.
+    """Tell whether each way back, to the start or to moments in the middle, is exact, bit by bit.
 
     Args:
         trials: By way, the two futures of each trial. Of a Data that holds no state, as of `save`.
     """
     if not isinstance(trials, Mapping):
-        off = Measurement("acceleration off by", trials, "rad/s²")
-        yield EngineAnswer("differs" if trials else "exact", (off,), "a used Data, a new one")
+        error = Measurement("acceleration off by", trials, "rad/s²")
+        yield EngineAnswer("differs" if trials else "exact", (error,), "a used Data, a new one")
         return
     for way, futures in trials.items():
         exact = sum(np.array_equal(first, second) for first, second in futures)
         figures = (
             Measurement("exact in", f"{exact} of {len(futures)}"),
-            Measurement("boxes off by", max(_apart(*pair) for pair in futures), "m"),
+            Measurement("boxes off by", max(_box_gap(*pair) for pair in futures), "m"),
         )
         yield EngineAnswer("exact" if exact == len(futures) else "differs", figures, way)
 
 
-def _apart(first: Array, second: Array) -> float:
-    """The largest difference in a coordinate of a box [m]."""
+def _box_gap(first: Array, second: Array) -> float:
+    """Return the largest difference [m] between two futures in a coordinate of a box."""
     boxes = (first - second)[:, :-1].reshape(len(first), -1, 7)
     return float(np.abs(boxes[..., :3]).max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -21,11 +22,19 @@ _SAME = 1e-6  # m/s², s, m/s
     50,  # steps
 )
 def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Iterator[EngineAnswer]:
-    """The gravity (3,) [m/s²] that a body feels, unless the engine tells of another."""
+    """Tell the gravity that a body feels, and that which the engine tells where it is another.
+
+    Args:
+        gravity: What the engine tells (3,) [m/s²], and with what a body falls (3,) [m/s²].
+    """
     stated, measured = gravity
-    felt, said = (numbers(np.round(v, 2) + 0.0) for v in (measured, stated))
-    words = felt if np.allclose(stated, measured, atol=_SAME) else f"told {said}, felt {felt}"
-    yield EngineAnswer(words, (Measurement("falls with", tuple(map(float, measured)), "m/s²"),))
+    felt = numbers(np.round(measured, 2) + 0.0)
+    if np.allclose(stated, measured, atol=_SAME):
+        words = felt
+    else:
+        words = f"told {numbers(np.round(stated, 2) + 0.0)}, felt {felt}"
+    fall = Measurement("falls with", tuple(float(part) for part in measured), "m/s²")
+    yield EngineAnswer(words, (fall,))
 
 
 @question(
@@ -34,10 +43,13 @@ def gravity(gravity: tuple[Sequence[float], Sequence[float]]) -> Iterator[Engine
     "at a fixed rate must know how many steps there are to one of its own.",
 )
 def timestep(step: OneStep) -> Iterator[EngineAnswer]:
-    """The step [s] that a body at 1 m/s tells by how far it comes, and the engine's clock."""
+    """Tell the step by how far a body at 1 m/s comes in it, and the engine's clock."""
     stated, moved, clock, ticked = step
-    stated_ms, moved_ms = (f"{span * 1e3:.4g} ms" for span in (stated, moved))
-    words = moved_ms if abs(stated - moved) < _SAME else f"told {stated_ms}, moves {moved_ms}"
+    moved_ms = f"{moved * 1e3:.4g} ms"
+    if abs(stated - moved) < _SAME:
+        words = moved_ms
+    else:
+        words = f"told {stated * 1e3:.4g} ms, moves {moved_ms}"
     yield EngineAnswer(words, (Measurement("at 1 m/s a body moves", moved, "m"),), "one step")
     ticks = (Measurement("it goes on by", ticked, "s"),)
     yield EngineAnswer(clock if ticked else "none", ticks, "clock")
@@ -50,18 +62,24 @@ def timestep(step: OneStep) -> Iterator[EngineAnswer]:
     0.25,  # s
 )
 def actuation(runs: Sequence[LetGo]) -> Iterator[EngineAnswer]:
-    """What the joint does, by how it moves and how it would move if nothing held it."""
+    """Tell what the joint does, by how it moves and how it would move if nothing held it."""
     for part, moved, seconds, forces in runs:
-        verb, unit = ("starts with", "rad/s²") if seconds is None else ("moves", "rad")
-        free = RATE if seconds is None else limp(seconds)
+        if seconds is None:
+            verb, unit, free = "starts with", "rad/s²", RATE
+        else:
+            verb, unit, free = "moves", "rad", limp(seconds)
         words = _share(moved / free, "falls", "held")
-        figures = Measurement(verb, moved, unit), Measurement("limp", free, unit), *forces
+        figures = (Measurement(verb, moved, unit), Measurement("limp", free, unit), *forces)
         yield EngineAnswer(words, figures, part)
 
 
 def _share(share: float, all_of_it: str, nothing: str) -> str:
-    """What a share of one, or of next to nothing, means."""
-    return all_of_it if 0.9 < share < 1.1 else nothing if abs(share) < 0.1 else UNDECIDED
+    """Return the word for a share of one, or of next to nothing."""
+    if 0.9 < share < 1.1:
+        return all_of_it
+    if abs(share) < 0.1:
+        return nothing
+    return UNDECIDED
 
 
 @question(
@@ -71,11 +89,18 @@ def _share(share: float, all_of_it: str, nothing: str) -> str:
     1.0,  # N·m
 )
 def command(speeds: Mapping[str, Sequence[float]]) -> Iterator[EngineAnswer]:
-    """From the speeds (3,) [rad/s] at rest and after each step, by the kind of command."""
+    """Tell whether the second step gains as much speed as the first.
+
+    Args:
+        speeds: (3,) at rest and after each step [rad/s], by the kind of command.
+    """
     for kind, three in speeds.items():
         first, second = np.diff(three).tolist()
         words = _share(second / first if first else math.nan, "stays", "lasts one step")
-        figures = Measurement("first step", first, "rad/s"), Measurement("second", second, "rad/s")
+        figures = (
+            Measurement("first step", first, "rad/s"),
+            Measurement("second", second, "rad/s"),
+        )
         yield EngineAnswer(words, figures, kind)
 
 
@@ -90,24 +115,46 @@ _FAST = 200.0  # rad/s
     _FAST,
 )
 def damping(speeds: tuple[float, float]) -> Iterator[EngineAnswer]:
-    """Of a body that began at 1 m/s, after 1 s [m/s]; of a joint, one step after [rad/s]."""
+    """Tell what is left of each speed.
+
+    Args:
+        speeds: Of a body that began at 1 m/s, after 1 s [m/s]; of a joint, one step after [rad/s].
+    """
     left, joint = speeds
     body = "keeps it" if abs(left - 1) < _SAME else f"loses {100 * (1 - left):.1f} % in 1 s"
-    turns = "keeps it" if abs(joint / _FAST - 1) < 1e-3 else f"cut to {joint:.3g} rad/s"
     yield EngineAnswer(body, (Measurement("left after 1 s", left),), "a body at 1 m/s")
-    after = (Measurement("one step after", joint, "rad/s"),)
-    yield EngineAnswer(turns, after, "a joint at 200 rad/s")
+    turns = "keeps it" if abs(joint / _FAST - 1) < 1e-3 else f"cut to {joint:.3g} rad/s"
+    after = Measurement("one step after", joint, "rad/s")
+    yield EngineAnswer(turns, (after,), "a joint at 200 rad/s")
 
 
 SMOOTH, ROUGH = 0.25, 0.75
+
+
+def _mean(block: float, floor: float) -> float:
+    return (block + floor) / 2
+
+
+def _geometric_mean(block: float, floor: float) -> float:
+    return math.sqrt(block * floor)
+
+
+def _of_block(block: float, floor: float) -> float:
+    return block
+
+
+def _of_floor(block: float, floor: float) -> float:
+    return floor
+
+
 _RULES: dict[str, Callable[[float, float], float]] = {
     "the larger": max,
     "the smaller": min,
-    "their product": lambda block, floor: block * floor,
-    "their mean": lambda block, floor: (block + floor) / 2,
-    "their geometric mean": lambda block, floor: math.sqrt(block * floor),
-    "the block's": lambda block, floor: block,
-    "the floor's": lambda block, floor: floor,
+    "their product": operator.mul,
+    "their mean": _mean,
+    "their geometric mean": _geometric_mean,
+    "the block's": _of_block,
+    "the floor's": _of_floor,
 }
 # A block that MuJoCo holds creeps, by millimetres a second; one that slides gains more.
 _SLIDES = 0.02  # m/s
@@ -120,31 +167,34 @@ _HALVINGS = 10
     "numbers in the file.",
 )
 def friction(speeds: Mapping[str, Sliding]) -> Iterator[EngineAnswer]:
-    """Which rule explains on which slope a block begins to slide, one way round and the other.
+    """Tell which rule explains on which slope a block begins to slide.
 
     Args:
         speeds: By what is special about the block, its speed on a floor.
     """
-    pairs = ((SMOOTH, ROUGH), (ROUGH, SMOOTH))
-    for of, speed in speeds.items():
-        measured = [_slope(speed, *pair) for pair in pairs]
-        words, _, _ = closest(
-            {
-                name: max(abs(rule(*pair) - mu) for pair, mu in zip(pairs, measured, strict=True))
-                for name, rule in _RULES.items()
-            }
+    for kind, speed in speeds.items():
+        smooth_on_rough = _slope(speed, SMOOTH, ROUGH)
+        rough_on_smooth = _slope(speed, ROUGH, SMOOTH)
+        errors: dict[str, float] = {}
+        for name, rule in _RULES.items():
+            errors[name] = max(
+                abs(rule(SMOOTH, ROUGH) - smooth_on_rough),
+                abs(rule(ROUGH, SMOOTH) - rough_on_smooth),
+            )
+        figures = (
+            Measurement(f"{SMOOTH:g} on {ROUGH:g} slides from", smooth_on_rough),
+            Measurement(f"{ROUGH:g} on {SMOOTH:g} slides from", rough_on_smooth),
         )
-        figures = [
-            Measurement(f"{block:g} on {floor:g} slides from", mu)
-            for (block, floor), mu in zip(pairs, measured, strict=True)
-        ]
-        yield EngineAnswer(words, tuple(figures), of)
+        yield EngineAnswer(closest(errors).hypothesis, figures, kind)
 
 
 def _slope(speed: Sliding, block: float, floor: float) -> float:
-    """The tangent of the slope from which on a block slides: its friction, by halving."""
+    """Return the tangent of the slope from which on a block slides: its friction, by halving."""
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        low, high = (low, middle) if speed(block, floor, middle) > _SLIDES else (middle, high)
+        if speed(block, floor, middle) > _SLIDES:
+            high = middle
+        else:
+            low = middle
     return (low + high) / 2
