@@ -10,15 +10,8 @@ from ..measures.text import NONE, count, few, figure, grouped, listed, rough, se
 from ..page import Block, Page, Table, Text, Verdict
 from ..robots.examine import TRIED
 from ..robots.gaps import STEPS
-from ..robots.records import (
-    RUNS,
-    TOLERANCE,
-    BackendRow,
-    ExaminedModel,
-    RunGap,
-    Survey,
-    WitnessRow,
-)
+from ..robots.records import RUNS, TOLERANCE, BackendRow, ExaminedModel, RunGap, WitnessRow
+from ..robots.survey import Survey
 from . import template
 
 _WIDEST = 28  # characters of a name
