@@ -24,7 +24,9 @@ from statemachine.errors import BadInputError
 from statemachine.report.robots import page
 from statemachine.robots import (
     BackendRow,
+    EngineTally,
     ExaminedModel,
+    RefusedFeature,
     RunGap,
     Survey,
     WitnessRow,
@@ -349,6 +351,68 @@ def test_what_is_wrong() -> None:
     ):
         assert text in said
         assert bool(said) == bool(text), said
+
+
+@pytest.mark.parametrize(
+    ("changes", "outcome"),
+    [
+        ({}, "measured"),
+        ({"shrinks": 1.4}, "measured"),
+        ({"shrinks": 2.0}, "vanishes"),
+        ({"shrinks": 2.0, "floor": 1.0}, "rounding"),
+        ({"floor": 1.0, "ended": "it stopped"}, "stops"),
+        ({"ended": "it stopped", "hinge": 1e3}, "explodes"),
+    ],
+)
+def test_the_outcome_of_a_gap_is_the_gravest(changes: dict[str, Any], outcome: str) -> None:
+    assert replace(RunGap(400, 1e-3, moved=1.0), **changes).outcome == outcome
+
+
+@pytest.mark.parametrize(
+    ("changes", "loading"),
+    [
+        ({}, "with contacts"),
+        ({"refusal": "it has a tendon"}, "without contacts"),
+        ({"refusal": "it has a tendon", "refusal_without": "it has a tendon"}, "never"),
+    ],
+)
+def test_with_what_a_model_loads(changes: dict[str, Any], loading: str) -> None:
+    assert BackendRow(**changes).loading == loading
+
+
+@pytest.mark.parametrize(
+    ("changes", "exactness"),
+    [
+        ({"ended": "it crashed"}, "ended"),
+        ({"backends": {}}, "refused"),
+        ({"backends": {"mujoco": BackendRow("no", "no")}}, "refused"),
+        ({"backends": {"mujoco": BackendRow()}}, "not asked"),
+        ({"backends": {"mujoco": BackendRow(restores=True)}}, "exact"),
+        ({}, "differs"),  # two restores of PyBullet part
+    ],
+)
+def test_the_exactness_of_a_model(changes: dict[str, Any], exactness: str) -> None:
+    assert replace(ROW, **changes).exactness("mujoco") == exactness
+
+
+def test_the_comparison_of_a_model_on_two_engines() -> None:
+    assert ROW.comparison("pybullet", contacts=False) == "vanishes"
+    assert ROW.comparison("pybullet", contacts=True) == "refused"
+    assert ROW.comparison("mujoco", contacts=True) == "not compared"
+    assert ROW.comparison("drake", contacts=True) == "not compared"
+    assert replace(ROW, nv=0).comparison("pybullet", contacts=False) == "still"
+
+
+def test_the_sums_of_a_survey() -> None:
+    ended = replace(ROW.backends["pybullet"], without_contacts=RunGap(3, ended="it stopped"))
+    models = (ROW, replace(ROW, backends={**ROW.backends, "pybullet": ended}, witness=None))
+    survey = Survey("mujoco", models, (), "w")
+    mujoco_sums, pybullet_sums = survey.engines
+    assert mujoco_sums == EngineTally("mujoco", 2, 0, 2, None, None, None)
+    assert pybullet_sums == EngineTally("pybullet", 0, 2, None, 0, 0, 1)
+    assert survey.grades == {"own reading": 1}
+    assert survey.refused_features("pybullet") == (RefusedFeature("tendon", 2, 2, 2),)
+    assert survey.refused_features("mujoco") == ()
 
 
 def test_a_page_of_80_columns() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -15,11 +14,13 @@ from ..robots.records import (
     RUNS,
     TOLERANCE,
     BackendRow,
+    Exactness,
     ExaminedModel,
+    Loading,
     RunGap,
-    Survey,
     WitnessRow,
 )
+from ..robots.survey import Survey
 from ..show.templates import PageContent, render
 
 _WIDEST = 28  # characters of a name
@@ -69,16 +70,6 @@ class RobotsPage(PageContent):
     def model_count(self) -> int:
         """Number of models."""
         return len(self.survey.models)
-
-    @property
-    def has_experiments(self) -> bool:
-        """Whether experiments were tried."""
-        return _has_experiments(self.survey)
-
-    @property
-    def backends(self) -> list[str]:
-        """Names of the backends that are here."""
-        return _backends(self.survey)
 
     @property
     def inside(self) -> list[str]:
@@ -153,11 +144,6 @@ class RobotPage(PageContent):
         """Whether an engine told the sizes of the model."""
         return self.model.nq is not None
 
-    @property
-    def witness_places(self) -> bool:
-        """Whether the witness placed frames that the engine placed, too."""
-        return self.witness.gap is not None
-
 
 def page(survey: Survey, widest: int = _WIDEST) -> Page:
     """Return the table as a page; of one model alone, all that was found of it.
@@ -166,39 +152,25 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
         survey: What was found.
         widest: Characters of a model's name.
     """
-    models = survey.models
-    if len(models) == 1 and not survey.parts:
-        return _page_of_one(survey, models[0])
-    others = [name for name in _backends(survey) if name != survey.default]
+    if survey.is_of_one_model:
+        return _page_of_one(survey, survey.models[0])
     content = RobotsPage(
         survey,
-        models=_table(survey, others, widest),
-        engines=_engines_table(survey, others),
-        grades=_grades_table(models),
-        refusals=[_Refusals(other, _refused_features(models, other)) for other in others],
+        models=_table(survey, widest),
+        engines=_engines_table(survey),
+        grades=_grades_table(survey),
+        refusals=[_Refusals(other, _refused_features(survey, other)) for other in survey.others],
     )
     return render(content)
 
 
-def _backends(survey: Survey) -> list[str]:
-    """Return the names of the backends that any model was tried on."""
-    return list(dict.fromkeys(name for row in survey.models for name in row.backends))
-
-
-def _has_experiments(survey: Survey) -> bool:
-    """Tell whether experiments were tried of any model."""
-    rows = [row for model in survey.models for row in model.backends.values()]
-    return any(row.scenarios for row in rows)
-
-
-def _grades_table(models: Sequence[ExaminedModel]) -> Table:
+def _grades_table(survey: Survey) -> Table:
     """Return how many models the witness read in which way."""
-    grades = Counter(row.witness.grade or "refused" for row in models if row.witness is not None)
-    rows = [(grade, str(number)) for grade, number in sorted(grades.items())]
+    rows = [(grade, str(number)) for grade, number in survey.grades.items()]
     return Table(("the witness's reading", "models"), rows)
 
 
-def _table(survey: Survey, others: Sequence[str], widest: int) -> Table:
+def _table(survey: Survey, widest: int) -> Table:
     """Return a row for each model."""
 
     def shortened(row: ExaminedModel) -> str:
@@ -209,12 +181,12 @@ def _table(survey: Survey, others: Sequence[str], widest: int) -> Table:
         "model": shortened,
         "bits": partial(_bits, survey),
     }
-    for other in others:
-        of = f"{other}, " if len(others) > 1 else ""
-        columns[f"{of}no contacts"] = partial(_gap, other=other, without=True)
-        columns[f"{of}contacts"] = partial(_gap, other=other, without=False)
+    for other in survey.others:
+        of = f"{other}, " if len(survey.others) > 1 else ""
+        columns[f"{of}no contacts"] = partial(_gap, other=other, contacts=False)
+        columns[f"{of}contacts"] = partial(_gap, other=other, contacts=True)
     columns["witness"] = _witness
-    if _has_experiments(survey):
+    if survey.ran_experiments:
         columns |= {"runs": _runs, "cost": _costs}
     words = {"model", "bits", "witness", "runs"}
     return Table.of(survey.models, columns, words=words, wide={"cost"})
@@ -233,35 +205,30 @@ def _costs(row: ExaminedModel) -> str:
     return " ".join(f"{cost:.3g}" for cost in costs) if costs else NONE
 
 
+_EXACTNESS: dict[Exactness, str] = {
+    "ended": "ended",
+    "refused": "no",
+    "differs": "✗",
+    "exact": "✓",
+    "not asked": NONE,
+}
+
+
 def _bits(survey: Survey, row: ExaminedModel) -> str:
     """Return whether all that must be equal to the bit is."""
-    if row.ended:
-        return "ended"
-    first = row.backends.get(survey.default)
-    if first is None or (first.refusal and first.refusal_without):
-        return "no"
-    exact: list[bool | None] = []
-    for backend in row.backends.values():
-        exact += [backend.equals_engine, backend.restores]
-    if False in exact:
-        return "✗"
-    return "✓" if True in exact else NONE
+    return _EXACTNESS[row.exactness(survey.default)]
 
 
-def _gap(row: ExaminedModel, other: str, without: bool) -> str:
-    backend = row.backends.get(other, BackendRow())
-    gap = backend.without_contacts if without else backend.with_contacts
-    if gap is None:
-        refusal = backend.refusal_without if without else backend.refusal
-        return "refused" if refusal else NONE
-    outcomes = {
-        "still": not row.nv,
-        "explodes": gap.explodes,
-        "stops": gap.ended,
-        "rounding": gap.is_rounding,
-    }
-    size = figure(gap.largest) + (" → 0" if gap.first_order else "")
-    return next((word for word, holds in outcomes.items() if holds), size)
+def _gap(row: ExaminedModel, other: str, contacts: bool) -> str:
+    """Return the size of a gap, or in a word what became of the comparison."""
+    comparison = row.comparison(other, contacts)
+    if comparison == "not compared":
+        return NONE
+    gap = row.backends[other].gap(contacts)
+    if gap is None or comparison in ("still", "explodes", "stops", "rounding"):
+        return comparison
+    size = figure(gap.largest)
+    return f"{size} → 0" if comparison == "vanishes" else size
 
 
 def _witness(row: ExaminedModel) -> str:
@@ -272,22 +239,18 @@ def _witness(row: ExaminedModel) -> str:
     return f"{row.witness.grade.partition(' ')[0]} {rough(row.witness.gap)}"
 
 
-def _engines_table(survey: Survey, others: Sequence[str]) -> Table:
+def _engines_table(survey: Survey) -> Table:
     """Return how many models each engine loads, and what becomes of them."""
-    rows_by_backend = grouped(pair for row in survey.models for pair in row.backends.items())
     rows: list[tuple[str, ...]] = []
-    for name in (survey.default, *others):
-        backends = rows_by_backend.get(name, [])
-        loads = sum(row.loads for row in backends)
-        without = sum(not row.loads and not row.refusal_without for row in backends)
-        if name == survey.default:
-            same_bits = str(sum(row.equals_engine is True for row in backends))
-            gaps = (NONE, NONE, NONE)  # it has none to itself
-        else:
-            same_bits = NONE
-            gaps = _gap_counts(backends)
-        rows.append((name, str(loads), str(without), same_bits, *gaps))
+    for tally in survey.engines:
+        loaded = _known(tally.loads), _known(tally.only_without_contacts)
+        gaps = _known(tally.within), _known(tally.rounding), _known(tally.vanishes)
+        rows.append((tally.engine, *loaded, _known(tally.equals_engine), *gaps))
     return Table(_ENGINE_HEADERS, rows)
+
+
+def _known(number: int | None) -> str:
+    return NONE if number is None else str(number)
 
 
 _ENGINE_HEADERS = (
@@ -301,31 +264,14 @@ _ENGINE_HEADERS = (
 )
 
 
-def _gap_counts(backends: Sequence[BackendRow]) -> tuple[str, str, str]:
-    """Return how many gaps are within the tolerance, rounding, and vanish with the timestep.
-
-    Runs that ended early are left out.
-    """
-    gaps = [row.without_contacts for row in backends if row.without_contacts]
-    whole = [gap for gap in gaps if not gap.ended]
-    within = sum(gap.largest <= TOLERANCE for gap in whole)
-    rounding = sum(gap.is_rounding for gap in whole)
-    vanishing = sum(gap.first_order for gap in whole)
-    return str(within), str(rounding), str(vanishing)
-
-
-def _refused_features(models: Sequence[ExaminedModel], other: str) -> Table:
+def _refused_features(survey: Survey, other: str) -> Table:
     """Return what is refused, how often, and for how many models it alone stands in the way."""
-    rows = [row.backends[other] for row in models if other in row.backends]
-    refused = [row for row in rows if row.refusal]
-    features = Counter(name for row in refused for name in row.features)
-    alone = Counter(row.features for row in refused)
-    solved = Counter(n for row in refused for n in row.features if not row.refusal_without)
     headers = ("feature", "models", "the only one in", "not with contacts off in")
-    cells: list[tuple[str, ...]] = []
-    for name, number in features.most_common(_LISTED):
-        cells.append((name, str(number), str(alone[(name,)]), str(solved[name])))
-    return Table(headers, cells)
+    rows: list[tuple[str, ...]] = []
+    for refused in survey.refused_features(other)[:_LISTED]:
+        numbers = (refused.models, refused.alone, refused.loaded_without_contacts)
+        rows.append((refused.feature, *map(str, numbers)))
+    return Table(headers, rows)
 
 
 def _page_of_one(survey: Survey, row: ExaminedModel) -> Page:
@@ -340,10 +286,11 @@ def _page_of_one(survey: Survey, row: ExaminedModel) -> Page:
     return render(content)
 
 
-def _loads(row: BackendRow) -> str:
-    if row.loads:
-        return "✓"
-    return "no" if row.refusal_without else "with contacts off"
+_LOADING: dict[Loading, str] = {
+    "with contacts": "✓",
+    "without contacts": "with contacts off",
+    "never": "no",
+}
 
 
 def _cost(row: BackendRow) -> str:
@@ -352,7 +299,8 @@ def _cost(row: BackendRow) -> str:
 
 def _facts_table(row: ExaminedModel) -> Table:
     """Return a row for each fact that is known on any backend."""
-    facts: dict[str, Callable[[BackendRow], str]] = {"loads": _loads}
+    facts: dict[str, Callable[[BackendRow], str]] = {}
+    facts["loads"] = lambda row: _LOADING[row.loading]
     facts["the bits of the engine without us"] = lambda row: _MARKS[row.equals_engine]
     facts["two futures of a State are one"] = lambda row: _MARKS[row.restores]
     facts["gap without contacts"] = lambda row: _gap_in_full(row.without_contacts)

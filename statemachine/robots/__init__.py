@@ -16,7 +16,7 @@ import platform
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -24,20 +24,31 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from .. import __version__
-from ..errors import MissingEngineError, refuse
+from ..errors import BadInputError, MissingEngineError
 from ..installed import DEFAULT, ENGINES, engine_version, require
 from ..models import SUFFIXES, AnyPath
-from ..page import Figures
 from ..processes import ALONE, checked_jobs, fresh_python, sandbox
 from ..processes.parallel import in_parallel, unwinding
 from ..runs.drive import Progress, silent
 from ..runs.header import model_digest, model_files
 from .gaps import STEPS
-from .records import BackendRow, ExaminedModel, RunGap, Survey, WitnessRow, read_table, write_table
+from .records import (
+    BackendRow,
+    ExaminedModel,
+    ModelFile,
+    RunGap,
+    WitnessRow,
+    read_table,
+    write_table,
+)
+from .survey import EngineTally, RefusedFeature, Survey
 
 __all__ = [
     "BackendRow",
+    "EngineTally",
     "ExaminedModel",
+    "ModelFile",
+    "RefusedFeature",
     "RunGap",
     "Survey",
     "WitnessRow",
@@ -53,47 +64,46 @@ _BINARY = ".mjb"
 _START = 65536  # bytes in which a file that is not XML may say what it was meant to be
 
 
-def find(paths: Sequence[AnyPath]) -> list[Figures]:
-    """The models among files and folders, in an order that does not change.
+def find(paths: Sequence[AnyPath]) -> list[ModelFile]:
+    """Find the models among files and folders, in an order that does not change.
 
     In a folder, and in all below it, each MJCF and URDF is one; a binary model must be named.
     A file without bodies, itself or in what it includes, is left out.
 
-    Returns:
-        name: What it is called in the table.
-        path: Where it is.
-        sha256: Digest of it and of what it includes; "" where it cannot be read.
-        part_of: The first file found that includes it; "" for none.
-
     Raises:
         BadInputError: A path is not there, or nothing is found at all.
     """
-    files: dict[Path, tuple[str, Path]] = {}  # what each is called, and where it was found
-    for given in map(Path, paths):
-        is_file = given.is_file()
-        wrong_end = f"{given} is not a model: it does not end in {', '.join(SUFFIXES)}"
-        refuse(
-            (not is_file and not given.is_dir(), f"there is no file or folder {given}"),
-            (is_file and given.suffix.lower() not in SUFFIXES, wrong_end),
-        )
-        for file in [given] if is_file else _below(given):
-            name = (file.relative_to(given) if len(paths) == 1 and not is_file else file).as_posix()
-            files.setdefault(file.resolve(), (name, file))
-    refuse((not files, f"no models (MJCF or URDF) in {', '.join(map(str, paths))}"))
+    files: dict[Path, tuple[str, Path]] = {}  # by where each is: its name, and as it was found
+    for path in map(Path, paths):
+        if path.is_file():
+            if path.suffix.lower() not in SUFFIXES:
+                raise BadInputError(
+                    f"{path} is not a model: it does not end in {', '.join(SUFFIXES)}"
+                )
+            files.setdefault(path.resolve(), (path.as_posix(), path))
+            continue
+        if not path.is_dir():
+            raise BadInputError(f"there is no file or folder {path}")
+        for file in _below(path):
+            name = file.relative_to(path) if len(paths) == 1 else file
+            files.setdefault(file.resolve(), (name.as_posix(), file))
+    if not files:
+        raise BadInputError(f"no models (MJCF or URDF) in {', '.join(map(str, paths))}")
+    owners = _owners(files.values())
+    models: list[ModelFile] = []
+    for place, (name, file) in files.items():
+        models.append(ModelFile(name, file.absolute(), _digest(file), owners.get(place, "")))
+    return models
+
+
+def _owners(files: Iterable[tuple[str, Path]]) -> dict[Path, str]:
+    """Return the name of the first file that includes each included one."""
     owners: dict[Path, str] = {}
-    for name, file in files.values():
+    for name, file in files:
         with suppress(ValueError, OSError):
             for part in list(model_files(file))[1:]:  # what it includes
                 owners.setdefault(part.resolve(), name)
-    return [
-        Figures(
-            name=name,
-            path=file.absolute(),
-            sha256=_digest(file),
-            part_of=owners.get(place, ""),
-        )
-        for place, (name, file) in files.items()
-    ]
+    return owners
 
 
 _WITH_BODIES = ("body", "attach", "replicate", "composite", "flexcomp")  # elements of an MJCF
@@ -153,7 +163,7 @@ _MEMORY = 8 * sandbox.GB  # address space, of which engines reserve far more tha
 
 
 def examine_all(
-    models: Sequence[Figures],
+    models: Sequence[ModelFile],
     *,
     quick: bool = False,
     seconds: float = SECONDS,
@@ -180,13 +190,10 @@ def examine_all(
         MissingEngineError: The default engine is not installed here.
     """
     jobs = checked_jobs(jobs)
-    refuse(
-        (
-            not 0 < seconds <= 86400,
-            f"seconds must be above 0, and at most 86400; got {seconds:g}",
-        ),
-        (seed < 0, f"seed must not be negative; got {seed}"),
-    )
+    if not 0 < seconds <= 86400:
+        raise BadInputError(f"seconds must be above 0, and at most 86400; got {seconds:g}")
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
     require(DEFAULT)
     made_with = _made_with(quick, seed)
     before = read_table(table) if table is not None and table.exists() else {}
@@ -228,11 +235,14 @@ def _made_with(quick: bool, seed: int) -> str:
     for name in ENGINES:
         with suppress(MissingEngineError):
             versions.append(f"{name} {engine_version(name)}")
-    return f"{', '.join(versions)}; {STEPS} steps, seed {seed}{', quick' if quick else ''}"
+    settings = [f"{STEPS} steps", f"seed {seed}"]
+    if quick:
+        settings.append("quick")
+    return f"{', '.join(versions)}; {', '.join(settings)}"
 
 
 def _examined(
-    model: Figures,
+    model: ModelFile,
     made_with: str,
     *,
     quick: bool,
@@ -246,7 +256,7 @@ def _examined(
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder:
         answer = Path(folder) / "answer"
-        words = os.fspath(model.path), "quick" * quick, str(seed), os.fspath(answer)
+        words = os.fspath(model.path), "quick" if quick else "", str(seed), os.fspath(answer)
         command, environment = fresh_python(f"{__package__}.examine:main", *words)
         outcome = sandbox.run(
             command,

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import pickle
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ..backends import backend_names, load_to_run
 from ..backends.starts import overlaps_in
@@ -61,6 +60,21 @@ def examine(path: Path, row: ExaminedModel, quick: bool, seed: int, tell: Tell) 
     return _Examination(path, row, seed, tell).all(quick)
 
 
+@dataclass(frozen=True)
+class _Attempt:
+    """An attempt to load a model on a backend.
+
+    Attributes:
+        refusal: Why it does not load; "" if it does.
+        features: What of the model is refused; empty where it loads, and where that is not known.
+        warnings: What the backend told, and the default one did not tell.
+    """
+
+    refusal: str
+    features: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
 class _Examination:
     def __init__(self, path: Path, row: ExaminedModel, seed: int, tell: Tell) -> None:
         self.path, self.row, self.seed, self.tell = path, row, seed, tell
@@ -75,9 +89,11 @@ class _Examination:
             self._sizes(self.models[DEFAULT])
         for backend, model in self._any().items():
             with self._part(f"the engine alone, {backend}"):
-                self._put(backend, equals_engine=self._equals_engine(model))
+                is_equal = self._equals_engine(model)
+                self._put(backend, replace(self._known(backend), equals_engine=is_equal))
             with self._part(f"restore, {backend}"):
-                self._put(backend, restores=self._restores(model))
+                is_restored = self._restores(model)
+                self._put(backend, replace(self._known(backend), restores=is_restored))
         with self._part("witness"), suppress(MissingEngineError):
             require(WITNESS)
             model = self._any().get(DEFAULT)
@@ -85,15 +101,22 @@ class _Examination:
                 self.row = replace(self.row, witness=_witness_row(model, self.seed))
         self._gaps()
         if not quick:
-            for backend, model in self._any().items():
-                for name in TRIED:
-                    with self._part(f"scenario {name}, {backend}"):
-                        known = self.row.backends[backend].scenarios
-                        self._put(backend, scenarios={**known, name: self._scenario(name, model)})
-                # The engine's own motors may throw it.
-                with self._part(f"cost, {backend}"), suppress(DivergedError):
-                    self._put(backend, cost=self._cost(model))
+            self._experiments()
         return self.row
+
+    def _experiments(self) -> None:
+        """Run every experiment on each backend, and measure what a step costs."""
+        for backend, model in self._any().items():
+            for name in TRIED:
+                with self._part(f"scenario {name}, {backend}"):
+                    scenarios = {
+                        **self._known(backend).scenarios,
+                        name: self._scenario(name, model),
+                    }
+                    self._put(backend, replace(self._known(backend), scenarios=scenarios))
+            # The engine's own motors may throw it.
+            with self._part(f"cost, {backend}"), suppress(DivergedError):
+                self._put(backend, replace(self._known(backend), cost=self._cost(model)))
 
     @contextmanager
     def _part(self, name: str) -> Iterator[None]:
@@ -107,8 +130,12 @@ class _Examination:
     def _fault(self, words: str) -> None:
         self.row = replace(self.row, faults=(*self.row.faults, one_line(words)[:300]))
 
-    def _put(self, backend: str, **facts: Any) -> None:
-        row = replace(self.row.backends.get(backend, BackendRow()), **facts)
+    def _known(self, backend: str) -> BackendRow:
+        """Return what is known of the model on a backend."""
+        return self.row.backends.get(backend, BackendRow())
+
+    def _put(self, backend: str, row: BackendRow) -> None:
+        """Keep what is known now of the model on a backend."""
         self.row = replace(self.row, backends={**self.row.backends, backend: row})
 
     def _any(self) -> dict[str, Model]:
@@ -116,24 +143,43 @@ class _Examination:
         return {**self.without, **self.models}
 
     def _load(self, backend: str) -> None:
+        """Load the model on a backend, with contacts and without."""
         self.tell(self.row, f"loading, {backend}")
-        facts: dict[str, Any] = {}
-        for models, case in ((self.models, ""), (self.without, "_without")):
-            options: dict[str, Any] = {"contacts": False} if case else {}
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
-                try:
-                    models[backend] = load_to_run(self.path, backend, **options)
-                except MissingEngineError:
-                    raise
-                except StateMachineError as error:
-                    facts[f"refusal{case}"] = one_line(error)
-                    facts.setdefault("features", _features(error))
-                except Exception as error:
-                    refusal = facts[f"refusal{case}"] = one_line(f"{type(error).__name__}: {error}")
-                    self._fault(f"loading, {backend}: {refusal}")
-            facts[f"warnings{case}"] = self._of_its_own(backend, caught)
-        self._put(backend, **facts)
+        with_contacts = self._attempt(backend, contacts=True)
+        without = self._attempt(backend, contacts=False)
+        features = with_contacts.features
+        if not features:
+            features = without.features
+        row = replace(
+            self._known(backend),
+            refusal=with_contacts.refusal,
+            refusal_without=without.refusal,
+            features=features,
+            warnings=with_contacts.warnings,
+            warnings_without=without.warnings,
+        )
+        self._put(backend, row)
+
+    def _attempt(self, backend: str, *, contacts: bool) -> _Attempt:
+        """Load the model on a backend, and keep it if it loads."""
+        models = self.models if contacts else self.without
+        refusal = ""
+        features: tuple[str, ...] = ()
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                if contacts:
+                    models[backend] = load_to_run(self.path, backend)
+                else:
+                    models[backend] = load_to_run(self.path, backend, contacts=False)
+            except MissingEngineError:
+                raise
+            except StateMachineError as error:
+                refusal, features = one_line(error), _features(error)
+            except Exception as error:
+                refusal = one_line(f"{type(error).__name__}: {error}")
+                self._fault(f"loading, {backend}: {refusal}")
+        return _Attempt(refusal, features, self._of_its_own(backend, caught))
 
     def _of_its_own(
         self, backend: str, caught: Sequence[warnings.WarningMessage]
@@ -147,13 +193,20 @@ class _Examination:
         first = self.row.backends.get(DEFAULT)
         if first is not None and backend != DEFAULT:
             known = [text.partition(": ")[2] for text in first.warnings]
-            texts = [text for text in texts if not any(text.endswith(end) for end in known)]
+            texts = [text for text in texts if not text.endswith(tuple(known))]
         return tuple(dict.fromkeys(texts))
 
     def _sizes(self, model: Model) -> None:
-        sizes = {name: int(getattr(model, name)) for name in ("nq", "nv", "nu", "nbody", "ngeom")}
-        inside = overlaps_in(model, gaps.keyframe_of(model))
-        self.row = replace(self.row, inside=tuple(inside), **sizes)
+        overlaps = overlaps_in(model, gaps.keyframe_of(model))
+        self.row = replace(
+            self.row,
+            nq=model.nq,
+            nv=model.nv,
+            nu=model.nu,
+            nbody=model.nbody,
+            ngeom=model.ngeom,
+            inside=tuple(overlaps),
+        )
 
     def _equals_engine(self, model: Model) -> bool | None:
         own = room(model.backend)
@@ -187,17 +240,22 @@ class _Examination:
             yield data
 
     def _gaps(self) -> None:
-        """Each other backend against the default one."""
-        for models, name, halve in (
-            (self.without, "without_contacts", True),
-            (self.models, "with_contacts", False),
-        ):
-            first = models.get(DEFAULT)
-            for backend, model in models.items():
-                if first is None or backend == DEFAULT:
-                    continue
-                with self._part(f"gap {name.replace('_', ' ')}, {backend}"):
-                    self._put(backend, **{name: gaps.run_gap(first, model, self.seed, halve)})
+        """Compare each other backend with the default one, without contacts and with them."""
+        for backend, first, model in self._pairs(self.without):
+            with self._part(f"gap without contacts, {backend}"):
+                gap = gaps.run_gap(first, model, self.seed, halve=True)
+                self._put(backend, replace(self._known(backend), without_contacts=gap))
+        for backend, first, model in self._pairs(self.models):
+            with self._part(f"gap with contacts, {backend}"):
+                gap = gaps.run_gap(first, model, self.seed)
+                self._put(backend, replace(self._known(backend), with_contacts=gap))
+
+    def _pairs(self, models: Mapping[str, Model]) -> Iterator[tuple[str, Model, Model]]:
+        """Yield each other backend, the Model on the default one, and that on the other."""
+        first = models.get(DEFAULT)
+        for backend, model in models.items():
+            if first is not None and backend != DEFAULT:
+                yield backend, first, model
 
     def _scenario(self, name: str, model: Model) -> str:
         try:
@@ -222,10 +280,7 @@ class _Examination:
 
             first = in_turns({"": lambda: ours(3)}, 2)[""][-1] / 3
             steps = max(1, min(500, round(_TURN / max(first, 1e-7))))
-            ways = {
-                "ours": lambda: ours(steps),
-                "alone": lambda: alone(steps),
-            }
+            ways = {"ours": lambda: ours(steps), "alone": lambda: alone(steps)}
             times = in_turns(ways, _ROUNDS, seed=self.seed)
         return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
 

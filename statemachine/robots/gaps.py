@@ -8,7 +8,7 @@ import numpy as np
 
 from ..compare.perturbed import nudged_controller, nudged_start
 from ..errors import StateMachineError
-from ..interface import Array, Model, make_data, reset
+from ..interface import Array, Ints, Model, make_data, reset
 from ..measures import JointPlaces, farthest, largest_or_inf, turns
 from ..runs.drive import Controller, drive
 from ..runs.robot import start_keyframe
@@ -107,27 +107,34 @@ def run_gap(left: Model, right: Model, seed: int, halve: bool = False) -> RunGap
 
 
 def _gap(model: Model, left: tuple[Array, str], right: tuple[Array, str]) -> RunGap:
-    """How far two runs are apart, which `run` made of a Model and of another."""
+    """Return how far two runs are apart, which `run` made of a Model and of another."""
     (first, ended), (second, also_ended) = left, right
     rows = min(len(first), len(second))
     a, b = first[:rows, : model.nq], second[:rows, : model.nq]
     places = JointPlaces.of(model.jnt_type, model.jnt_qposadr)
-    apart = {
-        name: farthest(a[:, chosen], b[:, chosen])
-        for name, chosen in (
-            ("hinge", places.hinges),
-            ("slide", places.slides),
-            ("position", places.positions),
-        )
-        if len(chosen)
-    }
+    turn = None
     if len(places.quats):
         quats = places.quats[:, None] + np.arange(4)
-        apart["turn"] = turns(a[:, quats], b[:, quats])
+        turn = largest_or_inf(turns(a[:, quats], b[:, quats]))
+    hinge = _largest_difference(a, b, places.hinges)
+    slide = _largest_difference(a, b, places.slides)
+    position = _largest_difference(a, b, places.positions)
+    moved = np.abs(a - a[0]).max(initial=0.0)
+    fastest = np.abs(second[:rows, model.nq :]).max(initial=0.0)
     return RunGap(
         steps=rows - 1,
-        **{name: largest_or_inf(sizes) for name, sizes in apart.items()},
-        moved=float(np.abs(a - a[0]).max(initial=0.0)),
-        fastest=float(np.abs(second[:rows, model.nq :]).max(initial=0.0)),
+        hinge=hinge,
+        slide=slide,
+        position=position,
+        turn=turn,
+        moved=float(moved),
+        fastest=float(fastest),
         ended=ended or also_ended,
     )
+
+
+def _largest_difference(a: Array, b: Array, columns: Ints) -> float | None:
+    """Return how far some columns of two arrays (n, nq) are apart at most; None of no column."""
+    if not len(columns):
+        return None
+    return largest_or_inf(farthest(a[:, columns], b[:, columns]))

@@ -7,10 +7,10 @@ import dataclasses
 import json
 import types
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ..errors import BadInputError
 from ..models import check_is_file
@@ -24,10 +24,32 @@ _STILL = 0.3  # [rad or m]: what moves less than this may be pushed about by a c
 _FIRST_ORDER = 1.5  # by how much a gap shrinks at least with half the timestep
 RUNS = "runs"
 
+Loading = Literal["with contacts", "without contacts", "never"]
+Exactness = Literal["ended", "refused", "differs", "exact", "not asked"]
+GapOutcome = Literal["explodes", "stops", "rounding", "vanishes", "measured"]
+Comparison = GapOutcome | Literal["refused", "not compared", "still"]
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A file of a model that is to be examined.
+
+    Attributes:
+        name: What it is called in the table.
+        path: Where it is, from the root of the file system.
+        sha256: Digest of it and of what it includes; "" where it cannot be read.
+        part_of: The first file found that includes it; "" for none.
+    """
+
+    name: str
+    path: Path
+    sha256: str
+    part_of: str
+
 
 @dataclass(frozen=True)
 class RunGap:
-    """How far two engines are apart over a run under the same commands.
+    """The distance between two engines over a run under the same commands.
 
     Attributes:
         steps: How many steps were compared.
@@ -74,10 +96,23 @@ class RunGap:
         """Whether it vanishes with the timestep, as that of two integrators does."""
         return self.shrinks is not None and self.shrinks >= _FIRST_ORDER
 
+    @property
+    def outcome(self) -> GapOutcome:
+        """The first of these that holds; "measured" where the size of the gap says it all."""
+        if self.explodes:
+            return "explodes"
+        if self.ended:
+            return "stops"
+        if self.is_rounding:
+            return "rounding"
+        if self.first_order:
+            return "vanishes"
+        return "measured"
+
 
 @dataclass(frozen=True)
 class BackendRow:
-    """What a model does on one backend.
+    """The behaviour of a model on one backend.
 
     Attributes:
         refusal: Why it does not load; "" if it does.
@@ -113,6 +148,15 @@ class BackendRow:
         return not self.refusal
 
     @property
+    def loading(self) -> Loading:
+        """With what it loads."""
+        if self.loads:
+            return "with contacts"
+        if not self.refusal_without:
+            return "without contacts"
+        return "never"
+
+    @property
     def unexplained(self) -> bool:
         """Whether the gap without contacts is one that nothing accounts for.
 
@@ -122,13 +166,19 @@ class BackendRow:
         gap = self.without_contacts
         if gap is None:
             return False
-        accounted = gap.first_order or gap.is_rounding or self.warnings_without
-        return bool(gap.ended) or (gap.largest > TOLERANCE and not accounted)
+        if gap.ended:
+            return True
+        is_accounted_for = gap.first_order or gap.is_rounding or bool(self.warnings_without)
+        return gap.largest > TOLERANCE and not is_accounted_for
+
+    def gap(self, contacts: bool) -> RunGap | None:
+        """Return the gap to the default backend, with contacts or without; None if not compared."""
+        return self.with_contacts if contacts else self.without_contacts
 
 
 @dataclass(frozen=True)
 class WitnessRow:
-    """What the witness says.
+    """The answer of the witness.
 
     Attributes:
         grade: "own reading" or "same reading"; "" where it refuses.
@@ -142,10 +192,20 @@ class WitnessRow:
     frames: int = 0
     gap: float | None = None
 
+    @property
+    def refuses(self) -> bool:
+        """Whether it compares nothing."""
+        return self.gap is None
+
+    @property
+    def has_no_own_reading(self) -> bool:
+        """Whether it compares, and says why it does so without a reading of its own."""
+        return self.gap is not None and bool(self.refusal)
+
 
 @dataclass(frozen=True)
 class ExaminedModel:
-    """What was found of one model.
+    """A model, and all that was found of it.
 
     Attributes:
         file: What it is called in the table.
@@ -184,6 +244,39 @@ class ExaminedModel:
         """Whether it is a model of its own: a part of another file must load, and move."""
         return not self.part_of or bool(self.nv)
 
+    @property
+    def ran_experiments(self) -> bool:
+        """Whether an experiment was tried on a backend."""
+        return any(backend.scenarios for backend in self.backends.values())
+
+    def exactness(self, default: str) -> Exactness:
+        """Return whether all that has to be the same bits is.
+
+        Args:
+            default: The backend that the others are compared with.
+        """
+        if self.ended:
+            return "ended"
+        if default not in self.backends or self.backends[default].loading == "never":
+            return "refused"
+        answers: list[bool | None] = []
+        for backend in self.backends.values():
+            answers += [backend.equals_engine, backend.restores]
+        if False in answers:
+            return "differs"
+        return "exact" if True in answers else "not asked"
+
+    def comparison(self, backend: str, contacts: bool) -> Comparison:
+        """Return what became of the comparison of a backend with the default one."""
+        if backend not in self.backends:
+            return "not compared"
+        row = self.backends[backend]
+        gap = row.gap(contacts)
+        if gap is None:
+            refusal = row.refusal if contacts else row.refusal_without
+            return "refused" if refusal else "not compared"
+        return gap.outcome if self.nv else "still"
+
     def wrong(self, default: str) -> tuple[str, ...]:
         """What must not be, in short sentences.
 
@@ -215,29 +308,6 @@ def _gap_words(gap: RunGap | None) -> str:
     return f"a gap of {gap.largest:.1e} without contacts that nothing accounts for"
 
 
-@dataclass(frozen=True)
-class Survey:
-    """A table of models.
-
-    Attributes:
-        default: The backend that the others are compared with.
-        models: One row each, in the order of the files.
-        parts: Files that are not models of their own but parts of others.
-        made_with: Versions and settings.
-    """
-
-    default: str
-    models: Sequence[ExaminedModel]
-    parts: Sequence[ExaminedModel]
-    made_with: str
-
-    @property
-    def wrong(self) -> Mapping[str, tuple[str, ...]]:
-        """What must not be, by file."""
-        by_file = {row.file: row.wrong(self.default) for row in self.models}
-        return {file: said for file, said in by_file.items() if said}
-
-
 SUFFIXES = (".csv", ".json")
 _FIRST = ("file", "sha256", "made_with")
 
@@ -250,7 +320,10 @@ def write_table(target: Path, rows: Iterable[ExaminedModel]) -> None:
         return
     flat = [_flat(row) for row in plain]
     head = list(dict.fromkeys(name for row in flat for name in row))
-    replace_csv(target, [head, *([row.get(name, "") for name in head] for row in flat)])
+    lines = [head]
+    for row in flat:
+        lines.append([row.get(name, "") for name in head])
+    replace_csv(target, lines)
 
 
 def read_table(target: Path) -> dict[tuple[str, str, str], ExaminedModel]:
