@@ -14,11 +14,38 @@ open. Terminal, documentation and notebook show the same page.
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
-# What an option is: its flag, its metavar ("" for a switch), its help, what else argparse is told.
-Row = tuple[Any, ...]
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+class Option(NamedTuple):
+    """An option of a lesson on the command line.
+
+    Attributes:
+        flag: What is typed, "--joint".
+        metavar: What its value is called; "" of a switch, which takes none.
+        help: What it is, for a user.
+        settings: What else argparse is told, such as its default or its choices.
+    """
+
+    flag: str
+    metavar: str
+    help: str
+    settings: Mapping[str, Any] = _NOTHING
+
+    @property
+    def key(self) -> str:
+        """Its name among the values of a lesson's options."""
+        return self.flag.removeprefix("--")
+
+    @property
+    def default(self) -> Any:
+        """Its value where nobody sets it; None of one that depends on the robot."""
+        return self.settings.get("default", None if self.metavar else False)
 
 
 @dataclass(frozen=True)
@@ -26,6 +53,10 @@ class Lesson:
     """An entry of the table of lessons.
 
     Attributes:
+        name: Of its module, of its template and on the command line.
+        question: What it answers.
+        model: The model that it is about.
+        options: On the command line.
         more: Switches, each of which shows a part of it; JSON and documentation show all.
         on_path: Whether the guided path has it.
         plots: Whether it has pictures for a file.
@@ -34,7 +65,7 @@ class Lesson:
     name: str
     question: str
     model: str
-    options: tuple[Row, ...] = ()
+    options: tuple[Option, ...] = ()
     more: tuple[str, ...] = ()
     on_path: bool = True
     plots: bool = False
@@ -42,129 +73,125 @@ class Lesson:
     @property
     def defaults(self) -> dict[str, Any]:
         """Its options where nobody sets one."""
-        return {
-            flag.removeprefix("--"): dict(*more).get("default", False if metavar == "" else None)
-            for flag, metavar, _, *more in self.options
-        }
+        return {option.key: option.default for option in self.options}
 
 
 # What depends on the robot has no default here: `fit` of the lesson's module gives it one.
-_JOINT = ("--joint", "JOINT", "joint to write (default shoulder_lift, if there is one)")
-_VALUE = ("--value", "X", "what to write [rad or m] (default 0.8, if in range)")
+_JOINT = Option("--joint", "JOINT", "joint to write (default shoulder_lift, if there is one)")
+_VALUE = Option("--value", "X", "what to write [rad or m] (default 0.8, if in range)")
+
+_LESSONS = (
+    Lesson(
+        "objects",
+        "What never changes, and what does?",
+        "so101/scene",
+        (Option("--worlds", "N", "how many Data of one Model (default 10)", {"default": 10}),),
+    ),
+    Lesson(
+        "state",
+        "Which numbers are the state?",
+        "so101/scene_box",
+        plots=True,
+    ),
+    Lesson(
+        "write",
+        "You wrote into qpos. Who noticed?",
+        "so101/scene",
+        (_JOINT, _VALUE),
+    ),
+    Lesson(
+        "forward",
+        "Why is a fresh arm's fingertip at the origin?",
+        "so101/scene",
+        (
+            _JOINT,
+            _VALUE,
+            Option("--site", "SITE", "the fingertip (default gripperframe, or the last site)"),
+            Option("--arrays", "", "show only which arrays each call changes"),
+            Option("--lag", "", "show only how far behind a step leaves it"),
+            Option("--seconds", "S", "simulated time of --lag (default 2)"),
+        ),
+        more=("arrays", "lag"),
+        plots=True,
+    ),
+    Lesson(
+        "hold",
+        "Six numbers in: how does the arm follow?",
+        "so101/scene",
+        (
+            Option("--seconds", "S", "simulated time (default 2)", {"default": 2.0}),
+            Option("--target", "X,X,…", "command, one number an actuator [rad for a servo]"),
+        ),
+        plots=True,
+    ),
+    Lesson(
+        "gravity",
+        "You never wrote ctrl. Who holds the arm up?",
+        "so101/scene",
+        (
+            Option("--seconds", "S", "simulated time (default 4)"),
+            Option(
+                "--joint",
+                "JOINT",
+                "joint to watch, with a servo (default shoulder_lift, or that with most load)",
+            ),
+            Option("--longer", "S", "simulated time of the fall; 0 for none (default 100)"),
+        ),
+        plots=True,
+    ),
+    Lesson(
+        "reset",
+        "Back to a known state: what is in it?",
+        "so101/scene_box",
+    ),
+    Lesson(
+        "replay",
+        "Same start, same commands: the same bits?",
+        "so101/scene_box",
+        (
+            Option("--steps", "N", "steps of each run (default 600)", {"default": 600}),
+            Option("--ctrl", "X,X,…", "command, one number an actuator [rad for a servo]"),
+            Option(
+                "--break",
+                "extra-step|late-ctrl",
+                "make the second run differ: one step more, or the command one step late",
+                {"choices": ("extra-step", "late-ctrl")},
+            ),
+        ),
+        plots=True,
+    ),
+    Lesson(
+        "time",
+        "What time is it in a simulator?",
+        "so101/scene",
+        (
+            Option("--realtime", "", "wait for the clock"),
+            Option("--seconds", "S", "simulated time with --realtime (default 4)"),
+        ),
+    ),
+    Lesson(
+        "speed",
+        "What does one second of your machine buy?",
+        "so101/scene_box",
+        (Option("--steps", "N", "steps of each run (default 4000)", {"default": 4000}),),
+    ),
+    Lesson(
+        "worlds",
+        "Many worlds: what does a shared Model save?",
+        "so101/scene_box",
+        (Option("--most", "N", "the largest number of worlds (default 4096)", {"default": 4096}),),
+        on_path=False,
+        plots=True,
+    ),
+    Lesson("questions", "Check yourself: six questions.", "so101/scene_box", on_path=False),
+)
 
 # The lessons of the path, in order, and those beside it.
-LESSONS = {
-    lesson.name: lesson
-    for lesson in (
-        Lesson(
-            "objects",
-            "What never changes, and what does?",
-            "so101/scene",
-            (("--worlds", "N", "how many Data of one Model (default 10)", {"default": 10}),),
-        ),
-        Lesson(
-            "state",
-            "Which numbers are the state?",
-            "so101/scene_box",
-            plots=True,
-        ),
-        Lesson(
-            "write",
-            "You wrote into qpos. Who noticed?",
-            "so101/scene",
-            (_JOINT, _VALUE),
-        ),
-        Lesson(
-            "forward",
-            "Why is a fresh arm's fingertip at the origin?",
-            "so101/scene",
-            (
-                _JOINT,
-                _VALUE,
-                ("--site", "SITE", "the fingertip (default gripperframe, or the last site)"),
-                ("--arrays", "", "show only which arrays each call changes"),
-                ("--lag", "", "show only how far behind a step leaves it"),
-                ("--seconds", "S", "simulated time of --lag (default 2)"),
-            ),
-            more=("arrays", "lag"),
-            plots=True,
-        ),
-        Lesson(
-            "hold",
-            "Six numbers in: how does the arm follow?",
-            "so101/scene",
-            (
-                ("--seconds", "S", "simulated time (default 2)", {"default": 2.0}),
-                ("--target", "X,X,…", "command, one number an actuator [rad for a servo]"),
-            ),
-            plots=True,
-        ),
-        Lesson(
-            "gravity",
-            "You never wrote ctrl. Who holds the arm up?",
-            "so101/scene",
-            (
-                ("--seconds", "S", "simulated time (default 4)"),
-                (
-                    "--joint",
-                    "JOINT",
-                    "joint to watch, with a servo (default shoulder_lift, or that with most load)",
-                ),
-                ("--longer", "S", "simulated time of the fall; 0 for none (default 100)"),
-            ),
-            plots=True,
-        ),
-        Lesson(
-            "reset",
-            "Back to a known state: what is in it?",
-            "so101/scene_box",
-        ),
-        Lesson(
-            "replay",
-            "Same start, same commands: the same bits?",
-            "so101/scene_box",
-            (
-                ("--steps", "N", "steps of each run (default 600)", {"default": 600}),
-                ("--ctrl", "X,X,…", "command, one number an actuator [rad for a servo]"),
-                (
-                    "--break",
-                    "extra-step|late-ctrl",
-                    "make the second run differ: one step more, or the command one step late",
-                    {"choices": ("extra-step", "late-ctrl")},
-                ),
-            ),
-            plots=True,
-        ),
-        Lesson(
-            "time",
-            "What time is it in a simulator?",
-            "so101/scene",
-            (
-                ("--realtime", "", "wait for the clock"),
-                ("--seconds", "S", "simulated time with --realtime (default 4)"),
-            ),
-        ),
-        Lesson(
-            "speed",
-            "What does one second of your machine buy?",
-            "so101/scene_box",
-            (("--steps", "N", "steps of each run (default 4000)", {"default": 4000}),),
-        ),
-        Lesson(
-            "worlds",
-            "Many worlds: what does a shared Model save?",
-            "so101/scene_box",
-            (("--most", "N", "the largest number of worlds (default 4096)", {"default": 4096}),),
-            on_path=False,
-            plots=True,
-        ),
-        Lesson("questions", "Check yourself: six questions.", "so101/scene_box", on_path=False),
-    )
-}
+LESSONS = {lesson.name: lesson for lesson in _LESSONS}
 PATH = tuple(lesson for lesson in LESSONS.values() if lesson.on_path)
 BESIDE = tuple(lesson for lesson in LESSONS.values() if not lesson.on_path)
 
 
 def module(name: str) -> Any:
-    """The module of a lesson."""
+    """Import the module of a lesson."""
     return importlib.import_module(f".{name}", __name__)

@@ -20,9 +20,9 @@ not for all. The pages of reports have more rules: see `report/template.py`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -30,10 +30,26 @@ from ..installed import ENGINES
 from ..interface import Array
 from ..measures import largest
 from ..measures.text import apart, milliseconds, short_time
-from ..page import Block, Figures, Heading, Items, Page, Question, Table, Text, Verdict
+from ..page import Block, Heading, Items, Page, Question, Table, Text, Verdict
 from ..releases import engine_of
 
-Results = Mapping[str, Figures]  # of a lesson, by backend
+if TYPE_CHECKING:
+    from ..runs.header import Provenance
+
+R = TypeVar("R")  # the result of a lesson on one engine
+Results = Mapping[str, R]  # the results of a lesson, by backend
+Blocks = Mapping[str, Block | Sequence[Block]]  # what stands alone in a template, by slot
+
+
+class HasProvenance(Protocol):
+    """A result that says what it was computed with."""
+
+    @property
+    def provenance(self) -> Provenance:
+        """The model, the versions and the timestep of the run."""
+        ...
+
+
 _CONDITION = re.compile(r"<!-- (?:if (?P<no>not )?(?P<name>\w+)|(?P<other>else)|end) -->")
 _PARTS = re.compile(r"^(?:[a-h]\)|>|-) ", re.MULTILINE)  # choices, a reason, items of a list
 _MARKED = re.compile(r"([?✓]) (\w+): (.*)", re.DOTALL)
@@ -41,24 +57,27 @@ _MARKED = re.compile(r"([?✓]) (\w+): (.*)", re.DOTALL)
 
 def page(
     name: str,
-    results: Mapping[str, Any],
-    slots: Mapping[str, dict[str, Any]],
-    blocks: Mapping[str, Block | Sequence[Block]],
+    results: Mapping[str, HasProvenance],
+    slots: Mapping[str, Mapping[str, Any]],
+    blocks: Blocks,
     prose: bool = True,
 ) -> Page:
-    """The page of a lesson.
+    """Return the page of a lesson.
 
     Args:
         name: Of the template.
         results: What was found, by engine.
-        slots: What its slots take, by engine; those of the engines' own names are true, too.
+        slots: What its slots take, by engine. A slot with the name of an engine says whether the
+            page is about it.
         blocks: What stands alone, by name.
         prose: Whether to keep texts and questions, which are about the arm.
     """
     template = text_of(__package__ or "", name)
     alone = {key: f"{{{key}}}" for key in blocks}
     shown = {engine: engine in slots for engine in ENGINES}
-    texts = {engine: filled(template, shown | values | alone) for engine, values in slots.items()}
+    texts = {
+        engine: filled(template, {**shown, **values, **alone}) for engine, values in slots.items()
+    }
     title, page_blocks = "", list[Block]()
     for number in sorted(set().union(*texts.values())):
         engines: dict[str, list[str]] = {}
@@ -77,12 +96,12 @@ def page(
 
 
 def text_of(package: str, name: str) -> str:
-    """A template that stands in a package."""
+    """Read a template that stands in a package."""
     return resources.files(package).joinpath(f"{name}.md").read_text("utf-8")
 
 
 def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
-    """The paragraphs of a template that have a line under what holds, by number, a line each."""
+    """Fill in the paragraphs of a template, by number, without lines whose condition is false."""
     conditions: list[bool] = []
     paragraphs: dict[int, str] = {}
     number = 0
@@ -99,17 +118,18 @@ def filled(template: str, slots: Mapping[str, Any]) -> dict[int, str]:
             conditions.append(holds is not bool(condition["no"]))
         elif condition:
             last = conditions.pop()
-            conditions += [not last] if condition["other"] else []
+            if condition["other"]:
+                conditions.append(not last)
     return paragraphs
 
 
 def blocks_of(
     text: str,
-    blocks: Mapping[str, Block | Sequence[Block]],
+    blocks: Blocks,
     prefix: str = "",
     always: bool = True,
 ) -> Sequence[Block]:
-    """The block that a paragraph is, or those that it stands for.
+    """Return the block that a paragraph is, or those that it stands for.
 
     Args:
         text: The paragraph, its slots filled.
@@ -135,8 +155,8 @@ def blocks_of(
     return [Question(asked, choices, None if value == "None" else int(value), because, always)]
 
 
-def origin(results: Mapping[str, Any]) -> str:
-    """What a page was computed with: model and engine versions."""
+def origin(results: Mapping[str, HasProvenance]) -> str:
+    """Say what a page was computed with: model and engine versions."""
     first = next(iter(results.values())).provenance
     engines = ", ".join(
         f"{engine_of(name)} {result.provenance.versions[result.provenance.backend]}"
@@ -145,15 +165,15 @@ def origin(results: Mapping[str, Any]) -> str:
     return f"{first.model_file} on {engines}, {milliseconds(first.timestep)} a step"
 
 
-def where(results: Mapping[str, Any], engine: str) -> str:
-    """The prefix "mujoco: " where several engines are shown, else nothing."""
-    return f"{engine}: " if len(results) > 1 else ""
+def where(engines: Collection[str], engine: str) -> str:
+    """Return the prefix "mujoco: " where several engines are shown, else nothing."""
+    return f"{engine}: " if len(engines) > 1 else ""
 
 
 def by_engine(
-    results: Mapping[str, Any], rows: Mapping[str, Callable[[Any], str]], title: str
+    results: Mapping[str, R], rows: Mapping[str, Callable[[R], str]], title: str
 ) -> Table:
-    """A table with a column for each engine.
+    """Return a table with a column for each engine.
 
     Args:
         results: By backend.
@@ -164,31 +184,31 @@ def by_engine(
     return Table(("", *results), lines, title)
 
 
-def differences(
-    results: Mapping[str, Any], rows: Mapping[str, Callable[[Any, Any], str]]
-) -> list[Table]:
-    """The last table of a page with several engines: each against the first.
+def differences(results: Mapping[str, R], rows: Mapping[str, Callable[[R, R], str]]) -> list[Table]:
+    """Return the last table of a page with several engines: each against the first.
 
     Args:
         results: By backend.
         rows: By what is compared, the words for it from the first's result and another's.
+
+    Returns:
+        One table; none of a page with a single engine.
     """
-    (name, first), *others = results.items()
-    if not others or not rows:
+    if len(results) < 2 or not rows:
         return []
-    return [
-        Table(
-            ("", *(f"{other} against {name}" for other, _ in others)),
-            [(row, *(words(first, result) for _, result in others)) for row, words in rows.items()],
-            title="Where they differ, and by how much",
-        )
-    ]
+    (name, first), *others = results.items()
+    lines: list[tuple[str, ...]] = []
+    for row, words in rows.items():
+        cells = [words(first, result) for _, result in others]
+        lines.append((row, *cells))
+    headers = ("", *(f"{other} against {name}" for other, _ in others))
+    return [Table(headers, lines, title="Where they differ, and by how much")]
 
 
 def largest_gap(
     left: Array, right: Array, slides: Sequence[bool], names: Sequence[str], time: Array
 ) -> str:
-    """Where two runs are farthest apart: by how much, in which joint, and when.
+    """Say where two runs are farthest apart: by how much, in which joint, and when.
 
     Args:
         left: (n, k) k joints at n moments [rad; of a slide, m].
@@ -209,6 +229,6 @@ def largest_gap(
     return f"{text}{name} at {short_time(time[row])}" if len(time) else f"{text}{name}"
 
 
-def emulated(result: Any, *promises: str) -> str:
-    """Which promises that a page speaks of are kept by this interface, and not by the engine."""
+def emulated(result: HasProvenance, *promises: str) -> str:
+    """List the promises of a page that this interface keeps in place of the engine."""
     return ", ".join(promise for promise in promises if promise in result.provenance.emulated)
