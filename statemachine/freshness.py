@@ -44,8 +44,7 @@ from .interface import (
 )
 from .measures import ContactNames, Gap
 from .measures.quantities import Readings, readings
-from .measures.text import TINY, count, few, listed, milliseconds
-from .page import Figures
+from .measures.text import TINY, count, few, grouped, listed, milliseconds
 from .releases import engine_of
 from .rotations import angle_between, matrix_from_quat, times
 
@@ -186,43 +185,69 @@ def freshness(model: Model, data: Data) -> Freshness:
     )
 
 
-def _notes(model: Model, rows: tuple[Row, ...], age: Figures, touching: bool) -> list[str]:
-    """What has to be added to the rows: each sentence with what it holds under."""
-    behaviours = model.capabilities.behaviours
+def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> list[str]:
+    """Return the sentences that have to be added to the rows.
+
+    Args:
+        model: Of the Data.
+        rows: One for each derived array that the backend yields.
+        age: How old those are that are not of now.
+        touching: Whether there are contacts, in what the Data says or in what it would say now.
+    """
+    names = {row.name for row in rows}
+    unavailable = [name for name in DERIVED if name not in names]
+    notes = [f"This backend does not tell: {', '.join(unavailable)}."] if unavailable else []
     stale = {row.name for row in rows if not row.now}
-    untold = [name for name in DERIVED if name not in {row.name for row in rows}]
-    after_a_step, restore = behaviours["stale after a step"], behaviours["exact restore"]
-    unknown = not age.never and age.steps is None
-    notes = [f"This backend does not tell: {', '.join(untold)}."] if untold else []
     if not stale:
         return [*notes, "All are of now."]
-    sentences = [
-        (
-            age.retraced,
-            f"Found by going back: qpos − h·qvel, h = {milliseconds(engine_step(model))}, gives "
-            f"the poses of {few(age.retraced)}, "
-            f"{f'to {age.within:.1e} m' if age.within else 'to the bit'}.",
-        ),
-        (
-            age.unmatched,
+    notes += _notes_on_age(model, age, stale)
+    notes += _notes_on_backend(model, stale, touching)
+    return [*notes, "sm.forward(model, data) makes all of them of now."]
+
+
+def _notes_on_age(model: Model, age: Age, stale: set[str]) -> list[str]:
+    """Return how the age was found, and what of it is not known.
+
+    Args:
+        model: Of the Data.
+        age: How old the arrays are.
+        stale: Names of the arrays that are not of now.
+    """
+    notes: list[str] = []
+    if age.retraced:
+        length = milliseconds(engine_step(model))
+        precision = f"to {age.within:.1e} m" if age.within else "to the bit"
+        notes.append(
+            f"Found by going back: qpos − h·qvel, h = {length}, gives the poses of "
+            f"{few(age.retraced)}, {precision}."
+        )
+    if age.unmatched:
+        notes.append(
             f"{few(age.unmatched)} match neither moment: qpos or qvel was written since, or "
-            "the engine integrates otherwise.",
-        ),
-        (
-            unknown and stale & set(POSES),
-            "Going back one step, to qpos − h·qvel, does not lead to these poses.",
-        ),
-        (unknown, "Writes are not recorded, unless sm.watch_freshness(model, data) does."),
-        (age.written, f"Written since: {', '.join(age.written)}."),
-        (after_a_step.support == "unsupported", f"After a step: {after_a_step.note}."),
-        (
-            touching and not model.capabilities.exact_restore and stale & _REMEMBERED,
+            "the engine integrates otherwise."
+        )
+    if not age.never and age.steps is None:
+        if stale & set(POSES):
+            notes.append("Going back one step, to qpos − h·qvel, does not lead to these poses.")
+        notes.append("Writes are not recorded, unless sm.watch_freshness(model, data) does.")
+    if age.written:
+        notes.append(f"Written since: {', '.join(age.written)}.")
+    return notes
+
+
+def _notes_on_backend(model: Model, stale: set[str], touching: bool) -> list[str]:
+    """Return what the backend says of itself that has a part in what is not of now."""
+    notes: list[str] = []
+    behaviours = model.capabilities.behaviours
+    after_a_step = behaviours["stale after a step"]
+    if after_a_step.support == "unsupported":
+        notes.append(f"After a step: {after_a_step.note}.")
+    if touching and not model.capabilities.exact_restore and stale & _REMEMBERED:
+        notes.append(
             "In contacts, and the forces and accelerations of what touches, not all of the "
-            f"difference need be age: {restore.note}.",
-        ),
-        (True, "sm.forward(model, data) makes all of them of now."),
-    ]
-    return notes + [text for holds, text in sentences if holds]
+            f"difference need be age: {behaviours['exact restore'].note}."
+        )
+    return notes
 
 
 def watch_freshness(model: Model, data: Data, raise_on_stale: bool = False) -> Watch:
@@ -313,13 +338,11 @@ class Watch:
         finally:
             self._aside = before
 
-    def age(self) -> Figures:
-        """How old derived values are, as counted."""
+    def age(self) -> Age:
+        """Return how old derived values are, as counted."""
         self.touch()
         writes = None if self._steps is None else dict(self._writes)
-        return age_from(
-            steps=self._steps, writes=writes, never=self._never, written=tuple(self._entries())
-        )
+        return Age(self._steps, writes, self._never, written=tuple(self._entries()))
 
     def touch(self) -> None:
         """See whether an input was written since the last time."""
@@ -404,11 +427,20 @@ def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
 
         return property(get, slot.__set__)
 
+    def derived(value: Array | Contacts, _data: Data, name: str) -> None:
+        watch.check(name, value)
+
+    def recomputed(*_: object) -> None:
+        watch.begin(0, present=True)
+
+    def overwritten(*_: object) -> None:
+        watch.begin(None, never=True)
+
     tells: dict[str, Callable[..., None]] = {
-        "_derive": lambda value, _, name: watch.check(name, value),
-        "_recompute": lambda *_: watch.begin(0, present=True),
-        "_reset": lambda *_: watch.begin(None, never=True),
-        "_set_state": lambda *_: watch.begin(None, never=True),
+        "_derive": derived,
+        "_recompute": recomputed,
+        "_reset": overwritten,
+        "_set_state": overwritten,
     }
     hooks = {name: _after(getattr(kind, name), tell) for name, tell in tells.items()}
     inputs = {name: seen(slot) for name, slot in _SLOTS.items()}
@@ -433,9 +465,13 @@ def _stale_read(stale: Row, entries: list[str]) -> StaleReadError:
 
 
 def _worst(before: tuple[Gap, ...], now: tuple[Gap, ...]) -> tuple[Gap, ...]:
-    """Of each kind the larger gap."""
-    by_unit = {gap.unit: gap for gap in sorted((*now, *before), key=lambda gap: gap.shown)}
-    return tuple(by_unit[unit] for unit in dict.fromkeys(gap.unit for gap in (*before, *now)))
+    """Return of each kind the larger gap."""
+    by_unit: dict[str, Gap] = {}
+    for gap in (*before, *now):
+        known = by_unit.setdefault(gap.unit, gap)
+        if gap.shown > known.shown:
+            by_unit[gap.unit] = gap
+    return tuple(by_unit.values())
 
 
 def _place() -> str:
@@ -448,20 +484,28 @@ def _place() -> str:
     return f"{Path(frame.f_code.co_filename).name}:{frame.f_lineno}"
 
 
-def age_from(**known: Any) -> Figures:
+@dataclass(frozen=True)
+class Age:
     """How old derived values are, as far as it is known.
 
-    Returns:
+    Attributes:
         steps: Engine steps since; None if that is not known.
         writes: Changes of each input since; None if nobody counted.
         never: Whether nothing was derived since the Data was made, reset or set.
         written: Entries of the inputs that are others now; known only while watching.
-        retraced: Bodies that are where one step back has them, within `within` [m, and of
-            quaternions 1], where that is how the number of steps was found; unmatched: bodies
-            whose poses match neither moment.
+        retraced: Bodies that are where one step back has them, where that is how the number of
+            steps was found.
+        unmatched: Bodies whose poses match neither moment.
+        within: How far those of `retraced` are from there at most [m, and of quaternions 1].
     """
-    unknown = {"steps": None, "writes": None, "never": False, "within": 0.0}
-    return Figures(**unknown | dict.fromkeys(("written", "retraced", "unmatched"), ()) | known)
+
+    steps: int | None = None
+    writes: Mapping[str, int] | None = None
+    never: bool = False
+    written: tuple[str, ...] = ()
+    retraced: tuple[str, ...] = ()
+    unmatched: tuple[str, ...] = ()
+    within: float = 0.0
 
 
 class Scratch:
@@ -497,9 +541,9 @@ class Scratch:
 
 
 def row(
-    model: Model, name: str, age: Figures, held: Array | Contacts, now: Array | Contacts | None
+    model: Model, name: str, age: Age, held: Array | Contacts, now: Array | Contacts | None
 ) -> Row:
-    """What is to be told of one array.
+    """Return what is to be told of one array.
 
     Args:
         model: Of the Data.
@@ -514,14 +558,17 @@ def row(
     if age.never:
         return Row(name, False, None, None, "never computed", off)
     writes = None if age.writes is None else sum(age.writes[part] for part in DEPEND[name])
-    words = [count(age.steps, "substep" if model.substeps > 1 else "step")] if age.steps else []
-    words += [count(writes, "write")] if writes else []
+    words: list[str] = []
+    if age.steps:
+        words.append(count(age.steps, "substep" if model.substeps > 1 else "step"))
+    if writes:
+        words.append(count(writes, "write"))
     of = f"{listed(words)} ago" if words else "an earlier state"
     return Row(name, False, age.steps, writes, of, off)
 
 
-def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Figures:
-    """How old derived values are, from nothing but their values.
+def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Age:
+    """Find out how old derived values are, from nothing but their values.
 
     Args:
         model: Of the Data.
@@ -531,25 +578,25 @@ def age_of(model: Model, state: State, held: Readings, scratch: Scratch) -> Figu
     """
     now = scratch.now(state)
     if all(same(held[name], now[name]) for name in held):
-        return age_from(steps=0)
+        return Age(steps=0)
     poses, current = _poses(held), _poses(now)
     if not poses[:, 3:].any():  # a rotation is never zero
-        return age_from(never=True)
+        return Age(never=True)
     lag = np.abs(current - poses).max(axis=1)
     if not lag.any():  # the poses, which alone can be retraced, are of now
-        return age_from()
+        return Age()
     off = np.abs(scratch.one_step_back(state) - poses).max(axis=1)
     # Nearer than rounding makes them, and much nearer than those of now. One body is enough:
     # what else is not there was written since.
     moved = lag > 0
     there = moved & (off <= _ROUNDING * (1 + np.abs(poses).max())) & (off <= lag / 100)
     if not there.any():
-        return age_from()
+        return Age()
 
     def names(chosen: Any) -> tuple[str, ...]:
         return tuple(model.body_names[b] or f"body {b}" for b in np.flatnonzero(chosen).tolist())
 
-    return age_from(
+    return Age(
         steps=1,
         retraced=names(there),
         unmatched=names(moved & ~there),
@@ -605,9 +652,8 @@ def table(
         no_gap: What stands where a row has none.
     """
     *names, last = headers
-    widths = [
-        max(map(len, column)) for column in zip(names, *(cells for cells, _ in rows), strict=True)
-    ]
+    lines_of_cells = [names, *(cells for cells, _ in rows)]
+    widths = [max(map(len, column)) for column in zip(*lines_of_cells, strict=True)]
     indent = sum(widths) + 3 * len(widths)
 
     def line(cells: Sequence[str], end: str) -> str:
@@ -616,10 +662,10 @@ def table(
         )
 
     lines = [line(names, last)]
+    room = max(WIDTH - indent, 20)
     for cells, off in rows:
-        told = [str(gap) for gap in worth_telling(off)] or [no_gap]
-        room = max(WIDTH - indent, 20)
-        first, *others = [part for text in told for part in textwrap.wrap(text, room)]
+        texts = [str(gap) for gap in worth_telling(off)] or [no_gap]
+        first, *others = [part for text in texts for part in textwrap.wrap(text, room)]
         lines.append(line(cells, first))
         lines += [" " * indent + other for other in others]
     return [lines[0], "-" * max(map(len, lines)), *lines[1:]]
@@ -687,40 +733,77 @@ _VECTORS = {
 }
 
 
-def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[Gap]:
-    pairs = [[tuple(pair) for pair in contacts.geom.tolist()] for contacts in (held, now)]
-    called, matched = ContactNames.of(model), list[tuple[int, int]]()
-    gone, come = [], []
-    for pair in dict.fromkeys((*pairs[0], *pairs[1])):
-        ours, theirs = ([i for i, other in enumerate(side) if other == pair] for side in pairs)
-        while ours and theirs:  # the nearest to each other are one contact
+@dataclass(frozen=True)
+class _MatchedContacts:
+    """Which contacts of two moments are one contact.
+
+    Attributes:
+        held: Rows of the contacts of the first moment; a contact of both has the same place in
+            `held` and in `now`.
+        now: Rows of those of the second.
+        vanished: The pair of geoms of each contact that is only in the first.
+        appeared: The pair of geoms of each that is only in the second.
+    """
+
+    held: list[int]
+    now: list[int]
+    vanished: list[tuple[int, int]]
+    appeared: list[tuple[int, int]]
+
+
+def _matched(held: Contacts, now: Contacts) -> _MatchedContacts:
+    """Match contacts of the same geoms: the nearest to each other are one contact."""
+    matched = _MatchedContacts([], [], [], [])
+    rows_held, rows_now = _rows_by_pair(held), _rows_by_pair(now)
+    for pair in rows_held | rows_now:
+        ours, theirs = rows_held.get(pair, []), rows_now.get(pair, [])
+        while ours and theirs:
             apart = np.linalg.norm(held.pos[ours][:, None] - now.pos[theirs][None], axis=2)
             i, j = np.unravel_index(int(np.argmin(apart)), apart.shape)
-            matched.append((ours.pop(int(i)), theirs.pop(int(j))))
-        gone += [pair] * len(ours)
-        come += [pair] * len(theirs)
-    for unit, changed in (("appears", come), ("vanishes", gone)):
+            matched.held.append(ours.pop(int(i)))
+            matched.now.append(theirs.pop(int(j)))
+        matched.vanished.extend([pair] * len(ours))
+        matched.appeared.extend([pair] * len(theirs))
+    return matched
+
+
+def _rows_by_pair(contacts: Contacts) -> dict[tuple[int, int], list[int]]:
+    """Return the rows of contacts by their pairs of geoms."""
+    return grouped(((a, b), row) for row, (a, b) in enumerate(contacts.geom.tolist()))
+
+
+def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[Gap]:
+    """Give the gaps between the contacts of two moments."""
+    called, matched = ContactNames.of(model), _matched(held, now)
+    for unit, changed in (("appears", matched.appeared), ("vanishes", matched.vanished)):
         if changed:
             most = max(changed, key=changed.count)
             yield Gap(float(len(changed)), unit, called.geoms(*most))
-    if not matched:
+    ours, theirs = matched.held, matched.now
+    if not ours:
         return
-    ours, theirs = (list(column) for column in zip(*matched, strict=True))
-    owners = [called.geoms(*pairs[0][i]) for i in ours]
+    owners = [called.geoms(*pair) for pair in held.geom[ours].tolist()]
     moved = np.linalg.norm(held.pos[ours] - now.pos[theirs], axis=1)
     sizes = {
         "m": np.maximum(moved, np.abs(held.dist[ours] - now.dist[theirs])),
         "rad": angle_between(held.frame[ours], now.frame[theirs]),
     }
-    for unit, part in (("N", "force"), ("N·m", "torque")):  # along the world's axes
-        before, after = (
-            np.einsum("nij,ni->nj", contacts.frame, getattr(contacts, part))
-            for contacts in (held, now)
-        )
+    for unit, part in (("N", "force"), ("N·m", "torque")):
+        before, after = _along_world(held, part), _along_world(now, part)
         sizes[unit] = np.linalg.norm(before[ours] - after[theirs], axis=1)
     for unit, apart in sizes.items():
         if apart.any():
             yield Gap.of(apart, unit, owners)
+
+
+def _along_world(contacts: Contacts, part: str) -> Array:
+    """Return the forces or torques (n, 3) of contacts along the world's axes.
+
+    Args:
+        contacts: The n contacts.
+        part: "force" or "torque".
+    """
+    return np.einsum("nij,ni->nj", contacts.frame, getattr(contacts, part))
 
 
 class _Callable(ModuleType):

@@ -15,15 +15,14 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import BadInputError, ModelError, check_name, refuse
+from .errors import BadInputError, ModelError, check_name
 from .installed import require
 from .interface import Array, Model
 from .interface.options import as_numbers, as_vector
 from .model_files import checked_file
 from .models import AnyPath
-from .page import Figures
 from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz
-from .witness import Segment, read_file, read_numbers
+from .witness import RobotReading, Segment, read_file, read_numbers
 
 Kind = Literal["site", "body"]
 
@@ -85,7 +84,9 @@ class Kinematics:
         kinematics._hold(pin, model.path, read_numbers(pin, compiled, *names), None)
         return kinematics
 
-    def _hold(self, pin: Any, path: Path, read: Figures, joint_names: Sequence[str] | None) -> None:
+    def _hold(
+        self, pin: Any, path: Path, read: RobotReading, joint_names: Sequence[str] | None
+    ) -> None:
         self._pin: Any = pin
         self.path: Path = path
         self.version: str = pin.__version__
@@ -96,7 +97,7 @@ class Kinematics:
         self.prepared: tuple[str, ...] = read.prepared
         self.body_names: tuple[str, ...] = tuple(read.bodies)
         self.site_names: tuple[str, ...] = tuple(read.sites)
-        in_file = [name for name, _ in read.joints]
+        in_file = [segment.name for segment in read.joints]
         self.joint_names: tuple[str, ...] = _names(in_file if joint_names is None else joint_names)
         self._segments = _in_order(read, self.joint_names, path)
         self.nq: int = sum(segment.nq for segment in self._segments)
@@ -237,27 +238,26 @@ def shared_joints(kinematics: Kinematics, names: Sequence[str]) -> list[int]:
     if own == tuple(names):
         return list(range(len(own)))
     lacking = sorted(set(own) - set(names))
-    refuse(
-        (
-            not all(own),
-            f"{kinematics.path.name} has joints without a name: they cannot be matched",
-        ),
-        (lacking, f"the engine lacks joints of the witness: {', '.join(lacking)}"),
-    )
+    if not all(own):
+        raise BadInputError(
+            f"{kinematics.path.name} has joints without a name: they cannot be matched"
+        )
+    if lacking:
+        raise BadInputError(f"the engine lacks joints of the witness: {', '.join(lacking)}")
     return [number for number, name in enumerate(names) if name in own]
 
 
-def _in_order(read: Figures, wanted: Sequence[str], path: Path) -> list[Segment]:
-    """The joints as segments of a qpos that lists them in the order `wanted`."""
-    in_file = [name for name, _ in read.joints]
+def _in_order(read: RobotReading, wanted: Sequence[str], path: Path) -> list[Segment]:
+    """Return the joints as segments of a qpos that lists them in the order `wanted`."""
+    in_file = [segment.name for segment in read.joints]
     if list(wanted) == in_file:
-        return [segment for _, segment in read.joints]
+        return list(read.joints)
     if sorted(in_file) != sorted(wanted) or len(set(in_file)) != len(in_file):
         raise ModelError(
             f"{path.name} has other joints than asked for: {', '.join(in_file)} "
             f"against {', '.join(wanted)}"
         )
-    by_name = dict(read.joints)
+    by_name = {segment.name: segment for segment in read.joints}
     return [by_name[name] for name in wanted]
 
 

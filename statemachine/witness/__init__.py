@@ -8,18 +8,21 @@ that computes is another, and the reading of the file is not.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ..errors import ModelError
-from ..page import Figures
 from ..rotations import matrix_from_quat
-from .mjcf import PlainMjcf
+from .mjcf import PlainMjcf, WrittenBody, WrittenSite
 from .mjcf_text import parse
+
+if TYPE_CHECKING:
+    import pinocchio
 
 # A robot as Pinocchio has it, with the names and the order of the file that it comes from.
 #
@@ -35,12 +38,14 @@ class Segment(NamedTuple):
     """One joint.
 
     Attributes:
+        name: "" if it has none.
         kind: "free", "ball", "hinge", "slide", or "unbounded": a hinge that Pinocchio
             keeps as cosine and sine.
         idx_q, idx_v: Where it starts in Pinocchio's vectors.
         ref: What qpos says where the file draws the joint [rad or m].
     """
 
+    name: str
     kind: str
     idx_q: int
     idx_v: int
@@ -55,6 +60,28 @@ class Segment(NamedTuple):
     def nv(self) -> int:
         """Its length in qvel."""
         return SIZES[self.kind][1]
+
+
+@dataclass(frozen=True, eq=False)
+class RobotReading:
+    """A robot as Pinocchio has it, and how it came by it.
+
+    Attributes:
+        model: Pinocchio's Model.
+        joints: In MuJoCo's order, or of a URDF in Pinocchio's.
+        bodies: Ids of Pinocchio's frames, by name; a body without a name is called "body 7", by
+            its place in MuJoCo's order. "body 0" is the world.
+        sites: The same of sites: "site 3".
+        grade: `OWN_READING` or `SAME_READING`.
+        prepared: What was done to the file's text before Pinocchio read it.
+    """
+
+    model: pinocchio.Model
+    joints: tuple[Segment, ...]
+    bodies: dict[str, int]
+    sites: dict[str, int]
+    grade: str
+    prepared: tuple[str, ...]
 
 
 def labels(kind: str, names: Iterable[str]) -> list[str]:
@@ -80,7 +107,7 @@ _KINDS = (
 
 def read_numbers(
     pin: Any, compiled: Any, bodies: Sequence[str], joints: Sequence[str], sites: Sequence[str]
-) -> Figures:
+) -> RobotReading:
     """Build Pinocchio's model of a compiled model.
 
     Args:
@@ -91,21 +118,12 @@ def read_numbers(
         bodies: Names, "" for none; joints, sites: likewise.
         joints: See bodies.
         sites: See bodies.
-
-    Returns:
-        model: Pinocchio's.
-        joints: Of each joint its name, "" if it has none, and where it is (a Segment); in MuJoCo's
-            order, or of a URDF in Pinocchio's.
-        bodies, sites: Ids of Pinocchio's frames, by name; those without a name are called
-            "body 7" and "site 3", by their places in MuJoCo's order. 0 is the world.
-        grade: `OWN_READING` or `SAME_READING`.
-        prepared: What was done to the file's text before Pinocchio read it.
     """
     model = pin.Model()
     types = pin.FrameType
     # Of each body: the joint that carries it, its pose in that joint, and its frame.
     carriers = [(0, pin.SE3.Identity(), 0)]
-    segments: list[tuple[str, Segment]] = []
+    segments: list[Segment] = []
     for body in range(1, len(bodies)):
         parent, pose, frame = carriers[int(compiled.body_parentid[body])]
         pose = pose * _pose(pin, compiled.body_pos[body], compiled.body_quat[body])
@@ -122,7 +140,7 @@ def read_numbers(
             parent = model.addJoint(parent, moving, pose * anchor, f"joint {joint}")
             pose = anchor.inverse()
             added = model.joints[parent]
-            segments.append((joints[joint], Segment(kind, added.idx_q, added.idx_v, ref)))
+            segments.append(Segment(joints[joint], kind, added.idx_q, added.idx_v, ref))
         own = model.addFrame(pin.Frame(f"body {body}", parent, frame, pose, types.BODY))
         carriers.append((parent, pose, own))
     placed: list[int] = []
@@ -132,7 +150,7 @@ def read_numbers(
         added = pin.Frame(f"site {site}", parent, frame, pose, types.OP_FRAME)
         placed.append(model.addFrame(added))
     frames = [frame for *_, frame in carriers]
-    return Figures(
+    return RobotReading(
         model=model,
         joints=tuple(segments),
         bodies=dict(zip(labels("body", bodies), frames, strict=True)),
@@ -150,8 +168,8 @@ def _pose(pin: Any, pos: Any, quat: Any) -> Any:
 # Own reading: a robot's file, read by Pinocchio's own parser with no misreading unnoticed.
 
 
-def read_file(pin: Any, path: Path) -> Figures:
-    """Pinocchio's model of an MJCF or URDF file.
+def read_file(pin: Any, path: Path) -> RobotReading:
+    """Read Pinocchio's model of an MJCF or URDF file.
 
     Args:
         pin: Pinocchio.
@@ -173,7 +191,7 @@ def read_file(pin: Any, path: Path) -> Figures:
     raise ModelError(f"{path} is neither MJCF nor URDF: its root element is <{root.tag}>")
 
 
-def _read_mjcf(pin: Any, file: PlainMjcf, path: Path) -> Figures:
+def _read_mjcf(pin: Any, file: PlainMjcf, path: Path) -> RobotReading:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "robot.xml"
         ElementTree.ElementTree(file.root).write(copy, encoding="utf-8")
@@ -184,45 +202,49 @@ def _read_mjcf(pin: Any, file: PlainMjcf, path: Path) -> Figures:
         for number, frame in enumerate(model.frames)
         if frame.type in (types.BODY, types.OP_FRAME)
     }
-    bodies = [frames[body.written] for body in file.bodies]
-    joints = [
-        segment
-        for body, frame in zip(file.bodies, bodies, strict=True)
-        for segment in _segments(pin, model, body, frame, path)
-    ]
-    sites = [site for body in file.bodies for site in body.sites]
-    if sum(segment.nq for _, segment in joints) != model.nq:
+    joints: list[Segment] = []
+    for body in file.bodies:
+        joints += _segments(pin, model, body, frames[body.written], path)
+    if sum(segment.nq for segment in joints) != model.nq:
         raise ModelError(f"Pinocchio finds other joints in {path.name} than there are")
-    return Figures(
+    sites = [site for body in file.bodies for site in body.sites]
+    return RobotReading(
         model=model,
         joints=tuple(joints),
-        bodies=dict(zip(labels("body", (body.name for body in file.bodies)), bodies, strict=True)),
-        sites=dict(
-            zip(
-                labels("site", (name for name, _ in sites)),
-                (frames[written] for _, written in sites),
-                strict=True,
-            )
-        ),
+        bodies=_labelled_frames("body", file.bodies, frames),
+        sites=_labelled_frames("site", sites, frames),
         grade=OWN_READING,
         prepared=file.changes,
     )
 
 
-def _segments(
-    pin: Any, model: Any, body: Figures, frame: int, path: Path
-) -> list[tuple[str, Segment]]:
-    """The joints of one body, which Pinocchio may have put into one."""
+def _labelled_frames(
+    kind: str, elements: Sequence[WrittenBody | WrittenSite], frames: Mapping[str, int]
+) -> dict[str, int]:
+    """Return the ids of Pinocchio's frames by what bodies or sites are called.
+
+    Args:
+        kind: "body" or "site".
+        elements: In MuJoCo's order.
+        frames: The ids by the names in what Pinocchio read.
+    """
+    called = labels(kind, [element.name for element in elements])
+    numbers = [frames[element.written] for element in elements]
+    return dict(zip(called, numbers, strict=True))
+
+
+def _segments(pin: Any, model: Any, body: WrittenBody, frame: int, path: Path) -> list[Segment]:
+    """Return the joints of one body, which Pinocchio may have put into one."""
     if not body.joints:
         return []
     number = model.frames[frame].parentJoint
     joint = model.joints[number]
     idx_q, idx_v = joint.idx_q, joint.idx_v
-    segments: list[tuple[str, Segment]] = []
+    segments: list[Segment] = []
     for name, kind, ref in body.joints:
         if kind not in SIZES:
             raise ModelError(f"{path.name} has a joint of the kind {kind!r}, which is unknown")
-        segments.append((name, Segment(kind, idx_q, idx_v, ref)))
+        segments.append(Segment(name, kind, idx_q, idx_v, ref))
         idx_q, idx_v = idx_q + SIZES[kind][0], idx_v + SIZES[kind][1]
         if kind == "free":
             # MuJoCo's qpos of a free body is its pose in the world, whatever pose the file
@@ -237,9 +259,9 @@ def _segments(
 _KINDS_BY_SIZE = {(2, 1): "unbounded", (1, 1): "hinge"}
 
 
-def _read_urdf(pin: Any, path: Path) -> Figures:
+def _read_urdf(pin: Any, path: Path) -> RobotReading:
     model = pin.buildModelFromUrdf(str(path))
-    joints: list[tuple[str, Segment]] = []
+    joints: list[Segment] = []
     changed = 0
     for number, name in list(enumerate(model.names))[1:]:
         joint, theirs = model.joints[number], model.joints[number].shortname()
@@ -250,17 +272,19 @@ def _read_urdf(pin: Any, path: Path) -> Figures:
         if free:
             changed += not model.jointPlacements[number].isIdentity()
             model.jointPlacements[number] = pin.SE3.Identity()  # as of an MJCF
-        joints.append((name, Segment(kind, joint.idx_q, joint.idx_v)))
+        joints.append(Segment(name, kind, joint.idx_q, joint.idx_v))
     links = [k for k, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
     bodies = {model.frames[k].name: k for k in links}
-    said = (f"places of floating joints left out, for qpos has them: {changed}",) * bool(changed)
-    return Figures(
+    prepared: tuple[str, ...] = ()
+    if changed:
+        prepared = (f"places of floating joints left out, for qpos has them: {changed}",)
+    return RobotReading(
         model=model,
         joints=tuple(joints),
         bodies=bodies,
         sites={},
         grade=OWN_READING,
-        prepared=said,
+        prepared=prepared,
     )
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -18,9 +19,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..errors import ModelError
-from ..page import Figures
 from ..rotations import HERE, Array, Placement
-from .mjcf_text import attached_source, body_of, numbers, own_place, source_of
+from .mjcf_text import MjcfSource, attached_source, body_of, numbers, own_place, source_of
 
 Element = ElementTree.Element
 _MOST_BODIES = 100_000
@@ -29,6 +29,49 @@ _WITHOUT_PLACES = {"inertial", "geom", "camera", "light", "plugin"}
 _PLACED_BY = {"quat", "euler", "axisangle", "xyaxes", "zaxis", "fromto"}
 # What a joint and a site of Pinocchio's parser need to be told.
 _KINEMATIC = {"joint": {"type", "pos", "axis", "ref"}, "site": {"pos"} | _PLACED_BY}
+
+
+class WrittenJoint(NamedTuple):
+    """A joint of a body.
+
+    Attributes:
+        name: "" if it has none.
+        kind: "free", "ball", "hinge" or "slide", or what else the file says.
+        ref: What qpos says where the file draws the joint [rad or m].
+    """
+
+    name: str
+    kind: str
+    ref: float
+
+
+class WrittenSite(NamedTuple):
+    """A site of a body.
+
+    Attributes:
+        name: "" if it has none.
+        written: Its name in what Pinocchio reads.
+    """
+
+    name: str
+    written: str
+
+
+@dataclass
+class WrittenBody:
+    """A body while it is written.
+
+    Attributes:
+        name: "" if it has none.
+        written: Its name in what Pinocchio reads: there, names are unique and never empty.
+        joints: Its joints, in order.
+        sites: Its sites, in order.
+    """
+
+    name: str
+    written: str
+    joints: list[WrittenJoint] = field(default_factory=list[WrittenJoint])
+    sites: list[WrittenSite] = field(default_factory=list[WrittenSite])
 
 
 class _Surroundings(NamedTuple):
@@ -43,13 +86,13 @@ class _Surroundings(NamedTuple):
 
     frame: Placement
     childclass: str
-    sources: tuple[Figures, ...]
+    sources: tuple[MjcfSource, ...]
     prefix: str = ""
     suffix: str = ""
 
     @property
-    def source(self) -> Figures:
-        """The file that it is in."""
+    def source(self) -> MjcfSource:
+        """Return the file that it is in."""
         return self.sources[-1]
 
 
@@ -58,10 +101,7 @@ class PlainMjcf:
 
     Attributes:
         root: What Pinocchio's parser reads.
-        bodies: The world first, then all bodies in MuJoCo's order. Of each its name, "" if it has
-            none; what is written, its name in what Pinocchio reads: there, names are unique and
-            never empty; its joints in order, the name of each, its kind, and its ref [rad or m];
-            its sites, their names, and what they are called in what Pinocchio reads.
+        bodies: The world first, then all bodies in MuJoCo's order.
         changes: What was done, in words.
     """
 
@@ -88,7 +128,7 @@ class PlainMjcf:
         # keeps them.
         ground = ElementTree.SubElement(world, "body", name="the ground")
         still = ElementTree.SubElement(ground, "body", name="body 0")
-        self.bodies = [Figures(name="world", written="body 0", joints=[], sites=[])]
+        self.bodies = [WrittenBody("world", "body 0")]
         self._numbers = {"joint": itertools.count(), "site": itertools.count()}
         around = _Surroundings(HERE, "", (source,))
         for worldbody in source.root.findall("worldbody"):
@@ -122,7 +162,7 @@ class PlainMjcf:
         self,
         source: Element,
         target: Element,
-        body: Figures,
+        body: WrittenBody,
         around: _Surroundings,
         sites: Element,
     ) -> None:
@@ -150,7 +190,7 @@ class PlainMjcf:
         self,
         element: Element,
         target: Element,
-        body: Figures,
+        body: WrittenBody,
         around: _Surroundings,
         sites: Element,
     ) -> None:
@@ -192,7 +232,7 @@ class PlainMjcf:
         if number > _MOST_BODIES:
             raise ModelError(f"{self._path.name} has more than {_MOST_BODIES:,} bodies")
         name = self._name(element, around)
-        body = Figures(name=name, written=f"body {number}", joints=[], sites=[])
+        body = WrittenBody(name, f"body {number}")
         self._done["body names"] += not name
         self.bodies.append(body)
         written = ElementTree.SubElement(target, "body", name=body.written)
@@ -202,7 +242,7 @@ class PlainMjcf:
         self._write(element, written, body, inside, written)
 
     def _joint(
-        self, element: Element, target: Element, body: Figures, around: _Surroundings
+        self, element: Element, target: Element, body: WrittenBody, around: _Surroundings
     ) -> None:
         given = self._resolved(element, "joint", around)
         kind = "free" if element.tag == "freejoint" else given.get("type", "hinge")
@@ -217,7 +257,7 @@ class PlainMjcf:
         if kind == "hinge":
             ref = compiler.radians(ref)
         name = self._name(element, around)
-        body.joints.append((name, kind, ref))
+        body.joints.append(WrittenJoint(name, kind, ref))
         self._done["joint names"] += not name
         written = {"name": f"joint {next(self._numbers['joint'])}", "type": kind}
         if kind != "free":
@@ -229,10 +269,10 @@ class PlainMjcf:
         ElementTree.SubElement(target, "joint", written)
 
     def _site(
-        self, element: Element, target: Element, body: Figures, around: _Surroundings
+        self, element: Element, target: Element, body: WrittenBody, around: _Surroundings
     ) -> None:
         called = f"site {next(self._numbers['site'])}"
-        body.sites.append((self._name(element, around), called))
+        body.sites.append(WrittenSite(self._name(element, around), called))
         written = ElementTree.SubElement(target, "site", name=called)
         self._place(self._resolved(element, "site", around), written, around)
 

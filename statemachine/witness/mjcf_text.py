@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -12,9 +13,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from .. import models
-from ..errors import ModelError, refuse
+from ..errors import ModelError
 from ..models import included_file
-from ..page import Figures
 from ..rotations import HERE, Array, Placement, matrix_from_quat, rotation
 
 Element = ElementTree.Element
@@ -34,20 +34,32 @@ class Compiler(NamedTuple):
         return float(np.deg2rad(angle)) if self.degrees else angle
 
 
-def source_of(root: Element, path: Path, done: Counter[str]) -> Figures:
-    """A file with all that is needed to read its bodies; `done` is told what was resolved.
+@dataclass(frozen=True, eq=False)
+class MjcfSource:
+    """A file with all that is needed to read its bodies.
 
-    Returns:
+    Attributes:
         path: Where it is.
         root: Its text, the includes resolved.
-        compiler, classes: What it says of angles, and its default classes.
+        compiler: What it says of angles.
+        classes: Its default classes.
+    """
+
+    path: Path
+    root: Element
+    compiler: Compiler
+    classes: Classes
+
+
+def source_of(root: Element, path: Path, done: Counter[str]) -> MjcfSource:
+    """Return the source of a file; `done` is told what was resolved.
 
     Raises:
         ModelError: It has a meaning that is not that of MuJoCo today, or a part is missing.
     """
     root, included = with_includes(root, path)
     done["included files"] += included
-    return Figures(
+    return MjcfSource(
         path=path,
         root=root,
         compiler=compiler_of(root, path),
@@ -55,8 +67,8 @@ def source_of(root: Element, path: Path, done: Counter[str]) -> Figures:
     )
 
 
-def attached_source(name: str, main: Figures, done: Counter[str]) -> Figures:
-    """The file that an <attach> of `main` calls `name`.
+def attached_source(name: str, main: MjcfSource, done: Counter[str]) -> MjcfSource:
+    """Return the file that an <attach> of `main` calls `name`.
 
     Raises:
         ModelError: None is called so, or it cannot be read.
@@ -71,8 +83,8 @@ def attached_source(name: str, main: Figures, done: Counter[str]) -> Figures:
     raise ModelError(f"{main.path.name} has an <attach> of {name!r}, and no <model> is called so")
 
 
-def body_of(source: Figures, name: str) -> tuple[Element, str]:
-    """A body of a file by its name, and the class that its parents give it.
+def body_of(source: MjcfSource, name: str) -> tuple[Element, str]:
+    """Return a body of a file by its name, and the class that its parents give it.
 
     Raises:
         ModelError: There is none, or a <frame> or <replicate> around it moves it.
@@ -151,18 +163,12 @@ def compiler_of(root: Element, path: Path) -> Compiler:
         given |= element.attrib
     angle, eulerseq = given.get("angle", "degree"), given.get("eulerseq", "xyz")
     coordinate = given.get("coordinate", "local")
-    refuse(
-        (angle not in ("degree", "radian"), f"{path.name} has angles in {angle!r}"),
-        (
-            len(eulerseq) != 3 or not set(eulerseq) <= set("xyzXYZ"),
-            f"{path.name} has an eulerseq of {eulerseq!r}",
-        ),
-        (
-            coordinate != "local",
-            f"{path.name} has {coordinate} coordinates, which are no more",
-        ),
-        error=ModelError,
-    )
+    if angle not in ("degree", "radian"):
+        raise ModelError(f"{path.name} has angles in {angle!r}")
+    if len(eulerseq) != 3 or not set(eulerseq) <= set("xyzXYZ"):
+        raise ModelError(f"{path.name} has an eulerseq of {eulerseq!r}")
+    if coordinate != "local":
+        raise ModelError(f"{path.name} has {coordinate} coordinates, which are no more")
     return Compiler(angle == "degree", eulerseq, given.get("alignfree") == "true")
 
 
