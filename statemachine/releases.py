@@ -15,13 +15,13 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from .errors import BadInputError, EngineError, MissingEngineError, check_name, refuse
 from .installed import DEFAULT, engine_version
-from .page import Figures
 
 if sys.platform == "win32":
     fcntl = None
@@ -141,21 +141,30 @@ def _python_in(place: Path) -> Path:
     return place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
-def releases() -> Iterator[Figures]:
-    """Those that are here, by name.
+@dataclass(frozen=True)
+class Release:
+    """Release of an engine in an environment of its own.
 
-    Returns:
+    Attributes:
         name: As "mujoco==3.3.7".
-        python: Version of its Python.
+        python: The version of its Python.
         size: Of its files [byte].
     """
+
+    name: str
+    python: str
+    size: int
+
+
+def releases() -> Iterator[Release]:
+    """Give the releases that are here, by name."""
     clear_abandoned()
     for place in sorted(folder().glob("[a-z]*==*")):  # one that is being made begins with a dot
         settings = place / "pyvenv.cfg"
         text = settings.read_text(encoding="utf-8") if settings.exists() else ""
         python = re.search(r"^version(?:_info)? *= *(\S+)", text, re.MULTILINE)
         files = (file for file in place.rglob("*") if not file.is_dir())
-        yield Figures(
+        yield Release(
             name=place.name,
             python=python[1] if python else "",
             size=sum(file.lstat().st_size for file in files),
