@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -224,6 +224,88 @@ def model_of(says: str = "the model", default: str | None = None) -> Row:
 def seed_of(what: str) -> Row:
     """The option --seed."""
     return "--seed", "N", f"random seed of {what} (0)", {"default": 0}
+
+
+class TerminalReporter:
+    """A `Reporter` that shows a bar of progress and prints each note, on standard error."""
+
+    def stage(self, what: str) -> AbstractContextManager[Callable[[float], None]]:
+        """Show a bar for a stage of the work."""
+        from ..report.terminal import progress
+
+        return progress(what)
+
+    def note(self, text: str) -> None:
+        """Print a note in one line."""
+        complain(text, 0)
+
+
+# Options that several commands have.
+_RUNS = "mujoco, pybullet or a release, mujoco==3.3.7"
+_EACH = f"all: those that are installed; may be repeated (default {DEFAULT})"
+ONE_BACKEND = f"{_RUNS}; pybullet:engine: as its own users meet it (default {DEFAULT})"
+EACH_BACKEND = f"{_RUNS}; pybullet:engine: as its own users meet it; {_EACH}"
+CONTRACT_BACKENDS = f"{_RUNS}; {_EACH}"  # each with the contract of this library
+SIDES = ("left", "right")
+
+
+def add_backend(parser: argparse._ActionsContainer, says: str) -> None:
+    """Add --backend, which may be repeated; the command says how often."""
+    parser.add_argument("--backend", action="append", metavar="NAME", help=says)
+
+
+def add_json(
+    parser: argparse._ActionsContainer, what: str = "result", default: object = False
+) -> None:
+    """Add --json, which prints the result as JSON.
+
+    Args:
+        parser: The parser that gets the option.
+        what: What the help calls the result.
+        default: `argparse.SUPPRESS` where a parser above this one has the option, too.
+    """
+    says = f"print the {what} as JSON"
+    parser.add_argument("--json", action="store_true", default=default, help=says)
+
+
+def add_seed(parser: argparse._ActionsContainer, what: str) -> None:
+    """Add --seed, of what is drawn at random."""
+    says = f"random seed of {what} (0)"
+    parser.add_argument("--seed", type=typed_int, default=0, metavar="N", help=says)
+
+
+def add_seconds(parser: argparse._ActionsContainer) -> None:
+    """Add --seconds, the simulated time."""
+    parser.add_argument("--seconds", type=typed_float, metavar="S", help="simulated time")
+
+
+def add_jobs(parser: argparse._ActionsContainer) -> None:
+    """Add --jobs, the number of processes."""
+    says = "parallel processes (default: one a processor)"
+    parser.add_argument("--jobs", type=typed_int, metavar="N", help=says)
+
+
+def add_model(
+    parser: argparse._ActionsContainer, says: str = "the model", default: str | None = None
+) -> None:
+    """Add the model, as a word that may be left out."""
+    if default is not None:
+        says += f" (default {default})"
+    parser.add_argument("model", nargs="?", default=default, metavar="NAME|FILE", help=says)
+
+
+def add_trust(parser: argparse._ActionsContainer) -> None:
+    """Add --trust-binary, which `cli.main` obeys."""
+    says = "read a binary model (.mjb); a damaged one can do harm"
+    parser.add_argument("--trust-binary", action="store_true", help=says)
+
+
+def add_menagerie(parser: argparse._ActionsContainer) -> None:
+    """Add --menagerie, the folder in which models are looked up, and --trust-binary."""
+    add_trust(parser)
+    folder = os.environ.get("MENAGERIE") or None
+    says = "look the model up in this folder of public models (default $MENAGERIE)"
+    parser.add_argument("--menagerie", default=folder, metavar="DIR", help=says)
 
 
 def chosen_backends(words: Sequence[str] | None) -> list[BackendChoice]:

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
-from ._common import MISSING, add_table, json_of, show
+from ._common import MISSING, add_json, show
+
+if TYPE_CHECKING:
+    from ..report.doctor_request import DoctorRequest
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    """Its options."""
-    add_table(parser, json_of("findings"))
+    """Add its options."""
+    add_json(parser, "findings")
+
+
+def request_of(_options: argparse.Namespace) -> DoctorRequest:
+    """Return what was asked for."""
+    from ..report.doctor_request import DoctorRequest
+
+    return DoctorRequest()
 
 
 def run(options: argparse.Namespace) -> int:
     """Examine, and show."""
     from ..report import doctor
+    from ..report.doctor_request import answer
 
-    diagnosis = doctor.examine()
-    return MISSING if show(doctor.page(diagnosis), diagnosis, options.json) else 0
+    diagnosis = answer(request_of(options))
+    code = show(doctor.page(diagnosis), diagnosis, options.json)
+    return 0 if code == 0 else MISSING

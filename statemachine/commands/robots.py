@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
-from ._common import SAYS_NO, TRUST, add_table, file_name, json_of, resumable, seed_of, show
+from ..typed_numbers import typed_float, typed_int
+from ._common import (
+    SAYS_NO,
+    TerminalReporter,
+    add_json,
+    add_seed,
+    add_trust,
+    file_name,
+    resumable,
+    show,
+)
+
+if TYPE_CHECKING:
+    from ..robots.request import RobotsRequest
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    """Its options."""
+    """Add its options."""
     parser.description = (
         "Examine every MJCF and URDF in a folder and below it, each in a process of its own: does "
         "it load, is it the bits of the engine without us, how far apart are two engines under "
@@ -22,45 +36,56 @@ def add(parser: argparse.ArgumentParser) -> None:
         "without contacts that neither a warning nor the timestep accounts for, an explosion, a "
         "witness that places a frame elsewhere. A refusal is a fact, and no fault."
     )
-    add_table(
-        parser,
-        ("paths", "DIR|FILE", "folders of models, or models", {"nargs": "+"}),
-        (
-            "--out",
-            "TABLE",
-            "write the table there after each model, .csv or .json; typed again, it examines "
-            "only models that are new or changed",
-            {"type": file_name},
-        ),
-        ("--quick", "", "leave out the experiments and the costs"),
-        ("--seconds", "S", "that a model may take (60)", {"default": 60.0}),
-        ("--jobs", "N", "how many models at once (default: one for each processor)"),
-        seed_of("what is drawn"),
-        TRUST,
-        json_of("table"),
+    parser.add_argument("paths", nargs="+", metavar="DIR|FILE", help="folders of models, or models")
+    parser.add_argument(
+        "--out",
+        type=file_name,
+        metavar="TABLE",
+        help="write the table there after each model, .csv or .json; typed again, it examines "
+        "only models that are new or changed",
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="leave out the experiments and the costs"
+    )
+    parser.add_argument(
+        "--seconds", type=typed_float, default=60.0, metavar="S", help="that a model may take (60)"
+    )
+    parser.add_argument(
+        "--jobs",
+        type=typed_int,
+        metavar="N",
+        help="how many models at once (default: one for each processor)",
+    )
+    add_seed(parser, "what is drawn")
+    add_trust(parser)
+    add_json(parser, "table")
+
+
+def request_of(options: argparse.Namespace) -> RobotsRequest:
+    """Return what was asked for.
+
+    Raises:
+        BadInputError: A number is out of range, or the table cannot be written.
+    """
+    from ..robots.request import RobotsRequest
+
+    return RobotsRequest(
+        paths=tuple(options.paths),
+        table=options.out,
+        quick=options.quick,
+        seconds=options.seconds,
+        jobs=options.jobs,
+        seed=options.seed,
     )
 
 
 def run(options: argparse.Namespace) -> int:
     """Examine, and show."""
-    from ..report import robots as words
-    from ..report.terminal import progress
-    from ..robots import examine_all, find
-    from ..robots.records import SUFFIXES
-    from ..runs.whole import check_place
+    from ..report.robots import page
+    from ..robots.request import answer
 
-    if options.out is not None:
-        check_place(options.out, SUFFIXES, "a table")
-    models = find(options.paths)
-    with resumable(options.out, "examined"), progress(f"{len(models)} models") as bar:
-        survey = examine_all(
-            models,
-            quick=options.quick,
-            seconds=options.seconds,
-            jobs=options.jobs,
-            seed=options.seed,
-            table=options.out,
-            progress=bar,
-        )
-    show(words.page(survey), survey, options.json)
+    request = request_of(options)
+    with resumable(request.table, "examined"):
+        survey = answer(request, TerminalReporter())
+    show(page(survey), survey, options.json)
     return SAYS_NO if survey.wrong else 0

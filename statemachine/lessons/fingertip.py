@@ -41,6 +41,23 @@ def _offset(distance: float, angle: float) -> Figures:
     )
 
 
+def checked_poses(poses: int, seed: int) -> int:
+    """Return the number of poses, once it and the seed of those that are drawn are checked.
+
+    Raises:
+        BadInputError: One of them is not a whole number in range.
+    """
+    wanted = as_count(poses, "poses")
+    if not 2 <= wanted <= _MOST:
+        raise BadInputError(
+            f"poses must be from 2, as one cannot tell a frame from a joint, to {_MOST:,}; "
+            f"got {wanted:,}"
+        )
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+    return wanted
+
+
 def certify(
     model: Model,
     poses: int = 200,
@@ -84,15 +101,7 @@ def certify(
         BadInputError: `poses` or `seed` is not a whole number in range, `witness` has joints
             that the model has not, or nothing moves.
     """
-    wanted = as_count(poses, "poses")
-    refuse(
-        (
-            not 2 <= wanted <= _MOST,
-            f"poses must be from 2, as one cannot tell a frame from a joint, to {_MOST:,}; "
-            f"got {wanted:,}",
-        ),
-        (seed < 0, f"seed must not be negative; got {seed}"),
-    )
+    wanted = checked_poses(poses, seed)
     tips = tips_of(model, site)
     refuse(
         (

@@ -162,6 +162,18 @@ SECONDS = 60.0  # for a model
 _MEMORY = 8 * sandbox.GB  # address space, of which engines reserve far more than they use
 
 
+def check_settings(seconds: float, seed: int) -> None:
+    """Check what an examination is given.
+
+    Raises:
+        BadInputError: The time of a model, or the seed, is out of range.
+    """
+    if not 0 < seconds <= 86400:
+        raise BadInputError(f"seconds must be above 0, and at most 86400; got {seconds:g}")
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+
+
 def examine_all(
     models: Sequence[ModelFile],
     *,
@@ -190,10 +202,7 @@ def examine_all(
         MissingEngineError: The default engine is not installed here.
     """
     jobs = checked_jobs(jobs)
-    if not 0 < seconds <= 86400:
-        raise BadInputError(f"seconds must be above 0, and at most 86400; got {seconds:g}")
-    if seed < 0:
-        raise BadInputError(f"seed must not be negative; got {seed}")
+    check_settings(seconds, seed)
     require(DEFAULT)
     made_with = _made_with(quick, seed)
     before = read_table(table) if table is not None and table.exists() else {}
