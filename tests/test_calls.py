@@ -31,7 +31,7 @@ from statemachine.probes.calls import (
     record,
     recorded_engines,
 )
-from statemachine.report import conventions as words
+from statemachine.report import calls as words
 from statemachine.report.as_json import dumps
 
 from .conftest import (

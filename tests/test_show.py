@@ -169,6 +169,7 @@ FAULTS = {
     "{% if size > 2 %}a{% endif %}": "a condition compares a field with a constant text alone",
     "{% if holds and name %}a{% endif %}": "a condition tests one field or named property",
     "{% if state == 'insde' %}a{% endif %}": "no value 'insde'",
+    "{{ none }}": "a page shows no None",
     "{{ size + 1 }}": "Add has no place in a template",
     "{% if holds %}{% if name %}{% if size %}a{% endif %}{% endif %}{% endif %}": "a condition "
     "stands in a condition that stands in a condition",

@@ -235,11 +235,11 @@ def _compute(
         page = with_picture(page, lesson.name)
     if not options.calls:
         return page, {name: run.result for name, run in taken.items()}
-    from ..report import conventions
+    from ..report import calls
 
     recordings = {name: t.calls for name, t in taken.items() if t.calls and t.calls.statements}
-    recorded = conventions.recorded_calls(recordings) if recordings else ()
-    silent = [conventions.not_asked(name) for name, run in taken.items() if run.calls is None]
+    recorded = calls.recorded_calls(recordings) if recordings else ()
+    silent = [calls.not_asked(name) for name, run in taken.items() if run.calls is None]
     page = replace(page, blocks=[*page.blocks, *recorded, *silent])
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 

@@ -1,92 +1,170 @@
-"""What each engine takes for granted, and which call does what: pages, and one to print.
-
-And recorded calls as blocks: each line of a code, and under it what the engine was made to do.
-"""
+"""What each engine takes for granted, and which call does what: pages, and one to print."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
-from itertools import chain, groupby, zip_longest
+from typing import Literal
 
-from ..engines import room
-from ..engines.call_watch import CallWords
 from ..engines.measured import Measurement
-from ..interface import DERIVED
-from ..measures.text import NONE, capital, few, grouped, reading, significant
-from ..page import Block, Code, Page, Section, Table, Text, Verdict
-from ..probes.calls import Call, RecordedStatement, Recording
+from ..measures.text import reading, significant
+from ..page import Page, Table
 from ..probes.conventions import CONCEPTS, Convention, Conventions, Phrasebook
-from . import template
-from .template import if_true, versions_of
+from ..show.templates import PageContent, render
+from .template import versions_of
 
 _ZERO = 1e-12
-_NOT_ASKED = "not asked"
+
+
+@dataclass(frozen=True)
+class _Convention:
+    """The answers to a question by engine, and why it matters (Markdown)."""
+
+    answers: Table
+    why: str
+
+
+@dataclass(frozen=True)
+class ConventionsPage(PageContent):
+    """Content of the page of conventions.
+
+    Attributes:
+        result: What the engines take for granted.
+        conventions: One for each question.
+    """
+
+    template = "conventions.md.j2"
+    result: Conventions
+    conventions: Sequence[_Convention]
+
+
+@dataclass(frozen=True)
+class _EnginePhrase:
+    """What to type on an engine for a concept.
+
+    Attributes:
+        engine: Its name.
+        concept: Its name.
+        state: Whether what it should do happened.
+        code: What is typed; "" where it was not asked.
+        message: What happened instead; "" where it works.
+    """
+
+    engine: str
+    concept: str
+    state: Literal["works", "fails", "not asked"]
+    code: str = ""
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class _Concept:
+    """A concept, and what to type for it, engine by engine."""
+
+    name: str
+    phrases: Sequence[_EnginePhrase]
+
+
+@dataclass(frozen=True)
+class CallsPage(PageContent):
+    """Content of the page of calls.
+
+    Attributes:
+        result: What was run on each engine.
+        concepts: In the order in which a newcomer meets them.
+    """
+
+    template = "conventions_calls.md.j2"
+    result: Phrasebook
+    concepts: Sequence[_Concept]
+
+    @property
+    def total(self) -> int:
+        """Number of calls that were run."""
+        return sum(len(phrases) for phrases in self.result.engines.values())
+
+    @property
+    def wrong(self) -> list[_EnginePhrase]:
+        """Calls that did not do what they should."""
+        phrases = [phrase for concept in self.concepts for phrase in concept.phrases]
+        return [phrase for phrase in phrases if phrase.state == "fails"]
+
+    @property
+    def right(self) -> int:
+        """Number of calls that did what they should."""
+        return self.total - len(self.wrong)
+
+    @property
+    def holds(self) -> bool:
+        """Whether all did what they should."""
+        return not self.wrong
 
 
 def page(result: Conventions) -> Page:
-    """One table for each question, and why it matters."""
-    answers = [(_table(answered), Text(answered.question.why)) for answered in result.questions]
-    return template.page(
-        "conventions", engines=versions_of(result.versions), answers=list(chain(*answers))
-    )
+    """Return one table for each question, and why it matters."""
+    conventions = [
+        _Convention(_table(answered), answered.question.why) for answered in result.questions
+    ]
+    return render(ConventionsPage(result, conventions))
 
 
 def calls_page(result: Phrasebook) -> Page:
-    """For each concept what to type on each engine, and whether all of it did what it should."""
-    calls = [(engine, call) for engine, those in result.engines.items() for call in those]
-    wrong = [f"{engine}, {call.concept}: {call.said}" for engine, call in calls if not call.works]
-    return template.page(
-        "conventions_calls",
-        engines=versions_of(result.versions),
-        concepts=[_concept(concept, result) for concept in CONCEPTS],
-        wrong=[Verdict(text, False) for text in wrong],
-        holds=not wrong,
-        right=len(calls) - len(wrong),
-        total=len(calls),
-    )
+    """Return for each concept what to type on each engine, and whether all did what it should."""
+    concepts = [_Concept(concept, _phrases_of(concept, result)) for concept in CONCEPTS]
+    return render(CallsPage(result, concepts))
 
 
-def _concept(concept: str, result: Phrasebook) -> Section:
-    """What to type for a concept, engine by engine."""
-    shown: list[Block] = []
+def _phrases_of(concept: str, result: Phrasebook) -> list[_EnginePhrase]:
+    """Return what to type for a concept, engine by engine."""
+    found: list[_EnginePhrase] = []
     for engine, calls in result.engines.items():
         call = next((call for call in calls if call.concept == concept), None)
-        state = f": {_NOT_ASKED}" if call is None else " ✓" if call.works else " ✗"
-        shown.append(Text(f"{engine}{state}"))
-        shown += [Code(call.code.splitlines())] if call else []
-    return Section("", capital(concept), shown)
+        if call is None:
+            found.append(_EnginePhrase(engine, concept, "not asked"))
+        else:
+            state = "works" if call.works else "fails"
+            found.append(_EnginePhrase(engine, concept, state, call.code, call.said))
+    return found
 
 
 def _table(answered: Convention) -> Table:
-    """Answers by engine, with a column for the parts of the question if it has any."""
-    rows = []
+    """Return answers by engine, with a column for the parts of the question if it has any."""
+    rows: list[tuple[str, str, str, str]] = []
     for engine, findings in answered.findings.items():
-        for k, finding in enumerate(findings or []):
+        if findings is None:
+            rows.append((engine, "", "not asked", ""))
+            continue
+        for number, finding in enumerate(findings):
+            name = "" if number else engine
             measured = ", ".join(_text(figure) for figure in finding.figures)
-            rows.append(("" if k else engine, finding.of, finding.answer, measured))
-        rows += [] if findings is not None else [(engine, "", _NOT_ASKED, "")]
-    shown = [0, 1, 2, 3] if any(row[1] for row in rows) else [0, 2, 3]
+            rows.append((name, finding.of, finding.answer, measured))
     headers = ("engine", "of", "answer", "measured")
+    has_parts = any(row[1] for row in rows)
+    columns = [0, 1, 2, 3] if has_parts else [0, 2, 3]
     return Table(
-        [headers[k] for k in shown],
-        [[row[k] for k in shown] for row in rows],
+        [headers[column] for column in columns],
+        [[row[column] for column in columns] for row in rows],
         f"{answered.name}: {answered.question.title}",
-        frozenset(range(len(shown))),
+        words=frozenset(range(len(columns))),
     )
 
 
 def _text(figure: Measurement) -> str:
+    """Return the name of a measurement and its values, in the unit that is read."""
     values = figure.value if isinstance(figure.value, tuple) else (figure.value,)
-    numbers = [value for value in values if not isinstance(value, str)]
-    most = max(map(abs, numbers), default=0.0)
     factor, unit = reading(figure.unit)
-    # Beside a large number, one that is only rounding is nothing.
-    scaled = [v if isinstance(v, str) else factor * v * (abs(v) > _ZERO * most) for v in values]
-    words = [
-        v if isinstance(v, str) else significant(v, 3 if abs(v) >= 1e-3 else 2) for v in scaled
-    ]
-    shown = (" " if numbers else ", ").join(words) or "nothing"
+    largest = max((abs(value) for value in values if not isinstance(value, str)), default=0.0)
+    words: list[str] = []
+    for value in values:
+        if isinstance(value, str):
+            words.append(value)
+        elif abs(value) <= _ZERO * largest:
+            words.append("0")  # beside a large number, one that is only rounding is nothing
+        else:
+            words.append(significant(factor * value, 3 if abs(factor * value) >= 1e-3 else 2))
+    has_numbers = any(not isinstance(value, str) for value in values)
+    shown = (" " if has_numbers else ", ").join(words) if words else "nothing"
     return f"{figure.name} {shown}{unit}".strip()
 
 
@@ -146,133 +224,3 @@ def cheat_sheet(table: Phrasebook) -> str:
         f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>\n\n"
         f"## What to remember\n\n{lines}\n"
     )
-
-
-_NAMES_SHOWN = 8  # of what a call changed
-_ROWS_SHOWN = 6  # of the calls on one thing, before those that changed nothing share one
-
-
-def recorded_calls(recordings: Mapping[str, Recording]) -> list[Block]:
-    """Blocks for the recordings of one code, by engine; the code's backend may differ."""
-    prefix = {name: f"{name}: " if len(recordings) > 1 else "" for name in recordings}
-    looks = [
-        f"{prefix[name]}{_words(recording.engine).shown}" for name, recording in recordings.items()
-    ]
-    ended = {name: recording.error for name, recording in recordings.items() if recording.error}
-    statements: list[Block] = []
-    for together in zip_longest(*(recording.statements for recording in recordings.values())):
-        pairs = zip(recordings, together, strict=True)
-        ran = {name: statement for name, statement in pairs if statement is not None}
-        sources = dict.fromkeys(statement.source for statement in ran.values())
-        is_import = next(iter(sources)).startswith(("import ", "from "))
-        if not is_import or any(statement.calls or statement.changed for statement in ran.values()):
-            statements.append(Code([line for source in sources for line in source.splitlines()]))
-            statements += _answers(ran)
-    return template.blocks(
-        "calls",
-        engines=" and ".join(
-            f"{name} {recording.version}" for name, recording in recordings.items()
-        ),
-        none=NONE,
-        looks="; ".join(looks),
-        statements=statements,
-        ended=[Text(f"{prefix[name]}The run ended there: {why}") for name, why in ended.items()],
-        legend=[text for recording in recordings.values() for text in _legend(recording)],
-    )
-
-
-def not_asked(backend: str) -> Text:
-    """What is said of a backend whose engine has no room that tells of its calls."""
-    return Text(f"{backend}: not asked which of its own functions it ran.")
-
-
-def _answers(ran: Mapping[str, RecordedStatement]) -> list[Block]:
-    """What a line made each engine do; once, if nothing and the same of all."""
-    silent = {name: _unheard(statement) for name, statement in ran.items() if not statement.calls}
-    if len(silent) == len(ran) and len({*silent.values()}) == 1:
-        return [Text(next(iter(silent.values())))]
-    return [
-        Text(f"{name}: {silent[name]}") if name in silent else _calls_table(name, statement)
-        for name, statement in ran.items()
-    ]
-
-
-def _unheard(statement: RecordedStatement) -> str:
-    """What a line did that ran nothing of the engine."""
-    changed = ", ".join(statement.changed) or None
-    (text,) = template.texts(
-        "calls_unheard",
-        later=" and ".join(statement.due) or None,
-        written=changed if statement.due else None,
-        changed=None if statement.due else changed,
-        nothing=if_true(not statement.due and not changed),
-    )
-    return text
-
-
-def _calls_table(engine: str, statement: RecordedStatement) -> Table:
-    """The calls, those on one thing under its name; then what changed outside of them."""
-    rows: list[tuple[str, str, str]] = []
-    titles: set[int] = set()
-    for (owner, on), calls in groupby(statement.calls, key=lambda call: (call.engine, call.on)):
-        of = "" if owner == engine else f"{owner}: "
-        titles.add(len(rows))
-        rows += [(f"{of}{on or 'no model, no data'}", "", ""), *_rows(list(calls))]
-    changed = grouped((name.rpartition(".")[2] in DERIVED, name) for name in statement.changed)
-    others = {"changed outside these calls": False, "computed because it was read": True}
-    for title, derived in others.items():
-        if derived in changed:
-            titles.add(len(rows))
-            rows.append((title, "", ", ".join(changed[derived])))
-    return Table(
-        (engine, "times", "changed"),
-        rows,
-        words=frozenset({0, 2}),
-        emphasis=frozenset(titles),
-    )
-
-
-def _rows(calls: Sequence[Call]) -> list[tuple[str, str, str]]:
-    """The calls on one thing; where they are many, those without effect in one row."""
-    idle = [call for call in calls if not call.changed]
-    if len(calls) <= _ROWS_SHOWN or len(idle) < 2:
-        idle = []
-    rows = [
-        (f"  {call.function}", f"{call.count:,}", _names(call.changed))
-        for call in calls
-        if call not in idle
-    ]
-    if idle:
-        names = ", ".join(call.function for call in idle)
-        times = sum(call.count for call in idle)
-        rows.append((f"  {len(idle)} others", f"{times:,}", f"{NONE}: {names}"))
-    return rows
-
-
-def _names(changed: Sequence[str]) -> str:
-    shown = _NAMES_SHOWN if len(changed) > _NAMES_SHOWN + 1 else len(changed)
-    return few(changed, shown) or NONE
-
-
-def _words(engine: str) -> CallWords:
-    return room(engine).call_watch().words
-
-
-def _legend(recording: Recording) -> list[Text]:
-    """What the roles are that appear, with what this run says of them."""
-    words = _words(recording.engine)
-    calls = [call for statement in recording.statements for call in statement.calls]
-    legend = [
-        (text, words.step, [call for call in calls if role in call.on])
-        for role, text in words.roles.items()
-    ]
-    legend.append((words.note, "", calls if words.note else []))
-    legend += [
-        (text, _words(engine).step, [call for call in calls if call.engine == engine])
-        for engine, text in words.helpers.items()
-    ]
-    return [
-        Text(text.format(sum(call.count for call in own if call.function.startswith(step))))
-        for text, step, own in legend
-        if own
-    ]

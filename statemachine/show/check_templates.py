@@ -17,10 +17,20 @@ from typing import Any
 from jinja2 import nodes
 
 from ..errors import did_you_mean
-from .templates import FILTERS, PageContent, environment
+from .templates import FILTERS, PageContent, environment, macros
 
 # What a template calls; the fields of its arguments are checked, their number is not.
-_MACROS = ("table", "titled", "block", "blocks", "items", "verdict", "small", "section")
+_MACROS = (
+    "table",
+    "titled",
+    "block",
+    "blocks",
+    "items",
+    "code_block",
+    "verdict",
+    "small",
+    "section",
+)
 _DEEPEST = 2  # conditions inside each other: one, and one in it
 
 
@@ -89,6 +99,8 @@ class _Checker:
         match node:
             case nodes.Output():
                 for part in node.nodes:
+                    if isinstance(part, nodes.Const) and not isinstance(part.value, str):
+                        self._fault(part, f"a page shows no {part.value!r}")
                     self._type_of(part, scope, depth)
             case nodes.If():
                 self._check_condition(node.test, scope, depth)

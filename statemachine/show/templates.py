@@ -10,6 +10,7 @@ whose fields are the names that the template may use:
     {{ gap | millimetres }} at {{ t | seconds }}    figures, each through a filter
     - One of several.                          an item of a list
     {% if diagnosis.healthy %} … {% endif %}   a choice of words
+    {{ code_block(source) }}                   lines as they are typed
     {% call verdict(holds) %}…{% endcall %}    a statement that was checked
     {% call titled(sums) %}…{% endcall %}      a table, and its title
     {% call small() %}…{% endcall %}           notes in small print
@@ -190,6 +191,11 @@ class _Origin(Text):
     """What a page was computed with."""
 
 
+def macros() -> list[str]:
+    """Return the names of what a template calls to place blocks."""
+    return list(_Placed().macros())
+
+
 class _Placed:
     """The blocks that a template places; each leaves a marker in the text."""
 
@@ -204,6 +210,7 @@ class _Placed:
             "block": self.block,
             "blocks": self.blocks,
             "items": self.items,
+            "code_block": self.code_block,
             "verdict": self.verdict,
             "small": self.small,
             "section": self.section,
@@ -229,6 +236,10 @@ class _Placed:
     def items(self, texts: Sequence[str], ordered: bool = False) -> Markdown:
         """Place a list; without items there is nothing to show."""
         return self._mark([Items(texts, ordered)] if texts else [])
+
+    def code_block(self, source: str) -> Markdown:
+        """Place lines as they are typed; of none there is nothing to show."""
+        return self._mark([Code(source.splitlines())] if source else [])
 
     def verdict(self, holds: bool, caller: Callable[[], str]) -> Markdown:
         """Place a statement that was checked, and whether it held."""
