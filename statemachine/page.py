@@ -12,9 +12,12 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     Numbers = Sequence[float] | NDArray[Any]
+    Poses = NDArray[np.float64]
+
 
 R = TypeVar("R")  # a record that is a row of a table
 
@@ -218,7 +221,7 @@ class RobotPicture:
     words: str
     view: str
     model: str
-    poses: Callable[[], tuple[Any, Any]]
+    poses: Callable[[], tuple[Poses, Poses | None]]
     interval: float = 0.08
     near: str = ""
 
@@ -226,6 +229,10 @@ class RobotPicture:
 def _one_line(cell: str) -> str:
     """A cell; the name of a file or a joint may have line breaks."""
     return "?".join(cell.splitlines()) if len(f"{cell}.".splitlines()) > 1 else cell
+
+
+def _one_lined(row: Sequence[str]) -> list[str]:
+    return [_one_line(cell) for cell in row]
 
 
 @dataclass(frozen=True)
@@ -249,7 +256,7 @@ class Table:
     wide: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
-        rows = [[_one_line(cell) for cell in row] for row in self.rows]
+        rows = [_one_lined(row) for row in self.rows]
         object.__setattr__(self, "rows", rows)
 
     @classmethod
@@ -272,27 +279,37 @@ class Table:
             wide: Headers of the wide columns.
             emphasis: Whether a record's row is set off.
         """
-        shown = list(records)
-        rows = [[cell(record) for cell in columns.values()] for record in shown]
+        word_columns = {0}
+        wide_columns: set[int] = set()
+        for k, header in enumerate(columns):
+            if header in words:
+                word_columns.add(k)
+            if header in wide:
+                wide_columns.add(k)
+        rows: list[list[str]] = []
+        set_off: set[int] = set()
+        for k, record in enumerate(records):
+            rows.append([cell(record) for cell in columns.values()])
+            if emphasis(record):
+                set_off.add(k)
         return cls(
             list(columns),
             rows,
             title,
-            frozenset(k for k, header in enumerate(columns) if not k or header in words),
-            frozenset(k for k, record in enumerate(shown) if emphasis(record)),
-            frozenset(k for k, header in enumerate(columns) if header in wide),
+            frozenset(word_columns),
+            frozenset(set_off),
+            frozenset(wide_columns),
         )
 
     def narrow(self) -> Table:
-        """The table without its wide columns."""
+        """Return the table without its wide columns."""
         columns = [k for k in range(len(self.headers)) if k not in self.wide]
-        return replace(
-            self,
-            headers=[self.headers[k] for k in columns],
-            rows=[[row[k] for k in columns] for row in self.rows],
-            words=frozenset(columns.index(k) for k in self.words if k in columns),
-            wide=frozenset(),
-        )
+        headers = [self.headers[k] for k in columns]
+        rows: list[list[str]] = []
+        for row in self.rows:
+            rows.append([row[k] for k in columns])
+        words = frozenset(columns.index(k) for k in self.words if k in columns)
+        return replace(self, headers=headers, rows=rows, words=words, wide=frozenset())
 
 
 @dataclass(frozen=True)

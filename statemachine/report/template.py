@@ -46,11 +46,11 @@ def texts(name: str, /, **slots: Any) -> list[str]:
     """
     is_block = {key: isinstance(value, list) or is_dataclass(value) for key, value in slots.items()}
     alone = {key: f"{{{key}}}" for key in slots if is_block[key]}
-    lines = [
-        line
-        for line in text_of(__package__ or "", name).splitlines()
-        if all(slots[slot] is not None for _, slot, *_ in Formatter().parse(line) if slot)
-    ]
+    lines: list[str] = []
+    for line in text_of(__package__ or "", name).splitlines():
+        named = [slot for _, slot, *_ in Formatter().parse(line) if slot]
+        if all(slots[slot] is not None for slot in named):
+            lines.append(line)
     return list(filled("\n".join(lines), slots | alone).values())
 
 

@@ -263,9 +263,11 @@ def _grid(block: Table, plain: bool, width: int) -> RenderableType:
         pad_edge=False,
         show_edge=False,
     )
-    rows = [[_shown(_loud(c), plain) for c in row] for row in (block.headers, *block.rows)]
+    rows: list[list[str]] = []
+    for row in (block.headers, *block.rows):
+        rows.append([_shown(_loud(cell), plain) for cell in row])
     widths = _widths(rows, block.words, width)
-    headers, *rows = ([*map(_broken, row, widths)] for row in rows)
+    headers, *rows = [list(map(_broken, row, widths)) for row in rows]
     for k, cells in enumerate(widths):
         grid.add_column(
             headers[k],

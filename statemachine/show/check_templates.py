@@ -17,7 +17,7 @@ from typing import Any
 from jinja2 import nodes
 
 from ..errors import did_you_mean
-from .templates import FILTERS, PageContent, environment, macros
+from .templates import FILTERS, PageContent, environment
 
 # What a template calls; the fields of its arguments are checked, their number is not.
 _MACROS = (
