@@ -587,6 +587,7 @@ def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs:
         out = tmp_path / name
         summary = run_sweep(sweep, out, jobs=jobs)
         assert (summary.done, dict(summary.failed), summary.missing) == (6, {kind: 2}, 0)
+        assert (summary.failed_cells, summary.cells_before) == (2, 0)
         rows = read_cells(out).to_pylist()
         assert [r["vary.gain"] for r in rows if r["status"] == "failed"] == [2.0, 2.0]
 

@@ -426,5 +426,10 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
         errors = numbers({each.parameter: each.error for each in answer.effects})
         assert 0 <= min(shares.values()) <= max(shares.values()) <= 1
         assert min(errors.values()) > 0
+    assert_has(of_gap, is_of_a_gap=True, is_sampled=True, has_shares=True, has_no_errors=False)
+    assert not of_one.is_of_a_gap
+    assert of_gap.where_largest == dict(
+        zip(("damping", "kp"), of_gap.largest.settings, strict=True)
+    )
     assert 0 < of_gap.largest.value < 0.1
     assert of_one.effects[0].parameter == "damping"

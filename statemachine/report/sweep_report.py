@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..measures.text import NONE, count, fixed, listed, quantity
-from ..page import Figures, Page, Table
-from ..sweep import PreparedSweep
+from ..page import Page, Table
+from ..sweep import PreparedSweep, SweepSummary
 from ..sweep.analysis import SweepEffects
 from . import template
 from .template import if_true, versions_of
@@ -72,8 +72,8 @@ def _value(sweep: SweepEffects, parameter: str, value: object) -> str:
     return f"{value:.4g} {sweep.units.get(parameter, '')}".strip()
 
 
-def summary_page(ready: PreparedSweep, summary: Figures) -> Page:
-    """The summary, and how the dataset is read."""
+def summary_page(ready: PreparedSweep, summary: SweepSummary) -> Page:
+    """Return the page of the summary, and of how the dataset is read."""
     asked, failed = ready.sweep, sum(summary.failed.values())
     before = summary.cells - summary.ran
     rows = [(kind, str(n)) for kind, n in {"done": summary.done, **summary.failed}.items()]

@@ -21,30 +21,33 @@ from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack, closing, contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
 from ..backends import parse_backend
-from ..errors import BadInputError, WorkerEndedError, refuse
+from ..errors import BadInputError, WorkerEndedError
 from ..installed import require_extra
-from ..page import Figures
 from ..processes import checked_jobs
 from ..processes.parallel import unwinding, worker_processes
 from ..runs.drive import Progress, silent
-from .design import Design, Vary
+from .design import Design, DesignPoint, Vary
 from .folder import check_folder, design_of, locked, read_manifest, settle_manifest
 from .prepare import prepared
 from .request import PreparedSweep, Sweep, SweepCell
-from .rows import CELLS, COLUMNS, DONE, RowWriter, counted, read_cells, remove_failed
+from .rows import CELLS, COLUMNS, DONE, RowWriter, counted, outcome_of, read_cells, remove_failed
+from .summary import SweepSummary
 from .worker import Row, differing, row_of, run_batch
 
 __all__ = [
     "COLUMNS",
     "Design",
+    "DesignPoint",
     "PreparedSweep",
     "Sweep",
+    "SweepSummary",
     "Vary",
     "design_of",
     "prepared",
@@ -75,7 +78,7 @@ def run_sweep(
     extend: bool = False,
     retry_failed: bool = False,
     progress: Progress = silent,
-) -> Figures:
+) -> SweepSummary:
     """Run what is missing of a sweep.
 
     Args:
@@ -86,17 +89,6 @@ def run_sweep(
         extend: Whether the design may be larger than that of the folder.
         retry_failed: Whether cells that failed are run again; their rows are replaced.
         progress: Told the fraction of what is missing that is done.
-
-    Returns:
-        folder: Where it is.
-        cells: How many it has; points: of the design.
-        done: How many have a result.
-        failed: How many have none, by the class of the error.
-        ran: How many were run this time.
-        seconds: What this time took.
-        said: What a reader should know.
-        read: Python that opens the dataset.
-        missing: How many have not run.
 
     Raises:
         BadInputError: The folder is of another sweep, or in use; see `prepared` for the rest.
@@ -112,14 +104,7 @@ def run_sweep(
         client = stack.enter_context(_connected(scheduler, ready)) if scheduler else None
         known = dict(counted(folder))
         if extend and known:
-            shared = sum(cell.id in known for name in ready.backends for cell in ready.cells(name))
-            refuse(
-                (
-                    shared < len(known),
-                    f"{folder} has {len(known) - shared} cells that are not of this design: a "
-                    "sweep grows by values, seeds and backends that are added",
-                )
-            )
+            _check_grows(folder, ready, known)
         settle_manifest(folder, ready.manifest(), extend)
         if retry_failed:
             remove_failed(folder)
@@ -130,51 +115,93 @@ def run_sweep(
         workers = max(1, sum(client.nthreads().values())) if client else jobs
         batches = _batches(ready, known, workers)
         with unwinding(at_once=False) as raise_if_ended:
-            run = (
-                _run_on_dask(ready, batches, workers, client, raise_if_ended)
-                if client
-                else _run_apart(ready, batches, workers, raise_if_ended)
-            )
+            if client:
+                run = _run_on_dask(ready, batches, workers, client, raise_if_ended)
+            else:
+                run = _run_apart(ready, batches, workers, raise_if_ended)
             try:
                 with closing(run) as results:
                     for rows in results:
                         writer.add(rows)
-                        kinds.update(row.get("error_class") or row["status"] for row in rows)
+                        kinds.update(outcome_of(row) for row in rows)
                         ran += len(rows)
                         progress(ran / max(1, missing))
             finally:
                 writer.flush()
+    return _summary(ready, folder, kinds, ran, time.monotonic() - began)
+
+
+def _check_grows(folder: Path, ready: PreparedSweep, known: Mapping[str, str]) -> None:
+    """Check that all that a folder has is of a design.
+
+    Args:
+        folder: Of the dataset.
+        ready: The sweep.
+        known: What became of each cell that is there, by its id.
+
+    Raises:
+        BadInputError: It has cells that are not of this design.
+    """
+    shared = 0
+    for backend in ready.backends:
+        shared += sum(cell.id in known for cell in ready.cells(backend))
+    if shared < len(known):
+        raise BadInputError(
+            f"{folder} has {len(known) - shared} cells that are not of this design: a "
+            "sweep grows by values, seeds and backends that are added"
+        )
+
+
+def _summary(
+    ready: PreparedSweep, folder: Path, kinds: Counter[str], ran: int, seconds: float
+) -> SweepSummary:
+    """Return the summary of a folder.
+
+    Args:
+        ready: The sweep.
+        folder: Of its dataset.
+        kinds: How many cells are done, and how many failed by the class of the error.
+        ran: How many cells were run this time.
+        seconds: What this time took [s].
+    """
     place = (folder / CELLS).as_posix()
-    done = kinds.pop(DONE, 0)
-    return Figures(
+    failed = Counter(kinds)
+    done = failed.pop(DONE, 0)
+    return SweepSummary(
         folder=os.fspath(folder),
         cells=len(ready),
         points=ready.design.size,
         done=done,
-        failed=dict(kinds.most_common()),
+        failed=dict(failed.most_common()),
         ran=ran,
-        seconds=time.monotonic() - began,
+        seconds=seconds,
         said=ready.said,
         read=f'pyarrow.dataset.dataset("{place}", partitioning="hive").to_table()',
-        missing=len(ready) - done - sum(kinds.values()),
+        missing=len(ready) - kinds.total(),
+        what=ready.sweep.what.rpartition("/")[2],
+        vary=tuple(ready.sweep.vary),
+        seeds=ready.sweep.seeds,
+        backends=ready.backends,
+        versions=ready.versions,
     )
 
 
 def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Iterator[Batch]:
-    """What is missing, in tasks of about a second, from all backends in turn."""
+    """Yield what is missing, in tasks of about a second, from all backends in turn."""
+    missing = len(ready) - len(known)
+    most = max(1, math.ceil(missing / (_TASKS * jobs * len(ready.backends))))
 
     def of(backend: str) -> Iterator[Batch]:
-        most = math.ceil((len(ready) - len(known)) / (_TASKS * jobs * len(ready.backends)))
-        size = min(
-            _MOST,
-            max(1, int(_BATCH / max(1e-6, ready.cost.get(parse_backend(backend).name, _BATCH)))),
-        )
+        cost = ready.cost.get(parse_backend(backend).name, _BATCH)  # of a cell [s]
+        size = min(_MOST, max(1, int(_BATCH / max(1e-6, cost))), most)
         cells = (cell for cell in ready.cells(backend) if cell.id not in known)
-        while batch := list(itertools.islice(cells, max(1, min(size, most)))):
+        while batch := list(itertools.islice(cells, size)):
             yield batch
 
-    turns = itertools.zip_longest(*(of(name) for name in ready.backends))
-    return (batch for turn in turns for batch in turn if batch is not None)
+    for turn in itertools.zip_longest(*(of(name) for name in ready.backends)):
+        for batch in turn:
+            if batch is not None:
+                yield batch
 
 
 def _run_apart(
@@ -183,7 +210,7 @@ def _run_apart(
     jobs: int,
     look: Callable[[], None],
 ) -> Results:
-    """The rows of each batch, as they are ready, from processes of this machine.
+    """Yield the rows of each batch, as they are ready, from processes of this machine.
 
     `look` is called between any two waits, and may raise.
     """
@@ -199,7 +226,7 @@ def _run_on_dask(
     client: Any,
     look: Callable[[], None],
 ) -> Results:
-    """The same from the workers of Dask; what they do not survive is run here.
+    """Yield the same from the workers of Dask; what they do not survive is run here.
 
     Raises:
         BadInputError: The scheduler went away.
@@ -216,6 +243,23 @@ def _run_on_dask(
         yield from _results(ready, batches, 2 * workers * [submit], [submit_here], look)
 
 
+@dataclass(frozen=True)
+class _Submitted:
+    """A batch that a worker has.
+
+    Attributes:
+        batch: Its cells.
+        is_again: Whether it is run again, alone, after its process ended.
+        idle: Where the worker is put back when it is done.
+        submit: Submits a batch to the worker.
+    """
+
+    batch: Batch
+    is_again: bool
+    idle: list[Submit]
+    submit: Submit
+
+
 def _results(
     ready: PreparedSweep,
     batches: Iterable[Batch],
@@ -223,7 +267,7 @@ def _results(
     here: list[Submit],
     look: Callable[[], None],
 ) -> Results:
-    """The rows of each batch, as they are ready.
+    """Yield the rows of each batch, as they are ready.
 
     The cells of a batch that was lost with a process are run again one by one, each by a worker
     of `here`; one that ends that process, too, fails.
@@ -235,12 +279,12 @@ def _results(
         here: The same for cells that are run again; it may be the same list.
         look: Called between any two waits.
     """
-    coming, again, ended = iter(batches), deque[SweepCell](), list[Any]()
-    waiting: dict[Future[list[Row]], Any] = {}
+    coming, again, ended = iter(batches), deque[SweepCell](), list[list[Row]]()
+    waiting: dict[Future[list[Row]], _Submitted] = {}
 
     def begin(batch: Batch, is_again: bool, idle: list[Submit]) -> None:
         submit = idle.pop()
-        waiting[submit(ready, batch)] = batch, is_again, idle, submit
+        waiting[submit(ready, batch)] = _Submitted(batch, is_again, idle, submit)
 
     while True:
         while again and here:
@@ -254,20 +298,21 @@ def _results(
         look()
         ended.clear()
         for future in done:
-            batch, is_again, idle, submit = waiting.pop(future)
-            idle.append(submit)
+            submitted = waiting.pop(future)
+            submitted.idle.append(submitted.submit)
             try:
-                rows = future.result()
+                ended.append(future.result())
             except Exception:  # its process ended
-                again += () if is_again else batch
+                if not submitted.is_again:
+                    again += submitted.batch
+                    continue
                 error = WorkerEndedError("its process ended before it was done, twice")
-                rows = [row_of(ready, cell, error) for cell in batch if is_again]
-            ended.append(rows)
+                ended.append([row_of(ready, cell, error) for cell in submitted.batch])
 
 
 @contextmanager
 def _connected(address: str, ready: PreparedSweep) -> Iterator[Any]:
-    """A client of a Dask scheduler whose workers have what the sweep needs.
+    """Connect a client to a Dask scheduler whose workers have what the sweep needs.
 
     Raises:
         MissingEngineError: The package distributed is not installed; the message names the extra.
@@ -286,15 +331,13 @@ def _connected(address: str, ready: PreparedSweep) -> Iterator[Any]:
         with suppress(TimeoutError):
             client.wait_for_workers(1, timeout=_PATIENCE)
         answers = client.run(differing, ready, __version__, on_error="return")
-        refuse((not answers, f"the scheduler at {address} has no workers"))
+        if not answers:
+            raise BadInputError(f"the scheduler at {address} has no workers")
         for worker, wrong in answers.items():
-            refuse(
-                (
-                    isinstance(wrong, BaseException),
-                    f"the worker {worker} cannot run a sweep: {wrong}",
-                ),
-                (wrong, f"the worker {worker} has not the same {wrong} as this machine"),
-            )
+            if isinstance(wrong, BaseException):
+                raise BadInputError(f"the worker {worker} cannot run a sweep: {wrong}")
+            if wrong:
+                raise BadInputError(f"the worker {worker} has not the same {wrong} as this machine")
         yield client
     finally:
         with suppress(Exception):

@@ -27,7 +27,7 @@ from .rows import read_cells
 
 @dataclass(frozen=True)
 class MainEffect:
-    """How much one parameter moves a quantity, whatever the others are.
+    """The effect of one parameter on a quantity, whatever the others are.
 
     Attributes:
         parameter: Its label, as "damping" or "qpos[elbow_flex]".
@@ -58,7 +58,7 @@ class LargestCell:
 
 @dataclass(frozen=True)
 class SweepEffects:
-    """What moves one quantity of a sweep, on one engine or of the gap between two.
+    """The effects of all parameters on a quantity of one engine, or on the gap between two.
 
     Attributes:
         what: The experiment.
@@ -106,6 +106,31 @@ class SweepEffects:
     left_out_values: Mapping[str, tuple[Value, ...]]
     failed: Mapping[str, int]
     missing: int
+
+    @property
+    def is_of_a_gap(self) -> bool:
+        """Whether the quantity is the gap between two engines."""
+        return len(self.backends) > 1
+
+    @property
+    def has_shares(self) -> bool:
+        """Whether parameters have shares of the variance."""
+        return not self.why_none
+
+    @property
+    def has_no_errors(self) -> bool:
+        """Whether there are shares, and no share has a standard error."""
+        return self.has_shares and all(effect.error is None for effect in self.effects)
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether a range is varied, whose samples are divided into classes."""
+        return self.samples > 0
+
+    @property
+    def where_largest(self) -> Mapping[str, Value]:
+        """The value of each parameter in the cell with the largest value."""
+        return dict(zip(self.parameters, self.largest.settings, strict=True))
 
 
 def effects(

@@ -13,14 +13,13 @@ import re
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import BadInputError, refuse, shown, unknown_name
+from ..errors import BadInputError, shown, unknown_name
 from ..installed import require_extra
 from ..interface import Array, JointType
-from ..page import Figures
 from ..typed_numbers import typed_float
 
 Kind = Literal["model", "option", "state", "parameter"]
@@ -92,7 +91,7 @@ class Vary:
         return f"vary.{self.label}"
 
     def unit_on(self, joints: Collection[int] = (JointType.HINGE, JointType.SLIDE)) -> str:
-        """What it is in on joints of some `JointType`s; "" of what is not a number or has none."""
+        """Return its unit on joints of some `JointType`s; "" of what is no number or has none."""
         if self.times or self.kind == "parameter" or self.name not in UNITS:
             return ""
         hinge, slide = UNITS[self.name]
@@ -124,12 +123,12 @@ class Vary:
 
 
 def is_number(value: object) -> bool:
-    """Whether it is a number, and no switch."""
+    """Tell whether a value is a number, and no switch."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
-    """What words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi say; `with_kinds` says what they vary.
+    """Read words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi; `with_kinds` tells what they vary.
 
     Args:
         words: As typed behind `--vary`.
@@ -140,18 +139,17 @@ def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
     factors = tuple(map(_parsed, words))
     labels = [vary.label for vary in factors]
     for vary in factors:
-        both = f"{vary.name} and {vary.label} are both varied: name one of them"
-        refuse(
-            (labels.count(vary.label) > 1, f"{vary.label} is varied twice"),
-            (vary.place and vary.name in labels, both),
-        )
+        if labels.count(vary.label) > 1:
+            raise BadInputError(f"{vary.label} is varied twice")
+        if vary.place and vary.name in labels:
+            raise BadInputError(f"{vary.name} and {vary.label} are both varied: name one of them")
     return factors
 
 
 def with_kinds(
     factors: Iterable[Vary], options: Collection[str], parameters: Collection[str] = ()
 ) -> tuple[Vary, ...]:
-    """The same factors, each with its kind.
+    """Return the same factors, each with its kind.
 
     Args:
         factors: As parsed.
@@ -197,19 +195,20 @@ def _parsed(word: str) -> Vary:
 def _values(
     label: str, words: Sequence[str], names: bool = False
 ) -> tuple[tuple[Value, ...], bool]:
-    """The values of words, and whether they are times the model's own."""
+    """Return the values of words, and whether they are times the model's own."""
     words = [word.strip() for word in words]
-    refuse(("" in words, f"--vary {label} has an empty value"))
+    if "" in words:
+        raise BadInputError(f"--vary {label} has an empty value")
     pairs = [(word, False) if names else _value(word) for word in words]
     values = tuple(value for value, _ in pairs)
-    mixed = (
-        f"{label} mixes values of different kinds: {', '.join(words)}; numbers, numbers with an x "
-        "behind (times the model's own), on and off, or names"
-    )
-    refuse(
-        (len({(type(value), times) for value, times in pairs}) > 1, mixed),
-        (len(set(values)) < len(values), f"{label} has a value twice: {', '.join(words)}"),
-    )
+    kinds = {(type(value), times) for value, times in pairs}
+    if len(kinds) > 1:
+        raise BadInputError(
+            f"{label} mixes values of different kinds: {', '.join(words)}; numbers, numbers with "
+            "an x behind (times the model's own), on and off, or names"
+        )
+    if len(set(values)) < len(values):
+        raise BadInputError(f"{label} has a value twice: {', '.join(words)}")
     return values, pairs[0][1]
 
 
@@ -221,46 +220,68 @@ def _value(word: str) -> tuple[Value, bool]:
         number = typed_float(word[:-1] if times else word)
     except ValueError:
         return word, False
-    refuse((not math.isfinite(number), f"{word} is not a finite number"))
+    if not math.isfinite(number):
+        raise BadInputError(f"{word} is not a finite number")
     return number + 0.0, times  # no negative zero
 
 
 def _kind(vary: Vary, options: Collection[str], parameters: Collection[str]) -> Kind:
+    """Return what a factor varies, and check that it can be varied as it is typed.
+
+    Raises:
+        UnknownNameError: There is nothing of its name.
+        BadInputError: It is varied as a whole and has no parts, or the other way round, or it has
+            no value of the model's own that could be multiplied.
+    """
     name = vary.name
-    kinds = {
-        "model": name == MODEL,
-        "state": name in STATES,
-        "option": name in options,
-        "parameter": name in parameters and not vary.place,
-    }
-    kind = cast("Kind | None", next((kind for kind, holds in kinds.items() if holds), None))
-    if kind is None:
-        raise unknown_name("thing to vary", name, [*options, MODEL, *STATES, *parameters])
-    refuse(
-        (
-            kind == "model" and vary.place,
-            "model is varied as a whole: model=so101/scene,so101/scene_box",
-        ),
-        (
-            kind == "state" and not vary.place,
-            f"{name} is varied one coordinate at a time: {name}[JOINT]=…",
-        ),
-        (
-            kind == "option" and name in parameters,
+    kind = _kind_of_name(vary, options, parameters)
+    if kind == "model" and vary.place:
+        raise BadInputError("model is varied as a whole: model=so101/scene,so101/scene_box")
+    if kind == "state" and not vary.place:
+        raise BadInputError(f"{name} is varied one coordinate at a time: {name}[JOINT]=…")
+    if kind == "option" and name in parameters:
+        raise BadInputError(
             f"{name} is an option of the model and a parameter of the function: give the "
-            "parameter another name",
-        ),
-        (
-            vary.times and kind != "option",
-            f"{vary.label} has no value of the model's own: leave the x out",
-        ),
-    )
+            "parameter another name"
+        )
+    if vary.times and kind != "option":
+        raise BadInputError(f"{vary.label} has no value of the model's own: leave the x out")
     return kind
+
+
+def _kind_of_name(vary: Vary, options: Collection[str], parameters: Collection[str]) -> Kind:
+    """Return what is varied by its name.
+
+    Raises:
+        UnknownNameError: There is nothing of this name.
+    """
+    if vary.name == MODEL:
+        return "model"
+    if vary.name in STATES:
+        return "state"
+    if vary.name in options:
+        return "option"
+    if vary.name in parameters and not vary.place:
+        return "parameter"
+    raise unknown_name("thing to vary", vary.name, [*options, MODEL, *STATES, *parameters])
+
+
+@dataclass(frozen=True)
+class DesignPoint:
+    """One combination of values of what a sweep varies.
+
+    Attributes:
+        id: A digest of the values.
+        values: One for each `Vary`, in their order.
+    """
+
+    id: str
+    values: tuple[Value, ...]
 
 
 @dataclass(frozen=True)
 class Design:
-    """What points a sweep has.
+    """The points of a sweep.
 
     Attributes:
         factors: What is varied; none for the experiment as it is.
@@ -274,20 +295,12 @@ class Design:
 
     def __post_init__(self) -> None:
         ranges = [vary.label for vary in self.sampled]
-        refuse(
-            (
-                ranges and not self.samples,
-                f"{''.join(ranges[:1])} has a range: say --samples N, or a count behind it",
-            ),
-            (
-                self.samples and not ranges,
-                "--samples is of ranges, NAME=from:to, and none is varied",
-            ),
-            (
-                len(ranges) > _DIMENSIONS,
-                f"{len(ranges)} ranges are more than can be sampled",
-            ),
-        )
+        if ranges and not self.samples:
+            raise BadInputError(f"{ranges[0]} has a range: say --samples N, or a count behind it")
+        if self.samples and not ranges:
+            raise BadInputError("--samples is of ranges, NAME=from:to, and none is varied")
+        if len(ranges) > _DIMENSIONS:
+            raise BadInputError(f"{len(ranges)} ranges are more than can be sampled")
 
     @property
     def sampled(self) -> tuple[Vary, ...]:
@@ -305,19 +318,15 @@ class Design:
         count = self.samples if self.sampled else 1
         return count * math.prod(len(vary.values) for vary in self.listed)
 
-    def points(self) -> Iterator[Figures]:
-        """Every point; the samples change slowest.
-
-        Yields:
-            id: A digest of the values.
-            values: One for each `Vary`, in their order.
-        """
+    def points(self) -> Iterator[DesignPoint]:
+        """Yield every point; the samples change slowest."""
         names = [vary.label for vary in self.factors]
         for sample in self.sample_values().tolist():
             drawn = iter(sample)
             choices = [vary.values or (next(drawn),) for vary in self.factors]
             for values in itertools.product(*choices):
-                yield Figures(id=digest(dict(zip(names, values, strict=True))), values=values)
+                settings = dict(zip(names, values, strict=True))
+                yield DesignPoint(digest(settings), values)
 
     def sample_values(self) -> Array:
         """Return the values (n, r) of n samples of the r ranges; (1, 0) where there is no range."""
@@ -328,7 +337,7 @@ class Design:
 
 
 def _sobol(width: int, count: int, seed: int) -> Array:
-    """(count, width) points in the unit cube, of a scrambled Sobol sequence."""
+    """Return (count, width) points in the unit cube, of a scrambled Sobol sequence."""
     engine = require_qmc().Sobol(width, scramble=True, rng=np.random.default_rng(seed))
     with warnings.catch_warnings():  # of a number that is not a power of two: said when it is asked
         warnings.simplefilter("ignore")
@@ -336,7 +345,7 @@ def _sobol(width: int, count: int, seed: int) -> Array:
 
 
 def require_qmc() -> Any:
-    """SciPy's quasi-Monte-Carlo designs.
+    """Return SciPy's module of quasi-Monte-Carlo designs.
 
     Raises:
         MissingEngineError: SciPy is not installed; the message names the extra.
@@ -345,7 +354,7 @@ def require_qmc() -> Any:
 
 
 def digest(content: object) -> str:
-    """Of plain values; 1 and 1.0 are the same."""
+    """Return the digest of plain values; 1 and 1.0 are the same."""
     plain = json.loads(json.dumps(content, allow_nan=False), parse_int=float)
     text = json.dumps(plain, sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]

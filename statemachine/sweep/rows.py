@@ -142,15 +142,21 @@ def _parts(folder: Path) -> list[Path]:
     return sorted((folder / CELLS).glob("backend=*/part-*.parquet"))
 
 
+def outcome_of(row: Mapping[str, Any]) -> str:
+    """Return what became of a cell: "done", or the class of its error."""
+    error = row.get("error_class")
+    return row["status"] if error is None else error
+
+
 def counted(folder: Path) -> Iterator[tuple[str, str]]:
-    """Id of every cell that the dataset has, and "done" or the class of its error.
+    """Yield the id of every cell that the dataset has, and what became of it.
 
     Raises:
         BadInputError: A file does not belong to the dataset.
     """
     for part in _parts(folder):
         for row in _read(part, ["cell", "status", "error_class"]).to_pylist():
-            yield row["cell"], row["error_class"] or row["status"]
+            yield row["cell"], outcome_of(row)
 
 
 def remove_failed(folder: Path) -> None:
