@@ -15,13 +15,13 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from .errors import BadInputError, EngineError, MissingEngineError, check_name, refuse
+from .errors import BadInputError, EngineError, MissingEngineError, check_name
 from .installed import DEFAULT, engine_version
-from .page import Figures
 
 if sys.platform == "win32":
     fcntl = None
@@ -96,7 +96,8 @@ def backends_of(versions: str) -> list[str]:
     words = {word.strip() for word in f"{versions},{installed}".split(",")}
     ordered = sorted(words, key=lambda word: [*map(int, re.findall(r"[0-9]+", word))])
     names = [DEFAULT if word == installed else f"{DEFAULT}=={word}" for word in ordered]
-    refuse((len(names) == 1, f"{versions} is installed: name another release to compare it with"))
+    if len(names) == 1:
+        raise BadInputError(f"{versions} is installed: name another release to compare it with")
     missing = [name for name in names if is_release(name) and not is_here(name)]
     if missing:
         raise MissingEngineError(_ADD.format(" and ".join(missing), " ".join(missing)))
@@ -133,7 +134,8 @@ def published(since: str) -> list[str]:
     installed = engine_version(DEFAULT)
     # The newest is the first; the index may not have the one that is installed.
     older = f", {line[1]}".rpartition(f", {installed}, ")[2].strip(", ").split(", ")
-    refuse((since not in older, f"the package index has no {DEFAULT}=={since} before {installed}"))
+    if since not in older:
+        raise BadInputError(f"the package index has no {DEFAULT}=={since} before {installed}")
     return [*(f"{DEFAULT}=={version}" for version in older[older.index(since) :: -1]), DEFAULT]
 
 
@@ -141,21 +143,30 @@ def _python_in(place: Path) -> Path:
     return place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
-def releases() -> Iterator[Figures]:
-    """Those that are here, by name.
+@dataclass(frozen=True)
+class Release:
+    """A release that has an environment here.
 
-    Returns:
+    Attributes:
         name: As "mujoco==3.3.7".
-        python: Version of its Python.
+        python: Version of its Python; "" where it does not say.
         size: Of its files [byte].
     """
+
+    name: str
+    python: str
+    size: int
+
+
+def releases() -> Iterator[Release]:
+    """Yield the releases that are here, by name."""
     clear_abandoned()
     for place in sorted(folder().glob("[a-z]*==*")):  # one that is being made begins with a dot
         settings = place / "pyvenv.cfg"
         text = settings.read_text(encoding="utf-8") if settings.exists() else ""
         python = re.search(r"^version(?:_info)? *= *(\S+)", text, re.MULTILINE)
         files = (file for file in place.rglob("*") if not file.is_dir())
-        yield Figures(
+        yield Release(
             name=place.name,
             python=python[1] if python else "",
             size=sum(file.lstat().st_size for file in files),
@@ -222,7 +233,8 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
     if is_here(name):
         say(f"{name} is here already")
         return
-    refuse((shutil.which(python) is None, f"there is no Python {python!r} to make it with"))
+    if shutil.which(python) is None:
+        raise BadInputError(f"there is no Python {python!r} to make it with")
     home.mkdir(parents=True, exist_ok=True)
     clear_abandoned()
     with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=home) as made, _held(Path(made)):

@@ -19,7 +19,7 @@ from typing import Any, Protocol, cast
 from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
-from ..interface.options import as_switch
+from ..interface.checks import as_switch
 from ..interface.records import Defaults
 from ..model_files import checked_file
 from ..models import AnyPath

@@ -27,7 +27,7 @@ import numpy as np
 
 from ..errors import EngineWarning, ModelError, one_line, shown
 from ..interface import Array, Ints, JointType, Keyframe
-from ..interface.options import HUGE, TINY
+from ..interface.checks import HUGE, TINY
 from ..measures import ctrl_owners
 from ..models import AnyPath, mesh_file
 from ._delays import delay_steps, from_binary

@@ -30,7 +30,7 @@ from ..interface import (
     Model,
     State,
 )
-from ..interface.options import HUGE, TINY, check_vector, engine_steps, unsupported
+from ..interface.checks import HUGE, TINY, check_vector, engine_steps, unsupported
 from ..interface.records import Defaults, StateLayout
 from ..models import AnyPath
 from ._delays import hold, saved

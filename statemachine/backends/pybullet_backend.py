@@ -10,9 +10,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
+from types import MappingProxyType
 from typing import Any, Literal, cast
 
 import mujoco
@@ -25,8 +26,10 @@ from ..interface import (
     Array,
     Behaviour,
     Capabilities,
+    Ints,
 )
-from ..interface.options import HUGE, checked_options
+from ..interface.checks import HUGE
+from ..interface.options import checked_options
 from ..interface.records import Defaults
 from ..measures.text import few
 from ..models import AnyPath
@@ -163,10 +166,7 @@ def load(
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
-    about: Any = SimpleNamespace(
-        backend="pybullet", capabilities=_capabilities(defaults == "engine"), **facts(raw)
-    )
-    checked = checked_options(about, options)
+    checked = checked_options(FileFacts.of(raw, _capabilities(defaults == "engine")), options)
     substeps = checked.get("substeps", 1)
     if checked:
         raw = edited(raw, checked, step_length(float(raw.opt.timestep), substeps, checked))
@@ -182,6 +182,45 @@ def load(
         for difference in (*as_targets(plan), *otherwise(plan)):
             warnings.warn(f"PyBullet: {difference}", EngineWarning, stacklevel=3)
     return model._started_as(model, checked)
+
+
+@dataclass(frozen=True, eq=False)
+class FileFacts:
+    """What options are checked against before there is a Model of a file.
+
+    Attributes:
+        capabilities: The record that the Model will have.
+        nv, nu, nbody, ngeom: Counts.
+        jnt_type, jnt_dofadr: (njnt,) as in a Model.
+        dof_armature, dof_damping, dof_frictionloss: (nv,) as in a Model.
+        body_mass: (nbody,) [kg].
+        body_names, actuator_names: Names, "" of what has none.
+        actuator_kp: (nu,) gains of position servos, NaN for other actuators.
+        backend: Name of the backend.
+    """
+
+    capabilities: Capabilities
+    nv: int
+    nu: int
+    nbody: int
+    ngeom: int
+    jnt_type: Ints
+    jnt_dofadr: Ints
+    dof_armature: Array
+    dof_damping: Array
+    dof_frictionloss: Array
+    body_mass: Array
+    body_names: tuple[str, ...]
+    actuator_names: tuple[str, ...]
+    actuator_kp: Array
+    backend: str = "pybullet"
+
+    @classmethod
+    def of(cls, raw: mujoco.MjModel, capabilities: Capabilities) -> FileFacts:
+        """Take them from a compiled model."""
+        known = facts(raw)
+        wanted = {field.name: known[field.name] for field in fields(cls) if field.name in known}
+        return cls(capabilities=capabilities, **wanted)
 
 
 def base_stands(model: PybulletModel) -> bool:
