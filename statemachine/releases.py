@@ -20,47 +20,19 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from .errors import BadInputError, EngineError, MissingEngineError, check_name
+from .errors import BadInputError, EngineError, MissingEngineError
 from .installed import DEFAULT, engine_version
+from .release_names import engine_of, is_release, version_of  # noqa: F401 (for others, too)
 
 if sys.platform == "win32":
     fcntl = None
 else:
     import fcntl
 
-_NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)", re.ASCII)
 _ADD = "not here: {}; to have it: statemachine engines add {}"
 _LARGE = 1e9  # [byte], more than any takes while it is made
 _SETTLING = 1.0  # [s] from the lock's file to the lock
 _JUST_MADE = 3600.0  # [s] since its last change, that a folder without a lock is left
-_EXAMPLE = f"{DEFAULT}==3.3.7"
-
-
-def is_release(name: str) -> bool:
-    """Return whether the name of a backend means a release of MuJoCo."""
-    return "==" in name
-
-
-def version_of(name: str) -> str:
-    """The version that a release's name has.
-
-    Raises:
-        BadInputError: It is no such name.
-        UnknownNameError: It is not one of MuJoCo.
-    """
-    match = _NAME.fullmatch(name)
-    if match is None:
-        whole = f"{name}.0" if _NAME.fullmatch(f"{name}.0") else _EXAMPLE
-        raise BadInputError(
-            f"{name!r} is not a release of {DEFAULT}, which has three numbers: type {whole}"
-        )
-    check_name("engine with releases", match["engine"], [DEFAULT])
-    return match["version"]
-
-
-def engine_of(name: str) -> str:
-    """The engine that a release's name has."""
-    return name.partition("==")[0]
 
 
 def folder() -> Path:

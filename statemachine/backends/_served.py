@@ -19,7 +19,7 @@ from ..interface import DERIVED, Array, Contacts
 from ..interface.checks import HUGE
 from ..interface.records import Arrays, Sizes
 from ..processes import PipedChild
-from ..releases import is_release, version_of
+from ..release_names import is_release, version_of
 from . import _child_server
 from ._hidden_world import HiddenWorld, Memory, Moment, Read
 

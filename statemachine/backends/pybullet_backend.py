@@ -34,6 +34,7 @@ from ..interface.records import Defaults
 from ..measures.text import few
 from ..models import AnyPath
 from . import _bullet_urdf as urdf
+from . import _edits
 from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import Act, DrivenWorld
 from ._bullet_file import UrdfFile
@@ -41,7 +42,6 @@ from ._bullet_plan import Plan
 from ._bullet_scope import as_targets, check, ignored, otherwise, softness
 from ._bullet_weights import weighed_as_it_comes
 from ._bullet_world import ENGINE_TIMESTEP, World
-from ._edits import edited, step_length
 from ._hidden_data import HiddenModel
 from .compiled import (
     check_numbers,
@@ -169,7 +169,8 @@ def load(
     checked = checked_options(FileFacts.of(raw, _capabilities(defaults == "engine")), options)
     substeps = checked.get("substeps", 1)
     if checked:
-        raw = edited(raw, checked, step_length(float(raw.opt.timestep), substeps, checked))
+        timestep = _edits.step_length(float(raw.opt.timestep), substeps, checked)
+        raw = _edits.edited(raw, checked, timestep)
     file = UrdfFile.read(Path(path)) if defaults == "engine" else None
     plan = Plan(raw, file)
     check(plan, "pybullet", defaults == "engine")
@@ -315,7 +316,8 @@ class PybulletModel(HiddenModel):
 
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
         substeps = options.get("substeps", self.substeps)
-        raw = edited(self.plan.raw, options, step_length(self.timestep, substeps, options))
+        timestep = _edits.step_length(self.timestep, substeps, options)
+        raw = _edits.edited(self.plan.raw, options, timestep)
         plan = Plan(raw, self.plan.file, self.plan.weighed)
         model = self._of(plan, substeps, options.get("max_qvel", self._asked))
         if "friction" in options:

@@ -23,7 +23,8 @@ from ..interface import Capabilities
 from ..interface.checks import unsupported_by
 from ..interface.records import Arrays, Defaults
 from ..models import AnyPath
-from ..releases import is_release, python_of, version_of
+from ..release_names import is_release, version_of
+from ..releases import python_of
 from . import _release_child as child
 from ._edits import put
 from ._hidden_data import HiddenModel
