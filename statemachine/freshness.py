@@ -45,7 +45,7 @@ from .interface import (
 from .measures import ContactNames, Gap
 from .measures.quantities import Readings, readings
 from .measures.text import TINY, count, few, grouped, listed, milliseconds
-from .releases import engine_of
+from .release_names import engine_of
 from .rotations import angle_between, matrix_from_quat, times
 
 WIDTH = 80

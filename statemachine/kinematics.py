@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from .errors import BadInputError, ModelError, check_name
 from .installed import require
 from .interface import Array, Model
-from .interface.options import as_numbers, as_vector
+from .interface.checks import as_numbers, as_vector
 from .model_files import checked_file
 from .models import AnyPath
 from .rotations import Placement, matrix_from_quat, xyzw_from_wxyz

@@ -20,47 +20,19 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from .errors import BadInputError, EngineError, MissingEngineError, check_name, refuse
+from .errors import BadInputError, EngineError, MissingEngineError
 from .installed import DEFAULT, engine_version
+from .release_names import engine_of, is_release, version_of  # noqa: F401 (for others, too)
 
 if sys.platform == "win32":
     fcntl = None
 else:
     import fcntl
 
-_NAME = re.compile(r"(?P<engine>[a-z]+)==(?P<version>\d+\.\d+\.\d+(\.?\w+)*)", re.ASCII)
 _ADD = "not here: {}; to have it: statemachine engines add {}"
 _LARGE = 1e9  # [byte], more than any takes while it is made
 _SETTLING = 1.0  # [s] from the lock's file to the lock
 _JUST_MADE = 3600.0  # [s] since its last change, that a folder without a lock is left
-_EXAMPLE = f"{DEFAULT}==3.3.7"
-
-
-def is_release(name: str) -> bool:
-    """Return whether the name of a backend means a release of MuJoCo."""
-    return "==" in name
-
-
-def version_of(name: str) -> str:
-    """The version that a release's name has.
-
-    Raises:
-        BadInputError: It is no such name.
-        UnknownNameError: It is not one of MuJoCo.
-    """
-    match = _NAME.fullmatch(name)
-    if match is None:
-        whole = f"{name}.0" if _NAME.fullmatch(f"{name}.0") else _EXAMPLE
-        raise BadInputError(
-            f"{name!r} is not a release of {DEFAULT}, which has three numbers: type {whole}"
-        )
-    check_name("engine with releases", match["engine"], [DEFAULT])
-    return match["version"]
-
-
-def engine_of(name: str) -> str:
-    """The engine that a release's name has."""
-    return name.partition("==")[0]
 
 
 def folder() -> Path:
@@ -96,7 +68,8 @@ def backends_of(versions: str) -> list[str]:
     words = {word.strip() for word in f"{versions},{installed}".split(",")}
     ordered = sorted(words, key=lambda word: [*map(int, re.findall(r"[0-9]+", word))])
     names = [DEFAULT if word == installed else f"{DEFAULT}=={word}" for word in ordered]
-    refuse((len(names) == 1, f"{versions} is installed: name another release to compare it with"))
+    if len(names) == 1:
+        raise BadInputError(f"{versions} is installed: name another release to compare it with")
     missing = [name for name in names if is_release(name) and not is_here(name)]
     if missing:
         raise MissingEngineError(_ADD.format(" and ".join(missing), " ".join(missing)))
@@ -133,7 +106,8 @@ def published(since: str) -> list[str]:
     installed = engine_version(DEFAULT)
     # The newest is the first; the index may not have the one that is installed.
     older = f", {line[1]}".rpartition(f", {installed}, ")[2].strip(", ").split(", ")
-    refuse((since not in older, f"the package index has no {DEFAULT}=={since} before {installed}"))
+    if since not in older:
+        raise BadInputError(f"the package index has no {DEFAULT}=={since} before {installed}")
     return [*(f"{DEFAULT}=={version}" for version in older[older.index(since) :: -1]), DEFAULT]
 
 
@@ -143,11 +117,11 @@ def _python_in(place: Path) -> Path:
 
 @dataclass(frozen=True)
 class Release:
-    """A release of an engine that is installed in an environment of its own.
+    """A release that has an environment here.
 
     Attributes:
         name: As "mujoco==3.3.7".
-        python: Version of its Python.
+        python: Version of its Python; "" where it does not say.
         size: Of its files [byte].
     """
 
@@ -164,8 +138,11 @@ def releases() -> Iterator[Release]:
         text = settings.read_text(encoding="utf-8") if settings.exists() else ""
         python = re.search(r"^version(?:_info)? *= *(\S+)", text, re.MULTILINE)
         files = (file for file in place.rglob("*") if not file.is_dir())
-        size = sum(file.lstat().st_size for file in files)
-        yield Release(place.name, python[1] if python else "", size)
+        yield Release(
+            name=place.name,
+            python=python[1] if python else "",
+            size=sum(file.lstat().st_size for file in files),
+        )
 
 
 _LOCK = "lock"  # in a folder that is being made: the file that its process holds
@@ -228,7 +205,8 @@ def add(name: str, python: str = sys.executable, say: Callable[[str], object] = 
     if is_here(name):
         say(f"{name} is here already")
         return
-    refuse((shutil.which(python) is None, f"there is no Python {python!r} to make it with"))
+    if shutil.which(python) is None:
+        raise BadInputError(f"there is no Python {python!r} to make it with")
     home.mkdir(parents=True, exist_ok=True)
     clear_abandoned()
     with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=home) as made, _held(Path(made)):

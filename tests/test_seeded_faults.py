@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from statemachine import conformance
-from statemachine.backends import _edits, mujoco_backend
+from statemachine.backends import _delays, _edits
 from statemachine.backends._mujoco_alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.faults import patches
@@ -168,7 +168,7 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
     ),
     "latency is ignored": (changes_with("actuator_delay"), {"latency_delays_a_command"}),
     "before a keyframe there was no command": (
-        around(mujoco_backend, "hold")(lambda right, *_: None),
+        around(_delays, "hold")(lambda right, *_: None),
         {"a_keyframe_holds_under_latency"},
     ),
     "state forgets the commands on their way": (

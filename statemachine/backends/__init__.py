@@ -1,6 +1,7 @@
 """The backends by name, each loaded when it is first asked for.
 
-What a backend for an engine with a world of its own is made from is here, too: `HiddenWorld`.
+What a backend for an engine with a world of its own is made from is here, too (`HiddenWorld`), and
+loaded when it is first asked for.
 """
 
 from __future__ import annotations
@@ -14,18 +15,16 @@ from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from ..errors import BadInputError, EngineWarning, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
-from ..interface.options import as_switch
+from ..interface.checks import as_switch
 from ..interface.records import Defaults
 from ..model_files import checked_file
 from ..models import AnyPath
-from ..releases import is_release, version_of
-from ._hidden_data import HiddenData, HiddenModel
-from ._hidden_world import HiddenWorld, Moment
+from ..release_names import is_release, version_of
 from .binary import is_binary, read_binary
 from .starts import overlap_warning, places_in, usual_start
 
@@ -44,6 +43,27 @@ __all__ = [
     "parse_backend",
     "register",
 ]
+
+
+if TYPE_CHECKING:
+    from ._hidden_data import HiddenData as HiddenData
+    from ._hidden_data import HiddenModel as HiddenModel
+    from ._hidden_world import HiddenWorld as HiddenWorld
+    from ._hidden_world import Moment as Moment
+
+# Where the parts are of a backend for an engine with a world of its own; MuJoCo needs none.
+_HIDDEN = {
+    "HiddenData": "_hidden_data",
+    "HiddenModel": "_hidden_data",
+    "HiddenWorld": "_hidden_world",
+    "Moment": "_hidden_world",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HIDDEN:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f".{_HIDDEN[name]}", __name__), name)
 
 
 class Loader(Protocol):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from itertools import combinations, product
 from typing import Any
 
@@ -17,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..interface import Array, Contacts
-from ..page import Figures
 from ..rotations import matrix_from_quat
 from . import _dense as dense
 from ._contact_rules import bodies_meet, mixed
@@ -28,11 +28,47 @@ _MOST = 10.0  # PyBullet's largest friction of a pair
 _CLOSE = 0.01  # a friction is the model's if it is within this part of it
 
 
+@dataclass(frozen=True)
+class Solid:
+    """Geoms of one body that meet the same others; PyBullet has one link for them.
+
+    Attributes:
+        body: MuJoCo's id of the body.
+        geoms: MuJoCo's ids of the geoms.
+        plane: Whether it is a plane, and not what touches as one.
+        part: Its number among the solids of its body.
+    """
+
+    body: int
+    geoms: tuple[int, ...]
+    plane: bool = False
+    part: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """One contact, as `Contacts` has them.
+
+    Attributes:
+        geoms: The ids of both, the smaller first.
+        distance: Between the surfaces [m]; negative is penetration.
+        position: (3,) midpoint in world axes [m].
+        frame: (3, 3) contact axes as rows, the first the normal.
+        force: (3,) of the first geom on the second, along those axes [N].
+    """
+
+    geoms: tuple[int, int]
+    distance: float
+    position: Array
+    frame: Array
+    force: Array
+
+
 class Surfaces:
     """The solids of a model.
 
     Attributes:
-        solids: All that can touch, see `_solids`; planes first.
+        solids: All that can touch; planes first.
         touching: (ngeom,) which geoms may touch any other.
         pairs: Of two solids, by their places, whether they meet.
         meeting: The geoms that do, two by two.
@@ -81,7 +117,7 @@ class Surfaces:
         ]
 
     def _label(self, i: int, j: int) -> str:
-        def name(solid: Figures) -> str:
+        def name(solid: Solid) -> str:
             if solid.plane:
                 return self._raw.geom(solid.geoms[0]).name or f"the plane (geom {solid.geoms[0]})"
             return self._raw.body(solid.body).name or f"body {solid.body}"
@@ -148,28 +184,23 @@ def _meets(raw: mujoco.MjModel) -> NDArray[np.bool_]:
 
 def _solids(
     raw: mujoco.MjModel, meets: NDArray[np.bool_], touching: NDArray[np.bool_]
-) -> list[Figures]:
-    """Geoms of a body that meet the same are one solid.
+) -> list[Solid]:
+    """Return the solids of a model, planes first: geoms of a body that meet the same are one.
 
-    Returns:
-        body: That they are of.
-        geoms: Which they are.
-        plane: Whether it is a plane, and not what touches as one.
-        part: A body's solids, numbered.
+    Args:
+        raw: The compiled model.
+        meets: (ngeom, ngeom) which geoms may touch.
+        touching: (ngeom,) which may touch any other.
     """
     planes = touching & (raw.geom_type == PLANE)
     solids = [
-        Figures(body=int(raw.geom_bodyid[g]), geoms=(g,), plane=True, part=0)
-        for g in np.flatnonzero(planes).tolist()
+        Solid(int(raw.geom_bodyid[g]), (g,), plane=True) for g in np.flatnonzero(planes).tolist()
     ]
     for body in range(raw.nbody):
         alike: dict[bytes, list[int]] = {}
         for geom in np.flatnonzero(touching & ~planes & (raw.geom_bodyid == body)).tolist():
             alike.setdefault(meets[geom].tobytes(), []).append(geom)
-        solids += [
-            Figures(body=body, geoms=tuple(geoms), plane=False, part=part)
-            for part, geoms in enumerate(alike.values())
-        ]
+        solids += [Solid(body, tuple(geoms), part=k) for k, geoms in enumerate(alike.values())]
     return solids
 
 
@@ -229,7 +260,7 @@ def contacts_of(
         local = dense.times(turns[b], point - read("xpos")[b])
         return min(candidates, key=lambda g: abs(_distance(raw, g, turns_of_geoms[g], local)))
 
-    rows: list[tuple[Any, ...]] = []
+    touches: list[Touch] = []
     for point in points:
         _, body_a, body_b, link_a, link_b, on_a, on_b, normal, dist, push = point[:10]
         if dist > 0 and not push:
@@ -241,18 +272,27 @@ def contacts_of(
         for size, direction in (point[10:12], point[12:14]):
             force = force + size * np.array(direction)
         if pair[0] > pair[1]:
-            pair, normal, force = pair[::-1], -normal, -force
+            pair, normal, force = (pair[1], pair[0]), -normal, -force
         frame = _axes(normal)
-        rows.append((pair, dist, (on_a + on_b) / 2, frame, dense.times(frame, force)))
-    count = len(rows)
-    columns = list(zip(*rows, strict=True)) or [()] * 5
+        touches.append(Touch(pair, dist, (on_a + on_b) / 2, frame, dense.times(frame, force)))
+    return _as_contacts(touches)
+
+
+def _as_contacts(touches: list[Touch]) -> Contacts:
+    """Return n contacts as arrays; PyBullet tells of no torque."""
+    n = len(touches)
+    geoms = np.array([touch.geoms for touch in touches], dtype=np.int64)
+    distances = np.array([touch.distance for touch in touches], dtype=np.float64)
+    positions = np.array([touch.position for touch in touches], dtype=np.float64)
+    frames = np.array([touch.frame for touch in touches], dtype=np.float64)
+    forces = np.array([touch.force for touch in touches], dtype=np.float64)
     return Contacts(
-        geom=np.array(columns[0], dtype=np.int64).reshape(count, 2),
-        dist=np.array(columns[1], dtype=np.float64),
-        pos=np.array(columns[2], dtype=np.float64).reshape(count, 3),
-        frame=np.array(columns[3], dtype=np.float64).reshape(count, 3, 3),
-        force=np.array(columns[4], dtype=np.float64).reshape(count, 3),
-        torque=np.zeros((count, 3)),
+        geom=geoms.reshape(n, 2),
+        dist=distances,
+        pos=positions.reshape(n, 3),
+        frame=frames.reshape(n, 3, 3),
+        force=forces.reshape(n, 3),
+        torque=np.zeros((n, 3)),
     )
 
 

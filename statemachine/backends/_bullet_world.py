@@ -18,7 +18,6 @@ import numpy as np
 
 from ..installed import silence
 from ..interface import Array
-from ..page import Figures
 from ..rotations import INVERSE, matrix_from_quat, wxyz_from_xyzw, xyzw_from_wxyz
 from ..rotations import times as quat_times
 from . import _bullet_urdf as urdf
@@ -33,7 +32,7 @@ from ._bullet_client import (
     times,
     turned,
 )
-from ._bullet_contacts import NO_CONTACT
+from ._bullet_contacts import NO_CONTACT, Solid
 from ._bullet_plan import Plan
 from ._bullet_trees import FileTree, Tree
 from ._hidden_world import HiddenWorld
@@ -247,8 +246,8 @@ class World:
                     physicsClientId=self.client,
                 )
 
-    def solids(self) -> Iterator[tuple[int, int, Figures]]:
-        """PyBullet's body and link of all that can touch.
+    def solids(self) -> Iterator[tuple[int, int, Solid]]:
+        """Yield PyBullet's body and link of all that can touch.
 
         In the order of the surfaces; of a robot that PyBullet read itself in that of its links,
         each with the geoms of the body that it is a part of.
@@ -266,15 +265,14 @@ class World:
             )
             yield body, link, solid
 
-    def _solids_of_file(self, tree: FileTree) -> Iterator[tuple[int, int, Figures]]:
+    def _solids_of_file(self, tree: FileTree) -> Iterator[tuple[int, int, Solid]]:
         raw = self._raw
         touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
         for link in range(-1, len(tree.bodies) - 1):
             if pb.getCollisionShapeData(tree.body, link, self.client):
                 body = tree.bodies[link]
                 geoms = np.flatnonzero(touching & (raw.geom_bodyid == body)).tolist()
-                solid = Figures(body=body, geoms=tuple(geoms), plane=False, part=0)
-                yield tree.body, link, solid
+                yield tree.body, link, Solid(body, tuple(geoms))
 
     def joints(self) -> Iterator[tuple[int, int, int]]:
         """PyBullet's body and index of each joint, and its degree of freedom."""

@@ -34,7 +34,7 @@ import select
 import sys
 import threading
 import time
-from types import SimpleNamespace
+from types import ModuleType
 
 import numpy as np
 
@@ -145,7 +145,9 @@ def main() -> None:
     os.dup2(2, 1)  # what an engine prints is not an answer
     if hasattr(select, "poll"):
         threading.Thread(target=end_with, args=(source,), daemon=True).start()
-    server = Answerer(SimpleNamespace(**runpy.run_path(sys.argv[1])))
+    engine = ModuleType("engine")
+    vars(engine).update(runpy.run_path(sys.argv[1]))
+    server = Answerer(engine)
     patience = SPIN
     while True:
         try:

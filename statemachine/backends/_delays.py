@@ -17,20 +17,14 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Ints
-from ..measures import ctrl_owners
 from ..processes import free_memory
+from .actuators import commands_needed
 
 SHORTER = 1 - 1e-6
 _LARGE = 1e7  # bytes of buffers, from which on it is asked what memory is free
 _MOST = 8.0 * 2**31  # bytes: the engine counts the numbers of the buffers in a C int
 _SMALL = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
 <actuator><motor joint="j" delay="1" nsample="{}"/></actuator></mujoco>"""
-
-
-def delay_steps(m: mujoco.MjModel) -> Ints:
-    """Engine steps (nu,) by which each number of ctrl acts late."""
-    steps = np.minimum(_needed(m.actuator_delay, m.opt.timestep), m.actuator_history[:, 0])
-    return steps.astype(np.int64)[ctrl_owners(m)]
 
 
 def commands_kept(m: mujoco.MjModel, delay: Array, timestep: Array | float) -> Ints:
@@ -48,7 +42,7 @@ def commands_kept(m: mujoco.MjModel, delay: Array, timestep: Array | float) -> I
         BadInputError: The memory that is free cannot hold so many.
     """
     steps = np.asarray(timestep)[..., None]
-    counts = np.maximum(_needed(delay, steps), m.actuator_history[:, 0])
+    counts = np.maximum(commands_needed(delay, steps), m.actuator_history[:, 0])
     sizes = 8.0 * (counts * (1 + m.actuator_ctrlnum)).sum(axis=-1)  # bytes
     if sizes.max() > _LARGE:
         limit = min(_MOST, free_memory() or _MOST)
@@ -141,12 +135,6 @@ def hold(m: mujoco.MjModel, history: Array, ctrl: Array, counts: Ints | None = N
             commands = np.tile(ctrl[which][..., number : number + own], int(stored[a]))
             rows[..., first : first + commands.shape[-1]] = commands
         history[which] = rows
-
-
-def _needed(delay: Array, timestep: Array | float) -> Array:
-    """Commands that have to be kept for delays [s], of any shape: the oldest acts."""
-    with np.errstate(over="ignore"):  # infinitely many, which `commands_kept` refuses
-        return np.ceil(delay / timestep - 1e-9)
 
 
 def _appended(m: mujoco.MjModel, counts: Ints) -> tuple[Ints, Ints]:

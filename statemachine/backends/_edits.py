@@ -13,10 +13,10 @@ import mujoco
 import numpy as np
 
 from ..errors import BadInputError
-from ..interface import Array, Ints
-from ..measures import ctrl_owners
+from ..interface import Array
 from ._delays import SHORTER, commands_kept, with_room
 from ._release_child import held
+from .actuators import servos
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -123,22 +123,6 @@ def varied(
 def _rows(array: Array, value: Any) -> Array:
     """A copy of an array of the compiled model, once for each world that a value speaks of."""
     return np.array(np.broadcast_to(array, (*value.shape[:-1], *array.shape[-2:])))
-
-
-def servos(m: mujoco.MjModel) -> tuple[Ints, Any]:
-    """Of each number of ctrl (nu,): the actuator that takes it, and whether it is a position servo.
-
-    An actuator may take several numbers of ctrl.
-    """
-    owner = ctrl_owners(m)
-    fixed = m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED)
-    affine = m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
-    gain = m.actuator_gainprm[:, 0]
-    servo = fixed & affine & (m.actuator_biasprm[:, 1] == -gain) & (gain != 0)
-    # An integrator's ctrl is a velocity.
-    direct = (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)
-    servo &= np.isin(m.actuator_dyntype, [int(kind) for kind in direct])
-    return owner, servo[owner]
 
 
 def edited(raw: mujoco.MjModel, options: dict[str, Any], timestep: float) -> mujoco.MjModel:

@@ -26,7 +26,7 @@ from ..interface import (
     Model,
     State,
 )
-from ..interface.options import HUGE, check_entries, check_writable, engine_steps, unsupported
+from ..interface.checks import HUGE, check_entries, check_writable, engine_steps, unsupported
 from ._hidden_world import HiddenWorld, LookAhead, Memory, Moment, bounded
 
 

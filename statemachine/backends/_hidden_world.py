@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..interface import DERIVED, POSES, Array
-from ..interface.options import HUGE
+from ..interface.checks import HUGE
 from ..interface.records import Sizes
 
 _MANY = HUGE * HUGE

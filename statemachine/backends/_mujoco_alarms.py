@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import BadInputError, DivergedError, EngineError, EngineWarning
 from ..interface import Model
-from ..interface.options import HUGE
+from ..interface.checks import HUGE
 
 _KIND = mujoco.mjtWarning
 # Warnings that make a Data useless, in the order in which a step looks for it.

@@ -17,7 +17,7 @@ from mujoco.batch import Batch, SimulationError
 
 from ..errors import StateMachineError, one_line
 from ..interface import Array, Ints, Model, State
-from ..interface.options import check_vector, engine_steps, unsupported
+from ..interface.checks import check_vector, engine_steps, unsupported
 from ..interface.records import Errors, StateLayout
 from ..interface.worlds import WRITABLE, Worlds, check_memory, without
 from ._delays import hold, places_of, with_room_of

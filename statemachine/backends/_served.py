@@ -8,6 +8,7 @@ import threading
 import weakref
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -15,10 +16,10 @@ import numpy as np
 
 from ..errors import EngineError
 from ..interface import DERIVED, Array, Contacts
-from ..interface.options import HUGE
-from ..interface.records import Arrays
+from ..interface.checks import HUGE
+from ..interface.records import Arrays, Sizes
 from ..processes import PipedChild
-from ..releases import is_release, version_of
+from ..release_names import is_release, version_of
 from . import _child_server
 from ._hidden_world import HiddenWorld, Memory, Moment, Read
 
@@ -44,6 +45,58 @@ class ServedEngine(NamedTuple):
     def anew(self) -> str:
         """What to type to make the environment of a release anew."""
         return f"statemachine engines remove {self.name}, then add"
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedModel:
+    """What an engine says of a model that it has loaded.
+
+    Attributes:
+        number: Of the model, in the process of the engine.
+        version: Of the engine.
+        digest: Of what it read, by which a file that changed since then is seen.
+        flags: Names of the flags that are set, by the names of their sets; empty where the engine
+            tells of none.
+        fields: Numeric fields that were asked for, by name, as far as the engine has them.
+    """
+
+    number: int
+    version: str
+    digest: str
+    flags: Mapping[str, list[str]]
+    fields: Arrays
+
+
+@dataclass(frozen=True)
+class MadeWorld:
+    """What an engine says of a world that it has made.
+
+    Attributes:
+        number: Of the world, in the process of the engine.
+        memory: As `HiddenWorld.memory_layout`.
+        kept_memory: As in a HiddenWorld.
+        unavailable: As `HiddenWorld.untold`.
+    """
+
+    number: int
+    memory: Sizes
+    kept_memory: tuple[str, ...]
+    unavailable: frozenset[str]
+
+
+@dataclass(frozen=True, eq=False)
+class RunSteps:
+    """Steps that an engine has taken.
+
+    Attributes:
+        taken: How many.
+        before: qpos, qvel and the memory, in a row, after these steps.
+        after: The same after one step more; None where that was not taken.
+    """
+
+    taken: int
+    before: Array
+    after: Array | None
 
 
 class LostError(Exception):
@@ -81,7 +134,7 @@ class Server:
     def ask(
         self, verb: str, arrays: Mapping[str, Array] = MappingProxyType({}), **job: Any
     ) -> tuple[dict[str, Any], Arrays]:
-        """Let it do something; its answer, and arrays by name.
+        """Let it do something, and return its answer, and arrays by name.
 
         Raises:
             LostError: It has ended.
@@ -112,8 +165,8 @@ class Server:
         file: str,
         edits: Mapping[str, Array] = MappingProxyType({}),
         **job: Any,
-    ) -> tuple[dict[str, Any], Arrays]:
-        """Let it load a model; its number and what is said of it, and numeric fields by name.
+    ) -> LoadedModel:
+        """Let it load a model.
 
         Args:
             text: Of the file, or "".
@@ -126,12 +179,48 @@ class Server:
             LostError, AnswerError: As `ask`.
             EngineError: The environment of a release has another one.
         """
-        said, values = self.ask("load", edits, file=file, text=text, **job)
-        name, version = self._engine.name, said["version"]
+        answer, fields = self.ask("load", edits, file=file, text=text, **job)
+        loaded = LoadedModel(
+            number=answer["model"],
+            version=answer["version"],
+            digest=answer["digest"],
+            flags=answer.get("flags", {}),
+            fields=fields,
+        )
+        name, version = self._engine.name, loaded.version
         if is_release(name) and version != version_of(name):
-            self.forgotten.append(said["model"])
+            self.forgotten.append(loaded.number)
             raise EngineError(f"the environment of {name} has {version}: {self._engine.anew}")
-        return said, values
+        return loaded
+
+    def make(self, model: int) -> MadeWorld:
+        """Let it make a world of a model, which is given by its number.
+
+        Raises:
+            LostError, AnswerError: As `ask`.
+        """
+        answer, _ = self.ask("make", model=model)
+        return MadeWorld(
+            number=answer["world"],
+            memory=tuple((name, int(length)) for name, length in answer["memory"]),
+            kept_memory=tuple(answer["kept_memory"]),
+            unavailable=frozenset(answer["untold"]),
+        )
+
+    def run(self, world: int, arrays: Mapping[str, Array], steps: int, **job: Any) -> RunSteps:
+        """Let it take steps.
+
+        Args:
+            world: The number of the world.
+            arrays: "ctrl", the command; and "state" where the world is to be placed first.
+            steps: Number of steps; fewer are taken where a coordinate goes beyond its bound.
+            **job: "fastest", that bound of a velocity; and "ahead", whether one step more is taken.
+
+        Raises:
+            LostError, AnswerError: As `ask`.
+        """
+        answer, states = self.ask("run", arrays, world=world, steps=steps, **job)
+        return RunSteps(answer["taken"], states["before"], states.get("after"))
 
     def number(self, opened: Callable[[Server], int]) -> int:
         """The number of a model there: all worlds that are opened alike share it."""
@@ -178,14 +267,14 @@ class ServedWorld(HiddenWorld):
         self._placed = True
         try:
             self._server = server = Server.of(self._engine)
-            said, _ = server.ask("make", model=server.number(self._opened))
+            made = server.make(server.number(self._opened))
         except (LostError, AnswerError, OSError) as error:
             raise EngineError(f"{self.engine} cannot make a world: {error}") from error
-        self._world = said["world"]
+        self._world = made.number
         # No call: it may be collected in the midst of another.
         self._end = weakref.finalize(self, server.forgotten.append, self._world)
-        self.memory_layout = tuple((name, int(length)) for name, length in said["memory"])
-        self.kept_memory, self.untold = said["kept_memory"], frozenset(said["untold"])
+        self.memory_layout, self.kept_memory = made.memory, made.kept_memory
+        self.untold = made.unavailable
 
     def place(self, qpos: Array, qvel: Array, memory: Memory) -> None:
         self._state, self._placed = np.concatenate([qpos, qvel, *memory]), True
@@ -199,18 +288,14 @@ class ServedWorld(HiddenWorld):
     def advance(self, steps: int, fastest: float) -> int:
         if not self._server.lives:
             self._begin()
-        placed = {"state": self._state} if self._placed else {}
-        answer, states = self._server.ask(
-            "run",
-            {"ctrl": self._ctrl, **placed},
-            world=self._world,
-            steps=steps,
-            fastest=fastest,
-            ahead=self._ahead or not steps,
-        )
-        self._placed, self._derived, self._state = False, None, states["before"]
-        self._reserve = states.get("after")
-        return answer["taken"]
+        arrays = {"ctrl": self._ctrl}
+        if self._placed:
+            arrays["state"] = self._state
+        ahead = self._ahead or not steps
+        run = self._server.run(self._world, arrays, steps, fastest=fastest, ahead=ahead)
+        self._placed, self._derived, self._state = False, None, run.before
+        self._reserve = run.after
+        return run.taken
 
     def step(self) -> None:
         if self._reserve is None:

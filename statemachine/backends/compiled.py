@@ -27,11 +27,9 @@ import numpy as np
 
 from ..errors import EngineWarning, ModelError, one_line, shown
 from ..interface import Array, Ints, JointType, Keyframe
-from ..interface.options import HUGE, TINY
-from ..measures import ctrl_owners
+from ..interface.checks import HUGE, TINY
 from ..models import AnyPath, mesh_file
-from ._delays import delay_steps, from_binary
-from ._edits import servos
+from .actuators import control_names, ctrl_owners, delay_steps, servos
 from .binary import is_binary, read_binary
 
 # For `fastest`: in a step [rad, or the model's extent]; at least [rad/s or m/s]; about a day [s].
@@ -109,6 +107,8 @@ def compile_file(path: AnyPath) -> mujoco.MjModel:
     binary = read_binary(text) if is_binary(text) else None
     try:
         if binary is not None:
+            from ._delays import from_binary
+
             raw = from_binary(binary)
         else:
             spec = spec_with_packages(Path(text))
@@ -333,7 +333,7 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
             f"{kind}_names": tuple(getattr(m, kind)(k).name for k in range(getattr(m, count)))
             for kind, count in _NAMED.items()
         },
-        "actuator_names": tuple(_control_names(m)),
+        "actuator_names": tuple(control_names(m)),
         "jnt_limited": m.jnt_limited.astype(bool),
         "actuator_jntid": np.where(on_joint, m.actuator_trnid[owner, 0], -1).astype(np.int64),
         "actuator_ctrlrange": _ranges(m.actuator_ctrlrange, m.actuator_ctrllimited),
@@ -361,33 +361,6 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
             for i in range(m.nkey)
         ),
     }
-
-
-# What the controls of an actuator with several are: bits of its ctrlspec, in their order.
-_INPUTS = {
-    int(mujoco.mjtCtrlInput.mjINPUT_POS): "position",
-    int(mujoco.mjtCtrlInput.mjINPUT_VEL): "velocity",
-    int(mujoco.mjtCtrlInput.mjINPUT_FF): "feedforward",
-    int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE): "voltage",
-    int(mujoco.mjtCtrlInput.mjINPUT_PRESSURE): "pressure",
-}
-_CHARTS = {
-    int(mujoco.mjtCtrlChart.mjCHART_EXPMAP): ("x", "y", "z"),
-    int(mujoco.mjtCtrlChart.mjCHART_QUAT): ("w", "x", "y", "z"),
-}
-
-
-def _control_names(m: mujoco.MjModel) -> Iterator[str]:
-    """A name for each number of ctrl: the actuator's, with a suffix where it takes several."""
-    for i in range(m.nactuator):
-        name, count, spec = m.actuator(i).name, int(m.actuator_ctrlnum[i]), m.actuator_ctrlspec[i]
-        if m.actuator_gaintype[i] == int(mujoco.mjtGain.mjGAIN_SO3):
-            parts = _CHARTS.get(int(spec), ())
-        else:
-            parts = tuple(part for bit, part in _INPUTS.items() if int(spec) & bit)
-        if len(parts) != count:  # a signature of a later engine
-            parts = tuple(str(k) for k in range(count))
-        yield from (f"{name}.{part}" if name and count > 1 else name for part in parts)
 
 
 def _ranges(ranges: Array, limited: Any) -> Array:

@@ -30,11 +30,9 @@ from ..interface import (
     Model,
     State,
 )
-from ..interface.options import HUGE, TINY, check_vector, engine_steps, unsupported
+from ..interface.checks import HUGE, TINY, check_vector, engine_steps, unsupported
 from ..interface.records import Defaults, StateLayout
 from ..models import AnyPath
-from ._delays import hold, saved
-from ._edits import CONSTANTS_FOLLOW, edited, step_length, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
 from ._release_child import constraint_part, contact_arrays
 from .compiled import (
@@ -159,6 +157,8 @@ class MujocoModel(Model):
         Raises:
             OSError: It cannot be written.
         """
+        from ._delays import saved
+
         Path(path).write_bytes(saved(self.raw).tobytes())
 
     def with_compiled(self, compiled: mujoco.MjModel) -> MujocoModel:
@@ -176,6 +176,7 @@ class MujocoModel(Model):
     def _make_worlds(
         self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
     ) -> Any:
+        from ._edits import CONSTANTS_FOLLOW
         from ._mujoco_worlds import MujocoWorlds
 
         base, arrays = self._varied(options) if options else (self, {})
@@ -192,6 +193,8 @@ class MujocoModel(Model):
         Returns:
             A Model, and (n, ...) arrays by name; see `changes`.
         """
+        from ._edits import step_length, varied
+
         self._check_friction(options)
         given = {name: np.array(values) for name, values in options.items()}
         substeps = given.pop("substeps", np.array([self.substeps]))
@@ -217,6 +220,8 @@ class MujocoModel(Model):
             raise unsupported(self, "friction", reason)
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
+        from ._edits import edited, step_length
+
         self._check_friction(options)
         substeps = options.get("substeps", self.substeps)
         try:
@@ -285,6 +290,8 @@ class MujocoData(Data):
         else:
             mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
             if self._home._holds_start:
+                from ._delays import hold
+
                 hold(self._home.raw, self.raw.history, self.raw.ctrl)
         self._alarms.clear()
 

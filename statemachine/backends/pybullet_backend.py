@@ -10,9 +10,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
+from types import MappingProxyType
 from typing import Any, Literal, cast
 
 import mujoco
@@ -25,12 +26,15 @@ from ..interface import (
     Array,
     Behaviour,
     Capabilities,
+    Ints,
 )
-from ..interface.options import HUGE, checked_options
+from ..interface.checks import HUGE
+from ..interface.options import checked_options
 from ..interface.records import Defaults
 from ..measures.text import few
 from ..models import AnyPath
 from . import _bullet_urdf as urdf
+from . import _edits
 from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import Act, DrivenWorld
 from ._bullet_file import UrdfFile
@@ -38,7 +42,6 @@ from ._bullet_plan import Plan
 from ._bullet_scope import as_targets, check, ignored, otherwise, softness
 from ._bullet_weights import weighed_as_it_comes
 from ._bullet_world import ENGINE_TIMESTEP, World
-from ._edits import edited, step_length
 from ._hidden_data import HiddenModel
 from .compiled import (
     check_numbers,
@@ -163,13 +166,11 @@ def load(
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
-    about: Any = SimpleNamespace(
-        backend="pybullet", capabilities=_capabilities(defaults == "engine"), **facts(raw)
-    )
-    checked = checked_options(about, options)
+    checked = checked_options(FileFacts.of(raw, _capabilities(defaults == "engine")), options)
     substeps = checked.get("substeps", 1)
     if checked:
-        raw = edited(raw, checked, step_length(float(raw.opt.timestep), substeps, checked))
+        timestep = _edits.step_length(float(raw.opt.timestep), substeps, checked)
+        raw = _edits.edited(raw, checked, timestep)
     file = UrdfFile.read(Path(path)) if defaults == "engine" else None
     plan = Plan(raw, file)
     check(plan, "pybullet", defaults == "engine")
@@ -182,6 +183,45 @@ def load(
         for difference in (*as_targets(plan), *otherwise(plan)):
             warnings.warn(f"PyBullet: {difference}", EngineWarning, stacklevel=3)
     return model._started_as(model, checked)
+
+
+@dataclass(frozen=True, eq=False)
+class FileFacts:
+    """What options are checked against before there is a Model of a file.
+
+    Attributes:
+        capabilities: The record that the Model will have.
+        nv, nu, nbody, ngeom: Counts.
+        jnt_type, jnt_dofadr: (njnt,) as in a Model.
+        dof_armature, dof_damping, dof_frictionloss: (nv,) as in a Model.
+        body_mass: (nbody,) [kg].
+        body_names, actuator_names: Names, "" of what has none.
+        actuator_kp: (nu,) gains of position servos, NaN for other actuators.
+        backend: Name of the backend.
+    """
+
+    capabilities: Capabilities
+    nv: int
+    nu: int
+    nbody: int
+    ngeom: int
+    jnt_type: Ints
+    jnt_dofadr: Ints
+    dof_armature: Array
+    dof_damping: Array
+    dof_frictionloss: Array
+    body_mass: Array
+    body_names: tuple[str, ...]
+    actuator_names: tuple[str, ...]
+    actuator_kp: Array
+    backend: str = "pybullet"
+
+    @classmethod
+    def of(cls, raw: mujoco.MjModel, capabilities: Capabilities) -> FileFacts:
+        """Take them from a compiled model."""
+        known = facts(raw)
+        wanted = {field.name: known[field.name] for field in fields(cls) if field.name in known}
+        return cls(capabilities=capabilities, **wanted)
 
 
 def base_stands(model: PybulletModel) -> bool:
@@ -276,7 +316,8 @@ class PybulletModel(HiddenModel):
 
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
         substeps = options.get("substeps", self.substeps)
-        raw = edited(self.plan.raw, options, step_length(self.timestep, substeps, options))
+        timestep = _edits.step_length(self.timestep, substeps, options)
+        raw = _edits.edited(self.plan.raw, options, timestep)
         plan = Plan(raw, self.plan.file, self.plan.weighed)
         model = self._of(plan, substeps, options.get("max_qvel", self._asked))
         if "friction" in options:

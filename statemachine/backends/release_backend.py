@@ -10,24 +10,25 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
-from types import MappingProxyType, SimpleNamespace
+from types import MappingProxyType
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from ..errors import EngineError, ModelError, refuse
+from ..errors import EngineError, ModelError
 from ..interface import Capabilities
-from ..interface.options import unsupported
+from ..interface.checks import unsupported_by
 from ..interface.records import Arrays, Defaults
 from ..models import AnyPath
-from ..page import Figures
-from ..releases import is_release, python_of, version_of
+from ..release_names import is_release, version_of
+from ..releases import python_of
 from . import _release_child as child
 from ._edits import put
 from ._hidden_data import HiddenModel
-from ._served import AnswerError, LostError, ServedEngine, ServedWorld, Server
+from ._served import AnswerError, LoadedModel, LostError, ServedEngine, ServedWorld, Server
 from .binary import is_binary
 from .compiled import check_numbers, facts, fastest, spec_with_packages
 from .mujoco_backend import MujocoModel
@@ -77,77 +78,113 @@ def served(
     """
 
     def load_there(path: AnyPath, defaults: Defaults = "model") -> ServedModel:
-        refuse(
-            (
-                is_binary(os.fspath(path)),
-                f"{path} was compiled by one release of MuJoCo; {engine.title} wants its XML",
-            ),
-            error=ModelError,
-        )
+        if is_binary(os.fspath(path)):
+            raise ModelError(
+                f"{path} was compiled by one release of MuJoCo; {engine.title} wants its XML"
+            )
         return ServedModel(_compiled(engine, load_installed(path, defaults)), capabilities)
 
     return load_there
 
 
-def _opened(reading: Figures, edits: Mapping[str, Any], server: Server) -> int:
-    """The number that the model of a file with some fields edited has there."""
-    return _loaded(server, reading.model, edits, digest=reading.digest)[0]["model"]
-
-
-def _compiled(engine: ServedEngine, installed: MujocoModel) -> Figures:
+@dataclass(frozen=True, eq=False)
+class EngineReading:
     """What an engine makes of a file that the installed release has compiled.
 
-    Returns:
+    Attributes:
         engine: That read it.
         version: Of the engine.
         model: In the installed release's terms.
         shared: Names of the fields that both have.
         digest: Of what was read, by which a file that changed since then is seen.
+    """
+
+    engine: ServedEngine
+    version: str
+    model: MujocoModel
+    shared: frozenset[str]
+    digest: str
+
+
+def _opened(reading: EngineReading, edits: Mapping[str, Any], server: Server) -> int:
+    """Return the number that the model of a file with some fields edited has there."""
+    return _loaded(server, reading.model, edits, digest=reading.digest).number
+
+
+def _compiled(engine: ServedEngine, installed: MujocoModel) -> EngineReading:
+    """Let an engine read a file that the installed release has compiled.
 
     Raises:
         ModelError: It cannot read the file, or finds other parts in it.
+        EngineError: It cannot be run.
     """
     raw, path, title = copy.copy(installed.raw), installed.path, engine.title
     try:
         server = Server.of(engine)
-        answer, fields = _loaded(server, installed)
+        loaded = _loaded(server, installed)
     except AnswerError as error:
         raise ModelError(f"{title} cannot read {path}: {error}") from error
     except (LostError, OSError) as error:
         anew = f"; to make it anew: {engine.anew}" if is_release(engine.name) else ""
         raise EngineError(f"{title} cannot be run: {error}{anew}") from error
-    server.forgotten.append(answer["model"])
+    server.forgotten.append(loaded.number)
+    fields = loaded.fields
     for name in _SAME:
         if name in fields and int(fields[name]) != getattr(raw, name):
             raise ModelError(
                 f"{title} reads {path} as another robot: {name} is {int(fields[name])} there "
                 f"and {getattr(raw, name)} in MuJoCo {mujoco.__version__}"
             )
-    flags = answer.get("flags", {})
-    shared = set(flags)
-    for name in _fields(raw):
-        now = np.asarray(_field(raw, name))
-        if name in fields and fields[name].shape == now.shape:
-            shared.add(name)
-            if not name.endswith("type") and not np.array_equal(fields[name], now):
-                put(raw, name, fields[name] if now.ndim else fields[name].item())
-    for name, set_there in flags.items():
-        kinds = _FLAGS[name].__members__
-        names = [own for flag in set_there for own in child.SPLIT.get(flag, (flag,))]
-        setattr(*child.held(raw, name), sum(int(kinds[own]) for own in names if own in kinds))
+    shared = _take_over(raw, fields) | set(loaded.flags)
+    for name, set_there in loaded.flags.items():
+        _take_over_flags(raw, name, set_there)
     check_numbers(raw, f"{path} in {title}")
-    return Figures(
+    return EngineReading(
         engine=engine,
-        version=answer["version"],
+        version=loaded.version,
         model=MujocoModel(raw, path, installed.substeps),
         shared=frozenset(shared),
-        digest=answer["digest"],
+        digest=loaded.digest,
     )
+
+
+def _take_over(raw: mujoco.MjModel, fields: Arrays) -> set[str]:
+    """Write the numbers that an engine read into a compiled model; the fields that both have.
+
+    Args:
+        raw: The compiled model of the installed release.
+        fields: What the engine read, by name.
+    """
+    shared = set[str]()
+    for name in _fields(raw):
+        now = np.asarray(_field(raw, name))
+        if name not in fields or fields[name].shape != now.shape:
+            continue
+        shared.add(name)
+        if not name.endswith("type") and not np.array_equal(fields[name], now):
+            put(raw, name, fields[name] if now.ndim else fields[name].item())
+    return shared
+
+
+def _take_over_flags(raw: mujoco.MjModel, name: str, set_there: list[str]) -> None:
+    """Set the flags of a compiled model that are set in an engine.
+
+    Args:
+        raw: The compiled model of the installed release.
+        name: Of `_FLAGS`.
+        set_there: Names of the flags that are set in the engine.
+    """
+    kinds, bits = _FLAGS[name].__members__, 0
+    for flag in set_there:
+        for own in child.SPLIT.get(flag, (flag,)):
+            if own in kinds:
+                bits += int(kinds[own])
+    setattr(*child.held(raw, name), bits)
 
 
 def _loaded(
     server: Server, model: MujocoModel, edits: Mapping[str, Any] = _NO_EDITS, **digest: str
-) -> tuple[dict[str, Any], Arrays]:
+) -> LoadedModel:
     """Let an engine read the file of a model: as `Server.load`.
 
     Args:
@@ -182,7 +219,7 @@ def _field(raw: mujoco.MjModel, name: str) -> Any:
     return getattr(*child.held(raw, name))
 
 
-def _edits(reading: Figures, raw: mujoco.MjModel) -> dict[str, Any]:
+def _edits(reading: EngineReading, raw: mujoco.MjModel) -> dict[str, Any]:
     """Fields of a compiled model that are another than those of the file; flags by their names.
 
     Raises:
@@ -193,11 +230,8 @@ def _edits(reading: Figures, raw: mujoco.MjModel) -> dict[str, Any]:
         if np.array_equal(_field(raw, name), _field(base, name)):
             continue
         if name not in reading.shared:
-            raise unsupported(
-                SimpleNamespace(backend=reading.engine.name, capabilities=None),
-                name,
-                "it has no such field, or lays it out in a way of its own",
-            )
+            reason = "it has no such field, or lays it out in a way of its own"
+            raise unsupported_by(reading.engine.name, name, reason)
         kind = name.removeprefix("opt.").removesuffix("flags")
         edits[name] = child.flags_of(raw, kind) if name in _FLAGS else np.array(_field(raw, name))
     return edits
@@ -206,27 +240,22 @@ def _edits(reading: Figures, raw: mujoco.MjModel) -> dict[str, Any]:
 class ServedModel(HiddenModel):
     """What an engine in a Python of its own makes of a file, with what was edited in it."""
 
-    _reading: Figures
+    _reading: EngineReading
     _inner: MujocoModel
     _own: Capabilities | None
 
     def __init__(
         self,
-        reading: Figures,
+        reading: EngineReading,
         capabilities: Capabilities | None = None,
-        inner: Any = None,
+        inner: MujocoModel | None = None,
     ) -> None:
-        inner = inner or reading.model
+        inner = reading.model if inner is None else inner
         engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner
-        edits = _edits(reading, engine.raw)
+        opened = partial(_opened, reading, _edits(reading, engine.raw))
+        timestep = float(inner.raw.opt.timestep)
         super().__init__(
-            partial(
-                ServedWorld,
-                reading.engine,
-                partial(_opened, reading, edits),
-                inner.raw,
-                float(inner.raw.opt.timestep),
-            ),
+            partial(ServedWorld, reading.engine, opened, inner.raw, timestep),
             backend=reading.engine.name,
             engine_version=reading.version,
             raw=inner.raw,

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from ..installed import DEFAULT, require
 from ..interface import MOCAP, Array, Model
-from ..measures import ContactNames, overlaps
-from ..measures.text import few
 
 _PLACES = ("qpos", *MOCAP)
 _ROUNDING = 1e-9  # of what is copied from one engine to another
@@ -45,6 +43,8 @@ def overlap_warning(model: Model, places: Mapping[str, Array]) -> str:
     pairs = _overlaps(model, places)
     if not pairs:
         return ""
+    from ..measures.text import few
+
     state = _called(model, places)
     return f"{model.path.name}: shapes are inside each other in {state}: {few(pairs)}"
 
@@ -64,11 +64,17 @@ def places_in(model: Model, keyframe: int | str | None) -> dict[str, Array]:
 
 
 def _overlaps(model: Model, places: Mapping[str, Array]) -> list[str]:
+    """Return the shapes inside each other in a state, as `measures.overlaps` has them."""
     if model.compiled is None:
         return []
     from .compiled import contacts_in
 
-    return overlaps(ContactNames.of(model), *contacts_in(model.compiled, places))
+    geoms, distances = contacts_in(model.compiled, places)
+    if not (distances < 0).any():
+        return []
+    from ..measures import ContactNames, overlaps  # only what overlaps needs names
+
+    return overlaps(ContactNames.of(model), geoms, distances)
 
 
 def _called(model: Model, places: Mapping[str, Array]) -> str:

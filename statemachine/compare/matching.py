@@ -22,7 +22,6 @@ from ..engines.records import BodyPair, Counterparts, Pairs
 from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
 from ..interface import INPUTS, Array, Model, State
-from ..measures import ctrl_owners
 from ..rotations import HERE
 from ..runs import SideStart
 
@@ -135,6 +134,8 @@ def _ends(pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
 
 def _activations(actuators: Pairs, left: Any, right: Any) -> list[tuple[int, int]]:
     """Pairs of places in act."""
+    from ..backends.actuators import ctrl_owners
+
     owner = ctrl_owners(left), ctrl_owners(right)
     pairs: set[tuple[int, int]] = set()
     for a, b in actuators:

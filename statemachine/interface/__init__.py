@@ -14,13 +14,13 @@ A simulator is a state machine. A `Model` never changes; a `Data` holds all that
 
 from .data import Data
 from .model import Model
-from .options import OPTIONS
 from .records import (
     BEHAVIOURS,
     DERIVED,
     FORCES,
     INPUTS,
     MOCAP,
+    OPTIONS,
     PARTS,
     POSES,
     Array,

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NoReturn, cast
 from numpy.typing import ArrayLike
 
 from ..errors import ClosedDataError, DivergedError, ReadOnlyError, no_attribute
+from .checks import as_scalar, as_vector, check_writable
 from .model import Model
-from .options import as_scalar, as_vector, check_writable
 from .records import INPUTS, MOCAP, Array, Contacts, State, StateLayout, read_only
 from .turns import Closable, Turn, alone, refuse_unless_held
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadInputError, ReadOnlyError, no_attribute, unknown_name
-from .options import TINY, checked_options, index_of, unsupported, whole_number
+from .checks import TINY, index_of, unsupported, whole_number
 from .records import Array, Capabilities, Ints, JointType, Keyframe, Sizes, StateLayout, read_only
 
 
@@ -209,6 +209,8 @@ class Model(ABC):
             UnsupportedError: This backend has no such option.
             BadInputError: The value has the wrong shape, kind or size.
         """
+        from .options import checked_options
+
         checked = checked_options(self, options)
         return self._replace(checked)._started_as(self, checked)
 

@@ -54,6 +54,26 @@ class JointType(IntEnum):
         return {JointType.FREE: 6, JointType.BALL: 3}.get(self, 1)
 
 
+# What `Model.replace` can take, of any backend.
+OPTIONS = (
+    "actuation",
+    "gravity",
+    "timestep",
+    "substeps",
+    "contacts",
+    "armature",
+    "damping",
+    "frictionloss",
+    "mass",
+    "friction",
+    "kp",
+    "kv",
+    "latency",
+    "limits",
+    "integrator",
+    "max_qvel",
+)
+
 # The promises of the contract that a capability record speaks of, all of them.
 BEHAVIOURS = (
     "stale after a write",

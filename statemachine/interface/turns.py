@@ -23,7 +23,7 @@ from types import CodeType
 from typing import Any, Self, TypeVar
 
 from ..errors import BusyDataError, ClosedDataError
-from .options import kind_of
+from .checks import kind_of
 
 T = TypeVar("T")
 _ALL = weakref.WeakSet[Any]()  # what has a Turn

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from typing import Any
 
 from ..errors import BadInputError, ForeignDataError
+from .checks import as_count, check_entries, check_state, kind_of
 from .data import Data
 from .model import Model
-from .options import as_count, check_entries, check_state, kind_of
 from .records import INPUTS, MOCAP, State
 from .turns import HOLDERS, alone
 

@@ -19,8 +19,8 @@ from ..errors import (
     shown,
 )
 from ..processes import free_memory
+from .checks import HUGE, TINY, as_numbers, as_vector, check_entries, check_writable, whole_number
 from .model import Model
-from .options import HUGE, TINY, as_numbers, as_vector, check_entries, check_writable, whole_number
 from .records import (
     FORCES,
     INPUTS,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -39,7 +38,6 @@ __all__ = [
     "amount",
     "at_moments",
     "common_moments",
-    "ctrl_owners",
     "distances",
     "farthest",
     "joint_gap",
@@ -120,11 +118,6 @@ class Deviation:
         worst, row = largest(sizes)
         rms = float(np.sqrt(np.mean(sizes**2)))
         return cls(unit, worst, float(time[row]), rms, float(sizes[-1]))
-
-
-def ctrl_owners(compiled: Any) -> Ints:
-    """The actuator (nu,) of each number of ctrl of a compiled model; one may take several."""
-    return np.repeat(np.arange(compiled.nactuator), compiled.actuator_ctrlnum)
 
 
 @dataclass(frozen=True, eq=False)

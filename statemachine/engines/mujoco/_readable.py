@@ -15,7 +15,6 @@ import numpy as np
 from ...errors import ModelError
 from ...installed import require
 from ...interface import Array
-from ...measures import ctrl_owners
 from ..description.shapes import one_to_one
 from ..records import Counterparts, Edit, ModelDifference
 from ._geoms import Geoms
@@ -59,6 +58,8 @@ def readable(left: Any, right: Any, pairs: Counterparts) -> list[ModelDifference
 
 def _pairs_of_elements(sides: Sides) -> dict[str, Pairs]:
     """Return pairs of ids by kind of element; of geoms those that touch nothing, too."""
+    from ...backends.actuators import ctrl_owners
+
     owners = ctrl_owners(sides.left), ctrl_owners(sides.right)
     acting = Geoms(sides).pairs
     return {

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ...backends import HiddenData
 from ...engines import room, rooms_with
 from ...errors import MissingEngineError
 from ...installed import require
@@ -57,7 +58,7 @@ def hook(name: str, instead: Instead) -> Patch:
 
     def fault(patch: Patcher) -> None:
         _adapters()  # they define the kinds of Data
-        for kind in Data.__subclasses__():
+        for kind in {HiddenData, *Data.__subclasses__()}:
             patch.setattr(kind, name, replacement(vars(kind)[name]))
 
     return fault
@@ -142,7 +143,9 @@ def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Patc
         for adapter in _adapters():
             patch.setattr(adapter, "compile_file", changing(adapter.compile_file))
             patch.setattr(adapter, "facts", unharmed(copied(adapter.facts)))
-            patch.setattr(adapter, "edited", changing(unharmed(adapter.edited)))
+        from ...backends import _edits  # once there is an adapter: it needs MuJoCo
+
+        patch.setattr(_edits, "edited", changing(unharmed(_edits.edited)))
 
     return fault
 
