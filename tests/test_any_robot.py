@@ -196,7 +196,7 @@ def test_no_balance_is_drawn_while_the_rest_moves(model: Any) -> None:
     end = found.servos_on
     assert found.joint == "rail"
     assert abs(end.velocity) < 0.01  # stands on its rail, which swings
-    assert abs(end.forces["total"]) > 0.1
+    assert abs(end.forces.total) > 0.1
     assert page.holds
 
 

@@ -6,6 +6,7 @@ import hashlib
 import random
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import BadInputError, ModelError
 from statemachine.lessons import fingertip, in_turns, session
-from statemachine.lessons._falling import milestones, summed
+from statemachine.lessons._falling import Forces, milestones
 from statemachine.lessons.certificate import page
 from statemachine.lessons.fingertip import random_qpos
 from statemachine.models import models_dir
@@ -50,16 +51,17 @@ def test_milestones() -> None:
 
 
 def test_forces_sum_with_the_bias_on_the_other_side() -> None:
-    names = ("bias", "actuator", "passive", "friction", "contact", "limit", "equality")
-    forces: dict[str, float | None] = {name: k + 1.0 for k, name in enumerate(names)}
-    assert summed(forces)["total"] == 2 + 3 + 4 + 5 + 6 + 7 - 1
-    assert summed({**forces, "actuator": None})["total"] is None
+    forces = Forces(
+        bias=1.0, actuator=2.0, passive=3.0, friction=4.0, contact=5.0, limit=6.0, equality=7.0
+    )
+    assert forces.total == 2 + 3 + 4 + 5 + 6 + 7 - 1
+    assert replace(forces, actuator=None).total is None
 
 
 def test_gravity_is_read_at_the_moment_of_the_end(mujoco_scene: sm.Model) -> None:
     found = lesson_result("gravity", mujoco_scene, seconds=1.0)
     with opened(mujoco_scene, nstep=200, derived=True) as (_, data):
-        assert found.servos_on.forces["actuator"] == data.qfrc_actuator[1]
+        assert found.servos_on.forces.actuator == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()
     touch = found.servos_off.touches["gripper on floor (fixed_stud_1)"]
     with opened(mujoco_scene.replace(actuation=False)) as (limp, data):

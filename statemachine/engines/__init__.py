@@ -35,7 +35,9 @@ if TYPE_CHECKING:
         Counterparts,
         Dials,
         Edit,
+        LeftAlone,
         ModelDifference,
+        WayBack,
     )
 
 _ROOMS: dict[str, str] = {
@@ -120,34 +122,16 @@ class RawEngine:
         """
         return ()
 
-    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[Figures, ...]:
-        """A joint that nobody commands, after some time [s], on four freshly loaded models.
+    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
+        """Leave a joint alone for some time [s], on four freshly loaded models.
 
-        As it comes; with the model's gravity; without the engine's own motors too; and
-        without the damping of joints.
-
-        Returns:
-            label: What was done to the engine before.
-            time: Simulated time [s].
-            position: Of the joint then [rad; of a slide, m].
-            motor: What the engine's own motor exerts on it [N·m or N].
-            explicit: Largest h·D/M of the joint damping that the engine applies explicitly;
-                above 2 a joint gains speed from being damped.
-            gravity: Length of the gravity of a fresh world [m/s²].
-            widest: How far any joint of the robot is from zero then [rad or m].
-            turns: In how many steps the joint's velocity changed its sign.
-            steps: Of how many.
+        They are as the engine loads them; with the model's gravity; without the engine's own
+        motors too; and without the damping of joints.
         """
         return ()
 
-    def ways_back(self, model: Model) -> tuple[Figures, ...]:
-        """Which of the engine's own ways to go back to an earlier state is exact.
-
-        Returns:
-            name: What is done.
-            difference: Of the second future from the first: the largest of a coordinate; zero
-                means the same bits.
-        """
+    def ways_back(self, model: Model) -> tuple[WayBack, ...]:
+        """Try each of the engine's own ways to go back to an earlier state."""
         return ()
 
     def unlike_its_users(self, model: Model) -> list[str]:

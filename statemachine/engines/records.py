@@ -75,6 +75,48 @@ class Counterparts:
     solids: tuple[BodyPair, ...]
 
 
+@dataclass(frozen=True)
+class LeftAlone:
+    """A joint that nobody commands, after some time on a freshly loaded model.
+
+    Attributes:
+        label: What was done to the engine before.
+        time: Simulated time [s].
+        position: Of the joint then [rad; of a slide, m].
+        motor: What the engine's own motor exerts on it [N·m; on a slide, N].
+        explicit: Largest h·D/M of the joint damping that the engine applies explicitly; above 2 a
+            joint gains speed from being damped.
+        gravity: Length of the gravity of a fresh world [m/s²].
+        widest: How far any joint of the robot is from zero then [rad or m].
+        turns: In how many steps the joint's velocity changed its sign.
+        steps: Of how many.
+    """
+
+    label: str
+    time: float
+    position: float
+    motor: float
+    explicit: float
+    gravity: float
+    widest: float
+    turns: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class WayBack:
+    """A way back to an earlier state that was tried.
+
+    Attributes:
+        name: What was done.
+        difference: Of the second future from the first: the largest of a coordinate [rad, m or
+            part of a quaternion]; zero means the same bits.
+    """
+
+    name: str
+    difference: float
+
+
 # The figure of a difference that is the angle [rad] by which the second model's element is turned.
 TURNED = "turned by"
 

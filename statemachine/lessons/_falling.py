@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from ..errors import UnsupportedError
 from ..interface import Array, Data, forward
 from ..measures.text import NONE, position
-from ..page import Figures
 from ..runs.drive import steps_in
 from ..runs.robot import touching
 from ._robot import carried_by_joint, coordinate
@@ -21,52 +20,80 @@ _SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
 _STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
 _AT_REST = 1e-4  # the same; below it nothing of the model moves
 
-# The generalized forces on one joint at one moment [N·m; of a slide, N], by the names of
-# `qfrc_…`. "bias" is on the other side of the equation of motion, so that gravity acts as -bias;
-# a part that the engine does not yield is None. "total" is what is left over to accelerate the
-# joint, zero at rest; None if a part is missing.
-Forces = dict[str, float | None]
-PARTS = {
-    "actuator": "servo",
-    "passive": "springs, damping",
-    "friction": "dry friction",
-    "contact": "contact",
-    "limit": "joint limit",
-    "equality": "equality",
-}
+SERVO, EQUALITY = "servo", "equality"  # two of the parts, as a page calls them
+
+
+@dataclass(frozen=True)
+class Forces:
+    """The generalized forces on one joint at one moment [N·m; of a slide, N].
+
+    They have the names of `qfrc_…`. A part that the engine does not yield is None.
+
+    Attributes:
+        bias: Gravity and Coriolis forces. It is on the other side of the equation of motion, so
+            that gravity acts as -bias.
+        actuator: Of the servo.
+        passive: Of springs and damping.
+        friction: Of dry friction.
+        contact: Of contacts.
+        limit: Of the joint's limit.
+        equality: Of equality constraints.
+    """
+
+    bias: float | None = None
+    actuator: float | None = None
+    passive: float | None = None
+    friction: float | None = None
+    contact: float | None = None
+    limit: float | None = None
+    equality: float | None = None
+
+    def parts(self) -> dict[str, float | None]:
+        """Return all but the bias, by what a page calls them."""
+        return {
+            SERVO: self.actuator,
+            "springs, damping": self.passive,
+            "dry friction": self.friction,
+            "contact": self.contact,
+            "joint limit": self.limit,
+            EQUALITY: self.equality,
+        }
+
+    @property
+    def total(self) -> float | None:
+        """What is left over to accelerate the joint: zero at rest, None if a part is missing."""
+        parts = [part for part in self.parts().values() if part is not None]
+        if self.bias is None or len(parts) < len(self.parts()):
+            return None
+        return sum(parts) - self.bias
 
 
 def forces_on(data: Data, dof: int) -> Forces:
-    """Forces on a degree of freedom, of the moment that `data`'s derived arrays show."""
-    forces: Forces = {}
-    for name in ("bias", *PARTS):
+    """Read the forces on a degree of freedom, of the moment that the derived arrays show."""
+    forces: dict[str, float | None] = {}
+    for part in fields(Forces):
         try:
-            forces[name] = float(getattr(data, f"qfrc_{name}")[dof])
+            forces[part.name] = float(getattr(data, f"qfrc_{part.name}")[dof])
         except UnsupportedError:
-            forces[name] = None
-    return summed(forces)
+            forces[part.name] = None
+    return Forces(**forces)
 
 
-def summed(forces: Mapping[str, float | None]) -> Forces:
-    """The parts, and their "total"."""
-    parts, bias = [forces[name] for name in PARTS], forces["bias"]
-    known = [part for part in parts if part is not None]
-    total = None if bias is None or len(known) < len(parts) else sum(known) - bias
-    return {**forces, "total": total}
-
-
-class Droop(Figures):
+@dataclass(frozen=True)
+class Droop:
     """One run from the default pose under an untouched ctrl.
 
+    Of a run that the engine gave up there are only the first four; the rest is of the end.
+
     Attributes:
-        time: (n,) moments [s]; position: (n,) of the joint then [rad; of a slide, m]; NaN after
-            the engine diverged.
+        time: (n,) moments [s].
+        position: (n,) of the joint then [rad; of a slide, m]; NaN after the engine diverged.
         path: (steps + 1,) its position after each step.
-        diverged: When the engine gave up [s]; None if it did not. The rest is of the end, and
-            says nothing if it did.
+        diverged: When the engine gave up [s]; None if it did not.
         qpos: (nq,) of the model.
         forces: On the joint, after `forward`.
-        velocity, acceleration: Of the joint [rad/s, rad/s²; or with m].
+        velocity: Of the joint [rad/s or m/s].
+        acceleration: Of the joint [rad/s² or m/s²].
         most_acceleration: The largest of the whole model [rad/s² or m/s²].
         touches: When each contact of what the joint carries was first found [s]; the longer
             runs look at their end only.
@@ -74,8 +101,21 @@ class Droop(Figures):
         ctrl_untouched: Whether ctrl still is what it was at the start.
     """
 
+    time: Array
+    position: Array
+    path: Array
+    diverged: float | None = None
+    qpos: Array | None = None
+    forces: Forces = Forces()
+    velocity: float = np.nan
+    acceleration: float = np.nan
+    most_acceleration: float = np.nan
+    touches: dict[str, float] = field(default_factory=dict[str, float])
+    touching: Sequence[str] = ()
+    ctrl_untouched: bool = True
+
     def at(self, row: int, slide: bool, decimals: int = 2) -> str:
-        """A position of the joint as text; a slower engine's run may be shorter."""
+        """Return a position of the joint as text; a slower engine's run may be shorter."""
         if row >= len(self.position):
             return NONE
         value = float(self.position[row])
@@ -89,32 +129,28 @@ class Droop(Figures):
     @property
     def balanced(self) -> bool:
         """Whether the forces on the joint sum to zero, if nothing of the model moves."""
-        total = self.forces["total"]
+        total, bias = self.forces.total, self.forces.bias
         if self.moves or total is None or self.most_acceleration > _AT_REST:
             return True
-        largest_part = max(abs(part or 0.0) for part in self.forces.values())
+        parts = [total, bias, *self.forces.parts().values()]
+        largest_part = max(abs(part) for part in parts if part is not None)
         return abs(total) <= max(BALANCE, _SHARE * largest_part)
 
     @property
     def held_by(self) -> str:
         """The part that carries most of the load at the end."""
-        load = self.forces["bias"]
+        load = self.forces.bias
         if self.moves:
             return "still moves"
-        if load is None or self.forces["total"] is None:
+        if load is None or self.forces.total is None:
             return NONE
         if abs(load) < BALANCE:
             return "no load"
-        against = {name: (self.forces[name] or 0.0) * load for name in PARTS}
-        part = max(against, key=lambda name: against[name])
-        return PARTS[part] if against[part] > 0 else "nothing"
-
-
-# The rest of a run that ended so.
-_DIVERGED: dict[str, Any] = {
-    **{"qpos": None, "forces": {}, "touches": {}, "touching": (), "ctrl_untouched": True},
-    **dict.fromkeys(("velocity", "acceleration", "most_acceleration"), np.nan),
-}
+        against = {
+            name: part * load for name, part in self.forces.parts().items() if part is not None
+        }
+        strongest = max(against, key=lambda name: against[name])
+        return strongest if against[strongest] > 0 else "nothing"
 
 
 def droop(
@@ -126,10 +162,10 @@ def droop(
     touches: Iterable[tuple[float, Sequence[str]]] = (),
     diverged: float | None = None,
 ) -> Droop:
-    """What a run came to.
+    """Summarize a run.
 
     Args:
-        data: As it was left.
+        data: As the run left it.
         joint: That is watched.
         seconds: How long the run was to be.
         ctrl: (nu,) at its start.
@@ -142,29 +178,37 @@ def droop(
     rows = np.rint(time / model.timestep).astype(int)
     position = np.full(len(time), np.nan)
     position[rows < len(path)] = path[rows[rows < len(path)]]
-    ways = {"time": time, "position": position, "path": path, "diverged": diverged}
+    run = Droop(time, position, path, diverged)
     if diverged is not None:
-        return Droop(**ways, **_DIVERGED)
+        return run
     forward(model, data)
     pairs_at_end = touching(model, data.contacts, carried_by_joint(model, joint))
     first: dict[str, float] = {}
     for moment, pairs in (*touches, (data.time, pairs_at_end)):
-        first |= {pair: moment for pair in pairs if pair not in first}
-    return Droop(
-        **ways,
+        for pair in pairs:
+            first.setdefault(pair, moment)
+    return replace(
+        _with_dynamics(run, data, dof),
         qpos=data.qpos.copy(),
-        forces=forces_on(data, dof),
-        velocity=float(data.qvel[dof]),
-        acceleration=float(data.qacc[dof]),
-        most_acceleration=float(np.abs(data.qacc).max()),
         touches=first,
         touching=pairs_at_end,
         ctrl_untouched=np.array_equal(data.ctrl, ctrl),
     )
 
 
+def _with_dynamics(run: Droop, data: Data, dof: int) -> Droop:
+    """Add the forces on the joint at the end of a run, and how it moves there."""
+    return replace(
+        run,
+        forces=forces_on(data, dof),
+        velocity=float(data.qvel[dof]),
+        acceleration=float(data.qacc[dof]),
+        most_acceleration=float(np.abs(data.qacc).max()),
+    )
+
+
 def milestones(seconds: float) -> list[float]:
-    """Times worth a row of a table: 0, 1, 2, 3, 4, 10, 20, 30, 50, 100 …, and the end."""
+    """Return times worth a row of a table: 0, 1, 2, 3, 4, 10, 20, 30, 50, 100 …, and the end."""
     later = (part * 10.0**decade for decade in range(1, 8) for part in (1, 2, 3, 5))
     marks = (0.0, 1.0, 2.0, 3.0, 4.0, *later)
     return [mark for mark in marks if mark < seconds * (1 - 1e-9)] + [seconds]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from ..errors import BadInputError, check_name
 from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
 from ..measures.quantities import readings
 from ..measures.text import command
-from ..page import Figures
 from ..runs.robot import carried_by, farther, is_servo, load_at_start, scalar_joint, start_keyframe
 
 USUAL = "shoulder_lift"  # the arm's joint that lessons are about
@@ -20,13 +20,27 @@ _SHIFT = 0.05  # m; of a slide without a range, or up
 FINGERTIP = "gripperframe"
 
 
-def coordinate(model: Model, joint: str) -> Figures:
-    """The coordinate that a lesson watches of a joint: a hinge, a slide, the height of a free body.
+@dataclass(frozen=True)
+class Coordinate:
+    """The coordinate of a joint that a lesson watches.
 
-    Returns:
-        place, dof: Where it is in qpos and in qvel.
+    It is the position of a hinge [rad] or of a slide [m], or the height of a free body [m].
+
+    Attributes:
+        place: Its index in qpos.
+        dof: Its index in qvel.
         slide: Whether it is a length, and no angle.
-        slot: How it is typed.
+        slot: The index in qpos as it is typed.
+    """
+
+    place: int
+    dof: int
+    slide: bool
+    slot: str
+
+
+def coordinate(model: Model, joint: str) -> Coordinate:
+    """Return the coordinate that a lesson watches of a joint.
 
     Raises:
         UnknownNameError: There is no such joint.
@@ -40,18 +54,18 @@ def coordinate(model: Model, joint: str) -> Figures:
         slot += " + 2  # the height of a free body"
     else:
         place, dof = scalar_joint(model, joint)
-    return Figures(place=place, dof=dof, slide=kind is not JointType.HINGE, slot=slot)
+    return Coordinate(place, dof, slide=kind is not JointType.HINGE, slot=slot)
 
 
 def carried_by_joint(model: Model, joint: str) -> frozenset[int]:
-    """The bodies that a joint moves."""
+    """Return the bodies that a joint moves."""
     return carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
 
 
 def usual_joint(model: Model, servos: bool = False) -> str:
-    """The joint that a lesson takes where nobody names one; with `servos` one that has a servo.
+    """Choose the joint of a lesson where nobody names one; with `servos` one that has a servo.
 
-    shoulder_lift if there is one; else of the driven hinges and slides the one that takes the
+    It is shoulder_lift if there is one; else of the driven hinges and slides the one that takes the
     largest force to keep where it starts. Of a robot without any, a joint that nothing drives.
 
     Raises:
@@ -62,17 +76,19 @@ def usual_joint(model: Model, servos: bool = False) -> str:
     kinds, names = model.jnt_type, model.joint_names
     driven = model.actuator_jntid[is_servo(model)] if servos else model.actuator_jntid
     named = [j for j, name in enumerate(names) if name and kinds[j] != JointType.BALL]
-    scalar = [j for j in named if kinds[j] != JointType.FREE]
-    candidates = [j for j in scalar if j in driven] or scalar or named
-    if not candidates:
+    if not named:
         what = "names none of its joints" if model.njnt else "has no joints"
         raise BadInputError(f"{model.path.name} {what}, and this lesson is about one")
+    scalar = [j for j in named if kinds[j] != JointType.FREE]
+    candidates = [j for j in scalar if j in driven]
+    if not candidates:
+        candidates = scalar if scalar else named
     load = load_at_start(model)
     return names[max(candidates, key=lambda j: load[coordinate(model, names[j]).dof])]
 
 
 def usual_value(model: Model, joint: str) -> float:
-    """What a lesson writes into a joint where nobody says it [rad; of a length, m]."""
+    """Choose what a lesson writes into a joint where nobody says it [rad; of a length, m]."""
     at = coordinate(model, joint)
     number = model.joint_id(joint)
     low, high = (float(end) for end in model.jnt_range[number])
@@ -81,11 +97,14 @@ def usual_value(model: Model, joint: str) -> float:
         return _VALUE
     with make_data(model) as data:
         start = float(data.qpos[at.place])
-    value = farther(start, (low, high)) if limited and low < high else start + _SHIFT
+    value = start + _SHIFT
+    if limited and low < high:
+        value = farther(start, (low, high))
     return float(f"{value:.3g}")
 
 
-class Tip(NamedTuple):
+@dataclass(frozen=True)
+class Tip:
     """A place on a robot that is read: a site or a body.
 
     Attributes:
@@ -104,16 +123,16 @@ class Tip(NamedTuple):
 
     @property
     def array(self) -> str:
-        """Where its position is in a Data."""
+        """The array of a Data that has its position."""
         return "site_xpos" if self.kind == "site" else "xpos"
 
     def read(self, data: Data) -> Array:
-        """Where it is (3,) [m], by what was last computed."""
+        """Return its position (3,) [m], by what was last computed."""
         return np.array(getattr(data, self.array)[self.number])
 
 
 def tips_of(model: Model, name: str | None) -> list[Tip]:
-    """The places of a robot that are asked for.
+    """Return the places of a robot that are asked for.
 
     Args:
         model: The robot.
@@ -128,7 +147,9 @@ def tips_of(model: Model, name: str | None) -> list[Tip]:
 
     sites = labels("site", model.site_names)
     bodies = labels("body", model.body_names)
-    wanted = FINGERTIP if name is None and FINGERTIP in sites else name
+    wanted = name
+    if name is None and FINGERTIP in sites:
+        wanted = FINGERTIP
     if wanted is None:
         parents = set(model.body_parentid.tolist())
         moved = carried_by(model, model.jnt_bodyid.tolist())
@@ -146,18 +167,24 @@ def tips_of(model: Model, name: str | None) -> list[Tip]:
 
 
 def usual_tip(model: Model, joint: str) -> str:
-    """The fingertip if there is one; else the last site or body that a joint carries."""
+    """Choose the place that a lesson reads: the fingertip, or what a joint carries.
+
+    It is the site gripperframe if there is one. Else it is the last site that the joint carries,
+    or the last body that it carries, or the last body of all.
+
+    Raises:
+        BadInputError: None of them has a name.
+    """
     if FINGERTIP in model.site_names:
         return FINGERTIP
     carried = carried_by_joint(model, joint)
-    sites = list(zip(model.site_bodyid.tolist(), model.site_names, strict=True))
+    sites = zip(model.site_bodyid.tolist(), model.site_names, strict=True)
     bodies = list(enumerate(model.body_names))[1:]  # without the world
-    places = (
-        *bodies,
-        *((b, n) for b, n in bodies if b in carried),
-        *((b, n) for b, n in sites if b in carried),
-    )
-    names = [name for _, name in places if name]
+    names = [name for body, name in sites if name and body in carried]
+    if not names:
+        names = [name for body, name in bodies if name and body in carried]
+    if not names:
+        names = [name for _, name in bodies if name]
     if not names:
         raise BadInputError(
             f"{model.path.name} names no site and no body, and this lesson reads one"
@@ -166,7 +193,7 @@ def usual_tip(model: Model, joint: str) -> str:
 
 
 def with_joint(model: Model, options: Mapping[str, Any], servos: bool = False) -> dict[str, Any]:
-    """Options with a joint, if none is named, and with a value to write to it."""
+    """Complete options with a joint, if none is named, and with a value to write to it."""
     values = dict(options)
     if values["joint"] is None:
         values["joint"] = usual_joint(model, servos)
@@ -176,33 +203,37 @@ def with_joint(model: Model, options: Mapping[str, Any], servos: bool = False) -
 
 
 def start_line(model: Model, name: str) -> str:
-    """What is typed after make_data of a Model of some name, so that it starts at home."""
+    """Return what is typed after make_data of a Model of some name, so that it starts at home."""
     key = start_keyframe(model)
     return f"sm.reset({name}, data, keyframe={key!r})\n" if key else ""
 
 
 def read_stored(data: Data) -> dict[str, bytes]:
-    """The bytes of every input, and of the time."""
+    """Return the bytes of every input, and of the time."""
     return {name: np.array(getattr(data, name)).tobytes() for name in (*INPUTS, "time")}
 
 
 def read_derived(data: Data) -> dict[str, bytes]:
-    """The bytes of every derived array that this engine gives, contacts among them."""
-    return {
-        name: b"".join(getattr(value, part).tobytes() for part in ("geom", "dist", "pos", "force"))
-        if isinstance(value, Contacts)
-        else value.tobytes()
-        for name, value in readings(data).items()
-    }
+    """Return the bytes of every derived array that this engine gives, contacts among them."""
+    return {name: _bytes_of(value) for name, value in readings(data).items()}
+
+
+def _bytes_of(value: Array | Contacts) -> bytes:
+    """Return the bytes of an array, or those of all that is known of contacts."""
+    if isinstance(value, Contacts):
+        parts = (value.geom, value.dist, value.pos, value.force)
+        return b"".join(part.tobytes() for part in parts)
+    return value.tobytes()
 
 
 def check_servos(model: Model, lesson: str, joint: str | None = None) -> None:
     """Raise BadInputError for a model, or a joint, without a position servo."""
     servos = model.actuator_jntid[is_servo(model)]
-    if not servos.size or (joint is not None and model.joint_id(joint) not in servos):
+    has_servo = servos.size > 0 and (joint is None or model.joint_id(joint) in servos)
+    if not has_servo:
+        driven = model.path.name if joint is None else joint
         words = command([lesson, str(model.path)])
         raise BadInputError(
-            f"no position servo drives {joint or model.path.name}, and this lesson is about "
-            f"servos; without one: statemachine compare {words} (on one engine: trace record "
-            "instead of compare)"
+            f"no position servo drives {driven}, and this lesson is about servos; without one: "
+            f"statemachine compare {words} (on one engine: trace record instead of compare)"
         )

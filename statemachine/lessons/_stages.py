@@ -3,91 +3,162 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..engines import room
-from ..interface import INPUTS, Data, Model, forward, make_data, step
+from ..interface import INPUTS, Array, Data, Model, forward, make_data, step
 from ..measures.text import grouped
-from ..page import Figures, Pipeline, Table, Traces
+from ..page import Block, Pipeline, Table, Traces
 from ..probes import conventions
 from ..runs.drive import Progress
 from ..runs.robot import hold_ctrl
 from ._robot import Tip, read_derived, read_stored
-from .template import Results
 
 _STORED = (*INPUTS, "time")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
 
 
-def own_answers(model: Model, question: str) -> tuple[Figures, ...]:
-    """What the engine behind a Model that emulates some of the contract does itself, asked alone.
+@dataclass(frozen=True)
+class OwnAnswer:
+    """What an engine does itself, without this interface.
 
-    Returns:
-        The question, a part of it, and the answer.
+    Attributes:
+        question: Its name among those of `statemachine conventions`.
+        part: What part of the question it answers.
+        answer: In words.
     """
+
+    question: str
+    part: str
+    answer: str
+
+
+def own_answers(model: Model, question: str) -> list[OwnAnswer]:
+    """Ask the engine behind a Model, alone, if its backend emulates some of the contract."""
     if not room(model.backend).emulated:  # the interface is the engine's own
-        return ()
-    return tuple(
-        Figures(question=question, part=finding.of, answer=finding.answer)
-        for finding in conventions.ask(question, model.backend) or ()
-    )
+        return []
+    findings = conventions.ask(question, model.backend)
+    if findings is None:
+        return []
+    return [OwnAnswer(question, finding.of, finding.answer) for finding in findings]
 
 
-def changes_by_call(model: Model, place: int, value: float) -> tuple[Figures, ...]:
-    """Each array of a Data, and what changes it.
+@dataclass(frozen=True)
+class ArrayChange:
+    """An array of a Data, and what changed its bytes.
+
+    forward and step are called in two Data, each right after the same write to qpos.
+
+    Attributes:
+        name: Of the array.
+        stored: Whether it is stored; otherwise it is derived.
+        write: Whether the write changed it.
+        forward: Whether forward changed it.
+        step: Whether step changed it.
+        same: Whether forward and step left the same bits in it.
+    """
+
+    name: str
+    stored: bool
+    write: bool
+    forward: bool
+    step: bool
+    same: bool
+
+
+@dataclass(frozen=True)
+class _Readings:
+    """The bytes of each array of a Data, read at three moments of a run.
+
+    Attributes:
+        start: After a first forward.
+        written: After a write to qpos.
+        called: After the call that follows.
+    """
+
+    start: dict[str, bytes]
+    written: dict[str, bytes]
+    called: dict[str, bytes]
+
+    def write_changes(self, name: str) -> bool:
+        """Tell whether the write changed an array."""
+        return self.start[name] != self.written[name]
+
+    def call_changes(self, name: str) -> bool:
+        """Tell whether the call changed an array."""
+        return self.written[name] != self.called[name]
+
+
+def changes_by_call(model: Model, place: int, value: float) -> list[ArrayChange]:
+    """Compare the bytes of each array of a Data before and after a write, forward and step.
 
     Args:
         model: Of the lesson.
-        place: What is written in qpos; value: what is written there [rad or m].
-        value: See place.
-
-    Returns:
-        The name of each, whether it is stored, and whether its bytes changed: by a write to qpos,
-        by forward, by step. forward and step are called in two Data, each right after the same
-        write; `same` says whether they left the same bits.
+        place: Index in qpos that is written.
+        value: What is written there [rad or m].
     """
+    by_forward = _read_around(forward, model, place, value)
+    by_step = _read_around(step, model, place, value)
+    return [_change_of(name, by_forward, by_step) for name in by_forward.start]
 
-    def look(data: Data) -> dict[str, bytes]:
-        return read_stored(data) | read_derived(data)
 
-    looks: list[dict[str, bytes]] = []
-    for call in (forward, step):
-        with make_data(model) as data:
-            forward(model, data)
-            looks.append(look(data))
-            data.qpos[place] = value
-            looks.append(look(data))
-            call(model, data)
-            looks.append(look(data))
-    start, written, computed, _, before, stepped = looks
-    return tuple(
-        Figures(
-            name=name,
-            stored=name in _STORED,
-            write=start[name] != written[name],
-            forward=written[name] != computed[name],
-            step=before[name] != stepped[name],
-            same=computed[name] == stepped[name],
-        )
-        for name in start
+def _change_of(name: str, by_forward: _Readings, by_step: _Readings) -> ArrayChange:
+    """Compare the bytes of an array before and after a write, forward and step."""
+    return ArrayChange(
+        name=name,
+        stored=name in _STORED,
+        write=by_forward.write_changes(name),
+        forward=by_forward.call_changes(name),
+        step=by_step.call_changes(name),
+        same=by_forward.called[name] == by_step.called[name],
     )
 
 
-def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Figures:
-    """Compare what each step of a command leaves with a forward before it and one after it.
+def _read_around(
+    call: Callable[[Model, Data], None], model: Model, place: int, value: float
+) -> _Readings:
+    """Read every array of a new Data before a write to qpos, after it, and after a call."""
 
-    Returns:
+    def read(data: Data) -> dict[str, bytes]:
+        return read_stored(data) | read_derived(data)
+
+    with make_data(model) as data:
+        forward(model, data)
+        start = read(data)
+        data.qpos[place] = value
+        written = read(data)
+        call(model, data)
+        return _Readings(start, written, called=read(data))
+
+
+@dataclass(frozen=True)
+class Lag:
+    """How far what a step leaves in a Data is behind the state that the step ends in.
+
+    Attributes:
         time: (n,) of the state that each step started from [s].
         distance: (n,) between the fingertip that a step leaves, and the one that `forward`
             computes right after it [m].
         of_before: For each derived array, after how many of the steps it was bit for bit what
-            `forward` had computed before the step; of_after: what `forward` computes after it.
+            `forward` had computed before the step.
+        of_after: The same for what `forward` computes after it.
         array: Where the fingertip is read: `site_xpos`, or `xpos` of a body.
         neither: Whether the model's integrator leaves what is derived from a stage of its own.
     """
+
+    time: Array
+    distance: Array
+    of_before: dict[str, int]
+    of_after: dict[str, int]
+    array: str
+    neither: bool
+
+
+def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Lag:
+    """Compare what each step of a command leaves with a forward before it and one after it."""
     times: list[float] = []
     distances: list[float] = []
     of_before, of_after = Counter[str](), Counter[str]()
@@ -108,99 +179,85 @@ def lag_of_steps(model: Model, tip: Tip, steps: int, progress: Progress) -> Figu
             before = after
             if k % 50 == 0:
                 progress(k / steps)
-    return Figures(
+    stale_after_step = model.capabilities.behaviours["stale after a step"]
+    return Lag(
         time=np.array(times),
         distance=np.array(distances),
         of_before=dict(of_before),
         of_after=dict(of_after),
         array=tip.array,
-        neither=model.capabilities.behaviours["stale after a step"].support == "unsupported",
+        neither=stale_after_step.support == "unsupported",
     )
 
 
-def change_tables(results: Mapping[str, Sequence[Figures]]) -> list[Any]:
-    """Arrays whose bytes a write, forward and step changed, in groups that behave alike."""
+def change_tables(results: Mapping[str, Sequence[ArrayChange]]) -> list[Block]:
+    """Show the arrays that a write, forward and step changed, in groups that behave alike."""
+    engines_by_rows = grouped((_change_rows(changes), name) for name, changes in results.items())
+    tables: list[Block] = [
+        Table(
+            (", ".join(engines), "a write", "forward", "step"),
+            rows,
+            title="Whose bytes change, after a write to qpos[…] and then one call",
+            words=frozenset({0, 1, 2, 3}),
+        )
+        for rows, engines in engines_by_rows.items()
+    ]
     first = next(iter(results.values()))
-    tables = grouped((_change_rows(changes), name) for name, changes in results.items())
     stored = [change.name for change in first if change.stored]
     computed = [change.name for change in first if not change.stored and change.forward]
     moved = [change.name for change in first if change.stored and change.step]
-    return [
-        *(
-            Table(
-                (", ".join(names), "a write", "forward", "step"),
-                rows,
-                title="Whose bytes change, after a write to qpos[…] and then one call",
-                words=frozenset({0, 1, 2, 3}),
-            )
-            for rows, names in tables.items()
-        ),
-        Pipeline(
-            "What forward and step cover, as found by comparing bytes",
-            (("stored", stored), ("derived", computed), ("integrated", moved)),
-            (("forward", 0, 1), ("step", 0, 2)),
-        ),
-    ]
-
-
-def _change_rows(changes: Sequence[Figures]) -> tuple[tuple[str, ...], ...]:
-    """A row for the arrays that behave alike."""
-    groups = grouped(((c.stored, c.write, c.forward, c.step), c.name) for c in changes)
-    return tuple(
-        (
-            f"{'stored' if stored else 'derived'}: {', '.join(members)}",
-            *("changes" if flag else "–" for flag in flags),
-        )
-        for (stored, *flags), members in groups.items()
+    pipeline = Pipeline(
+        "What forward and step cover, as found by comparing bytes",
+        (("stored", stored), ("derived", computed), ("integrated", moved)),
+        (("forward", 0, 1), ("step", 0, 2)),
     )
+    return [*tables, pipeline]
 
 
-def lag_tables(results: Results) -> list[Any]:
-    """To which moment belongs what a step leaves behind, by backend."""
-    return [
-        Table(
-            (
-                "array",
-                *(f"{name}: {side} it" for name in results for side in ("before", "after")),
-            ),
-            [
-                (
-                    name,
-                    *(
-                        str(table.get(name, "–"))
-                        for lag in results.values()
-                        for table in (lag.of_before, lag.of_after)
-                    ),
-                )
-                for name in _MOMENTS
-            ],
-            title="Steps after which an array belongs to the state before the step, or after it",
-        ),
-        Traces(
-            "How far site_xpos is behind after each step",
-            "time [s]",
-            "distance [mm]",
-            {
-                name: (lag.time.tolist(), (lag.distance * 1e3).tolist())
-                for name, lag in results.items()
-            },
-        ),
-    ]
+def _change_rows(changes: Sequence[ArrayChange]) -> tuple[tuple[str, ...], ...]:
+    """Return a row for each group of arrays that behave alike."""
+    groups = grouped(((c.stored, c.write, c.forward, c.step), c.name) for c in changes)
+    rows: list[tuple[str, ...]] = []
+    for (stored, *changed), names in groups.items():
+        kind = "stored" if stored else "derived"
+        cells = ["changes" if flag else "–" for flag in changed]
+        rows.append((f"{kind}: {', '.join(names)}", *cells))
+    return tuple(rows)
 
 
-def own_tables(results: Mapping[str, Sequence[Figures]], question: str) -> list[Table]:
-    """What each engine does without us, where some of this is emulated."""
-    rows = {
-        name: [(f"a {question}", a.part, a.answer) for a in answers if a.question == question]
-        for name, answers in results.items()
+def lag_tables(lags: Mapping[str, Lag]) -> list[Block]:
+    """Show to which moment belongs what a step leaves behind, by backend."""
+    headers = ["array"]
+    for name in lags:
+        headers += [f"{name}: before it", f"{name}: after it"]
+    rows: list[list[str]] = []
+    for array in _MOMENTS:
+        row = [array]
+        for lag in lags.values():
+            row += [str(lag.of_before.get(array, "–")), str(lag.of_after.get(array, "–"))]
+        rows.append(row)
+    title = "Steps after which an array belongs to the state before the step, or after it"
+    curves = {
+        name: (lag.time.tolist(), (lag.distance * 1e3).tolist()) for name, lag in lags.items()
     }
     return [
-        Table(
-            ("after", "what", "is"),
-            asked,
-            title=f"{name} itself, without us (statemachine conventions {question})",
-            words=frozenset({0, 1, 2}),
-        )
-        for name, asked in rows.items()
-        if asked
+        Table(headers, rows, title),
+        Traces("How far site_xpos is behind after each step", "time [s]", "distance [mm]", curves),
     ]
+
+
+def own_tables(results: Mapping[str, Sequence[OwnAnswer]], question: str) -> list[Table]:
+    """Show what each engine does without us, where some of this is emulated."""
+    tables: list[Table] = []
+    for name, answers in results.items():
+        asked = [answer for answer in answers if answer.question == question]
+        if asked:
+            tables.append(
+                Table(
+                    ("after", "what", "is"),
+                    [(f"a {question}", answer.part, answer.answer) for answer in asked],
+                    title=f"{name} itself, without us (statemachine conventions {question})",
+                    words=frozenset({0, 1, 2}),
+                )
+            )
+    return tables

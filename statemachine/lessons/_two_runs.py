@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
+from ..engines.records import WayBack
 from ..interface import Array, Data, Model, get_state, make_data, reset, set_state, step
 from ..measures import largest
 from ..measures.text import millimetres
-from ..page import Figures, Table, Traces
+from ..page import Block, Table, Traces
 from .template import where
 
 BREAKS = ("extra-step", "late-ctrl")
@@ -18,84 +19,93 @@ _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 
 _SHORT = {"extra-step": "one step more", "late-ctrl": "late ctrl"}
 
 
-def broken(way: str, first: Array, second: Array) -> Figures:
-    """What became of a second run that was made to differ.
+@dataclass(frozen=True)
+class BrokenRun:
+    """A second run that was made to differ from the first.
+
+    Attributes:
+        way: How, one of `BREAKS`.
+        close: Whether `np.allclose` calls the ends equal.
+        peak: The largest |qpos difference| on the way [rad, m or part of a quaternion].
+        peak_step: After which step.
+        end: The same at the end.
+    """
+
+    way: str
+    close: bool
+    peak: float
+    peak_step: int
+    end: float
+
+
+def broken(way: str, first: Array, second: Array) -> BrokenRun:
+    """Compare a run with a second one that was made to differ.
 
     Args:
         way: One of `BREAKS`.
         first: Qpos after each step (n+1, nq) of the run as it is.
         second: Of the other.
-
-    Returns:
-        close: Whether `np.allclose` calls the ends equal.
-        peak, peak_step: The largest |qpos difference| on the way, and after which step.
-        end: That at the end.
     """
     gap = np.abs(first - second).max(axis=1)
-    peak, step = largest(gap)
-    return Figures(
-        way=way,
-        close=bool(np.allclose(first[-1], second[-1])),
-        peak=peak,
-        peak_step=step,
-        end=float(gap[-1]),
+    peak, peak_step = largest(gap)
+    close = bool(np.allclose(first[-1], second[-1]))
+    return BrokenRun(way, close, peak, peak_step, end=float(gap[-1]))
+
+
+def broken_table(results: Mapping[str, Sequence[BrokenRun]]) -> list[Table]:
+    """Show what became of the second runs that were made to differ, by backend."""
+    rows: list[tuple[str, ...]] = []
+    for name, runs in results.items():
+        prefix = where(results, name)
+        rows += [_broken_row(prefix, run) for run in runs]
+    if not rows:
+        return []
+    headers = ("broken on purpose", "largest", "at the end", "allclose", "array_equal")
+    return [Table(headers, rows, "And if the second run is made to differ by one step")]
+
+
+def _broken_row(prefix: str, run: BrokenRun) -> tuple[str, ...]:
+    """Return the cells of a run."""
+    return (
+        f"{prefix}{_SHORT[run.way]}",
+        f"{run.peak:.1e}, step {run.peak_step}",
+        f"{run.end:.1e}",
+        "equal" if run.close else "not equal",
+        "not equal" if run.end else "equal",
     )
 
 
-def broken_table(results: Mapping[str, Sequence[Figures]]) -> list[Table]:
-    """What became of the second runs that were made to differ, by backend."""
-    rows = [
-        (
-            f"{where(results, name)}{_SHORT[run.way]}",
-            f"{run.peak:.1e}, step {run.peak_step}",
-            f"{run.end:.1e}",
-            "equal" if run.close else "not equal",
-            "not equal" if run.end else "equal",
-        )
-        for name, runs in results.items()
-        for run in runs
-    ]
-    headers = ("broken on purpose", "largest", "at the end", "allclose", "array_equal")
-    title = "And if the second run is made to differ by one step"
-    return [Table(headers, rows, title)] if rows else []
-
-
-def growth(differences: Mapping[str, Array], bodies: Mapping[str, Array | None]) -> list[Any]:
-    """The difference after some of the steps, and after all of them as curves.
+def growth(differences: Mapping[str, Array], bodies: Mapping[str, Array | None]) -> list[Block]:
+    """Show the difference after some of the steps, and after all of them as curves.
 
     Args:
         differences: By backend, the largest |qpos difference| after each step (n+1,).
         bodies: By backend, the distance of the free body's positions (n+1,) [m], if there is one.
     """
     nstep = len(next(iter(differences.values()))) - 1
-    shown = [step for step in _STEPS if step < nstep] + [nstep]
-    columns = {"after step": list(map(str, shown))}
+    steps = [step for step in _STEPS if step < nstep] + [nstep]
+    columns = {"after step": [str(step) for step in steps]}
     for name, difference in differences.items():
         prefix, distance = where(differences, name), bodies[name]
-        columns[f"{prefix}|Δqpos|"] = [f"{difference[step]:.1e}" for step in shown]
+        columns[f"{prefix}|Δqpos|"] = [f"{difference[step]:.1e}" for step in steps]
         if distance is not None:
-            columns[f"{prefix}free body"] = [millimetres(distance[step], 4) for step in shown]
+            columns[f"{prefix}free body"] = [millimetres(distance[step], 4) for step in steps]
     title = "How far the two runs are apart"
-    curves = {
-        name: (list(range(nstep + 1)), difference.tolist())
-        for name, difference in differences.items()
-    }
+    every_step = list(range(nstep + 1))
+    curves = {name: (every_step, gap.tolist()) for name, gap in differences.items()}
     return [
         Table(tuple(columns), list(zip(*columns.values(), strict=True)), title),
         Traces(title, "step", "largest |Δqpos|", curves, log=True),
     ]
 
 
-def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[Figures, ...]:
+def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...]:
     """Go back in each way that the interface has, and compare the futures.
 
     Args:
         model: Started from keyframe 0.
         ctrl: The command (nu,).
         steps: How many before and after the moment to which some ways go back.
-
-    Returns:
-        As `RawEngine.ways_back`.
     """
     key = 0 if model.keyframes else None
 
@@ -104,15 +114,12 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[Figures, ...
         data.ctrl = ctrl
 
     def go_on(data: Data, nstep: int = steps) -> Array:
-        """Qpos (nstep, nq) after each step."""
-        rows = []
+        """Step; return qpos (nstep, nq) after each step."""
+        rows: list[Array] = []
         for _ in range(nstep):
             step(model, data)
             rows.append(data.qpos.copy())
         return np.array(rows)
-
-    def largest_difference(first: Array, second: Array) -> float:
-        return float(np.abs(first - second).max(initial=0.0))
 
     with make_data(model) as data, make_data(model) as new, make_data(model) as written:
         start(data)
@@ -133,32 +140,39 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[Figures, ...
         for name, array in arrays.items():
             setattr(written, name, array)
         put_back = go_on(written)
-    return (
-        Figures(name="reset to the keyframe", difference=largest_difference(anew, first)),
-        Figures(name="a new Data, same keyframe", difference=largest_difference(again, first)),
-        Figures(name="set_state, against going on", difference=largest_difference(once, rest)),
-        Figures(name="set_state, done twice", difference=largest_difference(twice, once)),
-        Figures(name="qpos, qvel, ctrl put back", difference=largest_difference(put_back, rest)),
+    futures = {
+        "reset to the keyframe": (anew, first),
+        "a new Data, same keyframe": (again, first),
+        "set_state, against going on": (once, rest),
+        "set_state, done twice": (twice, once),
+        "qpos, qvel, ctrl put back": (put_back, rest),
+    }
+    return tuple(
+        WayBack(name, difference=float(np.abs(second - first).max(initial=0.0)))
+        for name, (second, first) in futures.items()
     )
 
 
-def through_us(results: Mapping[str, Sequence[Figures]]) -> Table:
-    """What the ways of this interface lead to, by backend."""
-    rows = zip(*results.values(), strict=True)
-    return Table(
-        ("", *results),
-        [(ways[0].name, *(_exactly(way.difference) for way in ways)) for ways in rows],
-        title="Ways to go back to an earlier state. The next 100 steps are then …",
-    )
+def through_us(results: Mapping[str, Sequence[WayBack]]) -> Table:
+    """Show what the ways of this interface lead to, by backend."""
+    rows: list[tuple[str, ...]] = []
+    for ways in zip(*results.values(), strict=True):
+        cells = [_exactly(way.difference) for way in ways]
+        rows.append((ways[0].name, *cells))
+    title = "Ways to go back to an earlier state. The next 100 steps are then …"
+    return Table(("", *results), rows, title)
 
 
-def of_its_own(results: Mapping[str, Sequence[Figures]]) -> list[Table]:
-    """What the engines' own ways lead to, where they were tried."""
+def of_its_own(results: Mapping[str, Sequence[WayBack]]) -> list[Table]:
+    """Show what the engines' own ways lead to, where they were tried."""
     return [
-        Table(
-            (f"{name} itself", "what follows is …"),
-            [(way.name, _exactly(way.difference)) for way in ways],
-            title=f"The ways back that {name}'s own users have, tried on it alone",
+        Table.of(
+            ways,
+            {
+                f"{name} itself": lambda way: way.name,
+                "what follows is …": lambda way: _exactly(way.difference),
+            },
+            f"The ways back that {name}'s own users have, tried on it alone",
         )
         for name, ways in results.items()
         if ways

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..interface import Model
+from ..interface import Array, Model
 from ..interface.options import as_scalar
 from ..measures import largest
 from ..measures.text import count, millimetres, short_time, vector
-from ..page import Figures, Table
+from ..page import Block, Table
 from ..runs.drive import Progress, steps_in
-from ..runs.header import provenance
+from ..runs.header import Provenance, provenance
 from ._robot import coordinate, tips_of, usual_tip, with_joint
 from ._stages import (
+    ArrayChange,
+    Lag,
+    OwnAnswer,
     change_tables,
     changes_by_call,
     lag_of_steps,
@@ -26,7 +31,7 @@ from ._stages import (
     own_tables,
 )
 from .session import CodeRun, Options
-from .template import Results, differences, emulated
+from .template import Blocks, Results, differences, emulated
 
 _SECONDS = 2.0  # under a command, long enough to touch something
 _INSIDE = 1e-3  # metres; less is how engines press things together
@@ -34,8 +39,56 @@ _Pairs = tuple[tuple[int, int], ...]
 _CHOICES: dict[_Pairs, int] = {((0, 1),): 0, ((1, 2),): 1, ((2, 3),): 2, ((1, 3),): 3}
 
 
+@dataclass(frozen=True)
+class Reading:
+    """The fingertip, read once.
+
+    Attributes:
+        after: What had been done before.
+        fingertip: (3,) its position [m].
+        time: Of the Data [s].
+    """
+
+    after: str
+    fingertip: Array
+    time: float
+
+
+@dataclass(frozen=True)
+class ForwardResult:
+    """Four readings of the fingertip around a write, and what else was asked for.
+
+    Attributes:
+        joint: The joint that was written.
+        site: What is read: the fingertip, or another site or body.
+        value: What was written [rad; of a slide or a height, m].
+        readings: Of the fingertip, at each print.
+        equal: Pairs (i, j), i < j, of readings that are equal bit by bit.
+        moved: Distance that the write and the second `forward` moved it [m].
+        contacts: How many were found after the second `forward`.
+        deepest: How far the two surfaces of the worst of them are inside each other [m].
+        itself: What the engine does without us, where some of this is emulated.
+        changes: What each call changes, if that was asked for.
+        lag: Of which moment derived values are after a step, if that was asked for.
+        provenance: What it was computed with.
+    """
+
+    joint: str
+    site: str
+    value: float
+    readings: tuple[Reading, ...]
+    equal: _Pairs
+    moved: float
+    contacts: int
+    deepest: float
+    itself: tuple[OwnAnswer, ...]
+    changes: tuple[ArrayChange, ...]
+    lag: Lag | None
+    provenance: Provenance
+
+
 def fit(model: Model, options: Options) -> dict[str, Any]:
-    """A joint of this robot, a value in its range, and what the joint carries."""
+    """Complete the options with a joint, a value in its range, and a place that it carries."""
     values = with_joint(model, options)
     if values["site"] is None:
         values["site"] = usual_tip(model, values["joint"])
@@ -43,7 +96,7 @@ def fit(model: Model, options: Options) -> dict[str, Any]:
 
 
 def code(model: Model, options: Options, load: str) -> str:
-    """The four readings."""
+    """Write the four readings."""
     slot = coordinate(model, options["joint"]).slot  # or says what is wrong with it
     tip = tips_of(model, options["site"])[0]
     read = f"data.{tip.array}[tip]"
@@ -65,89 +118,99 @@ print(4, {read}.round(4))
 """
 
 
-def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
-    """Read the fingertip at each print; then what else was asked for.
-
-    Returns:
-        joint, value: What was written, and where.
-        site: What is read: the fingertip, or another site or body.
-        readings: Of each what had been done after, the fingertip (3,) [m], and the time [s].
-        equal: Pairs (i, j), i < j, of readings that are equal bit by bit.
-        moved: Distance [m] that the write and the second `forward` moved it.
-        contacts: How many were found after the second `forward`; deepest: how far the two
-            surfaces of the worst of them are inside each other [m].
-        itself: What the engine does without us, where some of this is emulated.
-        changes: What each call changes, and lag: of which moment derived values are after a
-            step; of these two and of `itself` what was asked for.
-    """
-    model, joint, value = play.model, options["joint"], options["value"]
-    place, tip = coordinate(model, joint).place, tips_of(model, options["site"])[0]
+def run(play: CodeRun, options: Options, progress: Progress) -> ForwardResult:
+    """Read the fingertip at each print; then what else was asked for."""
+    model, joint, site, value = play.model, options["joint"], options["site"], options["value"]
+    place, tip = coordinate(model, joint).place, tips_of(model, site)[0]
     steps = _steps(model, options)
-    read = [
-        (tip.read(play.names["data"]), play.names["data"].time)
-        for source in play.lines()
-        if source.startswith("print(")
-    ]
+    actions = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
+    readings: list[Reading] = []
+    for source in play.lines():
+        if source.startswith("print("):
+            data = play.names["data"]
+            readings.append(Reading(actions[len(readings)], tip.read(data), data.time))
     contacts = play.names["data"].contacts
-    labels = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
-    places = [place for place, _ in read]
-    asked = ["write"] * options["arrays"] + ["step"] * bool(steps)
-    return Figures(
+    deepest = max(0.0, -float(contacts.dist.min(initial=0.0)))
+    moved = float(np.linalg.norm(readings[3].fingertip - readings[2].fingertip))
+    itself: list[OwnAnswer] = []
+    changes: list[ArrayChange] = []
+    if options["arrays"]:
+        itself += own_answers(model, "write")
+        changes += changes_by_call(model, place, value)
+    if steps:
+        itself += own_answers(model, "step")
+    lag = lag_of_steps(model, tip, steps, progress) if steps else None
+    return ForwardResult(
         joint=joint,
-        site=options["site"],
+        site=site,
         value=value,
-        readings=tuple(
-            Figures(after=label, fingertip=place, time=time)
-            for label, (place, time) in zip(labels, read, strict=True)
-        ),
-        equal=tuple(
-            (i, j)
-            for i, j in itertools.combinations(range(len(places)), 2)
-            if np.array_equal(places[i], places[j])
-        ),
-        moved=float(np.linalg.norm(places[3] - places[2])),
+        readings=tuple(readings),
+        equal=_equal_pairs(readings),
+        moved=moved,
         contacts=len(contacts),
-        deepest=max(0.0, -float(contacts.dist.min(initial=0.0))),
-        itself=tuple(answer for question in asked for answer in own_answers(model, question)),
-        changes=changes_by_call(model, place, value) if options["arrays"] else (),
-        lag=lag_of_steps(model, tip, steps, progress) if steps else None,
+        deepest=deepest,
+        itself=tuple(itself),
+        changes=tuple(changes),
+        lag=lag,
         provenance=provenance(model),
     )
 
 
+def _equal_pairs(readings: Sequence[Reading]) -> _Pairs:
+    """Return the pairs of readings that are equal bit by bit."""
+    pairs: list[tuple[int, int]] = []
+    for (i, one), (j, other) in itertools.combinations(enumerate(readings), 2):
+        if np.array_equal(one.fingertip, other.fingertip):
+            pairs.append((i, j))
+    return tuple(pairs)
+
+
 def _steps(model: Model, options: Options) -> int:
-    """Over how many steps to look at the lag; 0 if it is not asked for."""
-    seconds = _SECONDS if options["lag"] and options["seconds"] is None else options["seconds"]
+    """Return over how many steps to look at the lag; 0 if it is not asked for."""
+    seconds = options["seconds"]
+    if seconds is None and options["lag"]:
+        seconds = _SECONDS
     return 0 if seconds is None else steps_in(model, seconds)
 
 
-def slots(result: Figures) -> dict[str, Any]:
-    """What the page says."""
-    derived = [change for change in result.changes if not change.stored]
-    same = [change.name for change in derived if change.same]
-    said: dict[str, Any] = {
-        "right": _CHOICES.get(result.equal),
-        "zero_at_first": not any(result.readings[0].fingertip),
-        "unchanged": (1, 2) in result.equal,
-        "moved": millimetres(result.moved, 1),
-        "moves": result.moved > 0,
-        "no_time_passed": len({reading.time for reading in result.readings}) == 1,
-        "inside": result.deepest > _INSIDE,
-        "contacts": count(result.contacts, "contact"),
-        "deepest": millimetres(result.deepest, 1),
-        "emulated": emulated(
-            result, "zeros when fresh", "stale after a write", "stale after a step"
-        ),
-        "arrays": bool(result.changes),
+def slots(result: ForwardResult) -> dict[str, Any]:
+    """Fill the slots of the page."""
+    slots: dict[str, Any] = {}
+    slots["right"] = _CHOICES.get(result.equal)
+    slots["zero_at_first"] = not result.readings[0].fingertip.any()
+    slots["unchanged"] = (1, 2) in result.equal
+    slots["moved"] = millimetres(result.moved, 1)
+    slots["moves"] = result.moved > 0
+    slots["no_time_passed"] = len({reading.time for reading in result.readings}) == 1
+    slots["inside"] = result.deepest > _INSIDE
+    slots["contacts"] = count(result.contacts, "contact")
+    slots["deepest"] = millimetres(result.deepest, 1)
+    slots["emulated"] = emulated(
+        result, "zeros when fresh", "stale after a write", "stale after a step"
+    )
+    return slots | _slots_of_changes(result.changes) | _slots_of_lag(result.lag)
+
+
+def _slots_of_changes(changes: Sequence[ArrayChange]) -> dict[str, Any]:
+    """Fill the slots about the arrays that each call changes."""
+    derived = [change for change in changes if not change.stored]
+    same = {change.name for change in derived if change.same}
+    return {
+        "arrays": len(changes) > 0,
         "derived": len(derived),
         "same": len(same),
-        "places_are_same": {"xpos", "xquat", "site_xpos", "site_xmat"} <= set(same),
+        "places_are_same": {"xpos", "xquat", "site_xpos", "site_xmat"} <= same,
     }
-    if result.lag is None:
-        return said
-    lag, steps = result.lag, len(result.lag.time)
+
+
+def _slots_of_lag(lag: Lag | None) -> dict[str, Any]:
+    """Fill the slots about what a step leaves behind."""
+    if lag is None:
+        return {"lag": False}
+    steps = len(lag.time)
     worst, step = largest(lag.distance)
-    return said | {
+    return {
+        "lag": True,
         "lags": worst > 0 and not lag.neither,
         "steps": count(steps, "step"),
         "of_before": lag.of_before[lag.array] == steps > lag.of_after[lag.array],
@@ -157,39 +220,45 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Results, first: Figures) -> dict[str, Any]:
-    """The four readings; then what was asked for."""
-    digits = 3 if len(results) > 1 else 4  # so that two columns fit
-    readings = Table(
-        ("", "after", *(f"{name} [m]" for name in results), "data.time"),
-        [
-            (
-                str(i + 1),
-                reading.after,
-                *(vector(r.readings[i].fingertip, digits) for r in results.values()),
-                f"{reading.time:g} s",
-            )
-            for i, reading in enumerate(first.readings)
-        ],
-        title=f"{first.site}, read four times",
-        words=frozenset({0, 1}),
-        emphasis=frozenset(i for result in results.values() for pair in result.equal for i in pair),
-    )
+def tables(results: Results[ForwardResult], first: ForwardResult) -> Blocks:
+    """Show the four readings; then what was asked for."""
     answers = {name: result.itself for name, result in results.items()}
     changes = {name: result.changes for name, result in results.items()}
-    lags = {name: result.lag for name, result in results.items() if result.lag}
-    return {
-        "readings": readings,
-        "differences": differences(
-            results, {f"{first.site}, reading {k + 1}": partial(_apart, k) for k in range(4)}
-        ),
-        "changes": change_tables(changes) if first.changes else [],
-        "own_write": own_tables(answers, "write"),
-        "lag_tables": lag_tables(lags) if lags else [],
-        "own_step": own_tables(answers, "step"),
-    }
+    lags = {name: result.lag for name, result in results.items() if result.lag is not None}
+    rows: dict[str, Callable[[ForwardResult, ForwardResult], str]] = {}
+    for k in range(len(first.readings)):
+        rows[f"{first.site}, reading {k + 1}"] = partial(_apart, k)
+    blocks: dict[str, Table | Sequence[Block]] = {}
+    blocks["readings"] = _readings(results, first)
+    blocks["differences"] = differences(results, rows)
+    blocks["changes"] = change_tables(changes) if first.changes else []
+    blocks["own_write"] = own_tables(answers, "write")
+    blocks["lag_tables"] = lag_tables(lags) if lags else []
+    blocks["own_step"] = own_tables(answers, "step")
+    return blocks
 
 
-def _apart(reading: int, left: Figures, right: Figures) -> str:
+def _readings(results: Results[ForwardResult], first: ForwardResult) -> Table:
+    """Show the four readings; those that are equal to another are set off."""
+    decimals = 3 if len(results) > 1 else 4  # so that two columns fit
+    rows: list[tuple[str, ...]] = []
+    for k, reading in enumerate(first.readings):
+        cells = [vector(each.readings[k].fingertip, decimals) for each in results.values()]
+        rows.append((str(k + 1), reading.after, *cells, f"{reading.time:g} s"))
+    equal: set[int] = set()
+    for result in results.values():
+        equal.update(*result.equal)
+    columns = [f"{name} [m]" for name in results]
+    return Table(
+        ("", "after", *columns, "data.time"),
+        rows,
+        title=f"{first.site}, read four times",
+        words=frozenset({0, 1}),
+        emphasis=frozenset(equal),
+    )
+
+
+def _apart(reading: int, left: ForwardResult, right: ForwardResult) -> str:
+    """Return how far a reading on one engine is from that on another."""
     gap = math.dist(left.readings[reading].fingertip, right.readings[reading].fingertip)
     return f"{gap:.1e} m"

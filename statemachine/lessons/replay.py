@@ -3,24 +3,126 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..engines import room
+from ..engines.records import WayBack
 from ..errors import BadInputError, UnsupportedError, check_name
-from ..interface import Array, JointType, Model, get_state
+from ..interface import Array, Ints, JointType, Model, get_state
 from ..interface.options import as_count
 from ..measures import largest
 from ..measures.text import count, degrees, millimetres
-from ..page import Figures
+from ..page import Block, Table
 from ..runs.drive import Progress, part_of
-from ..runs.header import provenance
+from ..runs.header import Provenance, provenance
 from ..runs.robot import body_pairs, command, is_the_arm
-from ._two_runs import BREAKS, broken, broken_table, growth, of_its_own, through_us, ways_back
+from ._two_runs import (
+    BREAKS,
+    BrokenRun,
+    broken,
+    broken_table,
+    growth,
+    of_its_own,
+    through_us,
+    ways_back,
+)
 from .session import CodeRun, Options
-from .template import Results, by_engine, differences
+from .template import Blocks, Results, by_engine, differences
+
+
+@dataclass(frozen=True)
+class FinerRuns:
+    """The same two runs with half the timestep.
+
+    Attributes:
+        timestep: That timestep [s].
+        identical: Whether the two end in the same bits.
+        difference: The largest |qpos difference| of their end to that of the usual timestep
+            [rad, m or part of a quaternion].
+    """
+
+    timestep: float
+    identical: bool
+    difference: float
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """Two runs of n steps from the same start under the same commands, compared.
+
+    Attributes:
+        ctrl: (nu,) the command of both runs [unit of the actuators].
+        broken_by: How the second run was made to differ, one of `BREAKS`; None if it was not.
+        first_run: (n+1, nq) qpos of the first run.
+        second_run: (n+1, nq) qpos of the second run.
+        hinges: Where in qpos the hinges are.
+        free: Where in qpos a free body's position is; None without one.
+        contacts: (n,) contacts that each step of the first run found.
+        pairs: For each pair of bodies, in how many steps it touched.
+        keyframe: Name of the keyframe, its time was set to zero; None for the default state.
+        state: What a State of this engine holds.
+        ways: Ways to go back through this interface, tried.
+        own_ways: The engine's own ways, tried on the raw engine where that differs.
+        provenance: What it was computed with.
+        breaks: Second runs that were made to differ, if this one was not.
+        finer: The same with half the timestep; None where the backend cannot set it, and of a
+            second run that was made to differ.
+    """
+
+    ctrl: Array
+    broken_by: str | None
+    first_run: Array = field(metadata={"json": False})
+    second_run: Array = field(metadata={"json": False})
+    hinges: tuple[int, ...]
+    free: tuple[int, int, int] | None
+    contacts: Ints
+    pairs: Mapping[str, int]
+    keyframe: str | None
+    state: tuple[str, ...]
+    ways: tuple[WayBack, ...]
+    own_ways: tuple[WayBack, ...]
+    provenance: Provenance
+    breaks: tuple[BrokenRun, ...] = ()
+    finer: FinerRuns | None = None
+
+    @property
+    def qpos(self) -> Array:
+        """(nq,) at the end of the first run."""
+        return self.first_run[-1]
+
+    @property
+    def identical(self) -> bool:
+        """Whether the last qpos are equal, by `np.array_equal`."""
+        return bool(np.array_equal(self.first_run[-1], self.second_run[-1]))
+
+    @property
+    def close(self) -> bool:
+        """Whether `np.allclose` calls them equal."""
+        return bool(np.allclose(self.first_run[-1], self.second_run[-1]))
+
+    @property
+    def difference(self) -> Array:
+        """(n+1,) largest |qpos difference| after each step [rad, m or part of a quaternion]."""
+        return np.abs(self.first_run - self.second_run).max(axis=1)
+
+    @property
+    def apart(self) -> Array | None:
+        """(n+1,) distance of the free body's positions in the two runs [m]; None without one."""
+        if self.free is None:
+            return None
+        gap = self.first_run - self.second_run
+        return np.linalg.norm(gap[:, list(self.free)], axis=1)
+
+    @property
+    def travel(self) -> float:
+        """Largest movement of a hinge in the first run [rad]."""
+        hinges = self.first_run[:, list(self.hinges)]
+        return float(np.ptp(hinges, axis=0).max(initial=0.0))
 
 
 def fit(model: Model, options: Options) -> dict[str, Any]:
@@ -35,7 +137,7 @@ def fit(model: Model, options: Options) -> dict[str, Any]:
 
 
 def code(model: Model, options: Options, load: str) -> str:
-    """Two runs from the keyframe, compared.
+    """Write two runs from the keyframe, compared.
 
     With a way to break them, the second run differs: "extra-step" takes one step more before
     the count begins, "late-ctrl" writes the command one step late.
@@ -43,117 +145,118 @@ def code(model: Model, options: Options, load: str) -> str:
     if options["break"] is not None:
         check_name("way to break a replay", options["break"], BREAKS)
     steps = as_count(options["steps"], "steps")
-    write, said = (
-        "data.ctrl[:2] += (0.4, -0.2)" if model.nu > 1 else "data.ctrl += 0.4",
-        "  # pan and lift" if is_the_arm(model) else "",
-    )
-    if options["ctrl"] is not None:
-        write, said = f"data.ctrl[:] = {command(model, options['ctrl']).tolist()}", ""
-    body = {
-        None: [write + said, f"sm.step(model, data, {steps})"],
-        "extra-step": [write + said, f"sm.step(model, data, {steps} + broken)"],
-        "late-ctrl": [
+    if options["break"] == "late-ctrl":
+        lines = [
             f"for k in range({steps}):",
             "    if k == broken:  # the command comes one step late",
-            f"        {write}",
+            f"        {_command_line(model, options['ctrl'])}",
             "    sm.step(model, data)",
-        ],
-    }[options["break"]]
-    lines = "\n".join(f"    {line}" for line in body)
-    start = "    sm.reset(model, data, keyframe=0)\n    data.time = 0\n" if model.keyframes else ""
-    argument, *given = ("broken", "0", "1") if options["break"] else ("", "", "")
+        ]
+    else:
+        comment = "  # pan and lift" if options["ctrl"] is None and is_the_arm(model) else ""
+        nstep = f"{steps} + broken" if options["break"] == "extra-step" else str(steps)
+        lines = [
+            f"{_command_line(model, options['ctrl'])}{comment}",
+            f"sm.step(model, data, {nstep})",
+        ]
+    if model.keyframes:
+        lines = ["sm.reset(model, data, keyframe=0)", "data.time = 0", *lines]
+    body = "\n".join(f"    {line}" for line in lines)
+    parameter, first, second = ("broken", "0", "1") if options["break"] else ("", "", "")
     return f"""\
 import numpy as np
 import statemachine as sm
 
 model = {load}
 
-def run({argument}):
+def run({parameter}):
     data = sm.make_data(model)
-{start}{lines}
+{body}
     return data.qpos.copy()
 
-first, second = run({given[0]}), run({given[1]})
+first, second = run({first}), run({second})
 print(np.array_equal(first, second), abs(first - second).max())
 """
 
 
-def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
-    """Watch both runs; then play the code that breaks them, and theirs with half the timestep.
+def _command_line(model: Model, ctrl: Sequence[float] | None) -> str:
+    """Write the line that gives a command, which is one of any robot where none is asked for."""
+    if ctrl is not None:
+        return f"data.ctrl[:] = {command(model, ctrl).tolist()}"
+    return "data.ctrl[:2] += (0.4, -0.2)" if model.nu > 1 else "data.ctrl += 0.4"
 
-    Returns:
-        ctrl: (nu,) the command of both runs.
-        broken_by: How the second run was made to differ; None if it was not.
-        identical: Whether the last qpos are equal, `np.array_equal`.
-        close: Whether `np.allclose` calls them equal.
-        difference: (n+1,) largest |qpos difference| after each step.
-        apart: (n+1,) distance [m] between the free body's positions in the two
-            runs; None without a free body.
-        qpos: (nq,) at the end of the first run.
-        hinges: Where in qpos the hinges are.
-        free: Where in qpos a free body's position is; None without one.
-        travel: Largest movement of a hinge in the first run [rad].
-        contacts: (n,) contacts that each step of the first run found.
-        pairs: For each pair of bodies, in how many steps it touched.
-        keyframe: Name of the keyframe, its time was set to zero; None for the default state.
-        breaks: Second runs that were made to differ, if this one was not.
-        finer: The same with half the timestep, twice: that timestep [s], whether the two end in
-            the same bits, and the largest |qpos difference| of their end to that of the usual
-            timestep; None where the backend cannot set it.
-        state: What a State of this engine holds.
-        ways: Ways to go back through this interface, tried.
-        own_ways: The engine's own ways, tried on the raw engine where that differs.
-    """
+
+def run(play: CodeRun, options: Options, progress: Progress) -> ReplayResult:
+    """Watch both runs; then play the code that breaks them, and theirs with half the timestep."""
+    model, nstep = play.model, options["steps"]
+    if options["break"] is not None:
+        return _compared(play, options, progress)
+    thirds = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
+    result = _compared(play, options, thirds[0])
+    breaks: list[BrokenRun] = []
+    for way, third in zip(BREAKS, thirds[1:], strict=True):
+        with CodeRun(code(model, {**options, "break": way}, "sm.load()"), model) as other:
+            courses = other.follow(lambda _model, _data: None, 2 * nstep, third)
+        first, second = (_counted(course.qpos, nstep) for course in courses)
+        breaks.append(broken(way, first, second))
+    return replace(result, breaks=tuple(breaks), finer=_finer(model, options, result.qpos))
+
+
+def _compared(play: CodeRun, options: Options, progress: Progress) -> ReplayResult:
+    """Watch both runs, and try the ways back."""
     model, nstep, way = play.model, options["steps"], options["break"]
-    shares = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
-    runs = play.follow(
-        lambda model, data: body_pairs(model, data.contacts),
-        2 * nstep,
-        progress if way else shares[0],
-    )
-    first, second = _poses(runs, nstep)
-    breaks, finer = [], None
-    if way is None:
-        for fault, share in zip(BREAKS, shares[1:], strict=True):
-            with CodeRun(code(model, {**options, "break": fault}, "sm.load()"), model) as other:
-                courses = other.follow(lambda _model, _data: None, 2 * nstep, share)
-            breaks.append(broken(fault, *_poses(courses, nstep)))
-        finer = _finer(model, options, first[-1])
-    touches = runs[0].looks
-    gap = first - second
-    free = model.jnt_qposadr[model.jnt_type == int(JointType.FREE)].tolist()
-    hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
+    courses = play.follow(lambda model, data: body_pairs(model, data.contacts), 2 * nstep, progress)
+    first_run, second_run = (_counted(course.qpos, nstep) for course in courses)
+    touches = courses[0].looks
+    contacts = np.array([pairs.total() for pairs in touches], dtype=np.int64)
+    steps_of_pair = Counter(pair for pairs in touches for pair in pairs)
     _, data = play.worlds[0]
-    return Figures(
-        ctrl=data.ctrl.copy(),
+    ctrl = data.ctrl.copy()
+    state = [name for name, size in get_state(model, data).layout if size]
+    keyframe = model.keyframes[0].name if model.keyframes else None
+    own_ways = room(model.backend).ways_back(model)
+    return ReplayResult(
+        ctrl=ctrl,
         broken_by=way,
-        identical=bool(np.array_equal(first[-1], second[-1])),
-        close=bool(np.allclose(first[-1], second[-1])),
-        difference=np.abs(gap).max(axis=1),
-        apart=np.linalg.norm(gap[:, free[0] : free[0] + 3], axis=1) if free else None,
-        qpos=first[-1],
-        hinges=tuple(hinges.tolist()),
-        free=(free[0], free[0] + 1, free[0] + 2) if free else None,
-        travel=float(np.ptp(first[:, hinges], axis=0).max(initial=0.0)),
-        contacts=np.array([pairs.total() for pairs in touches], dtype=np.int64),
-        pairs=dict(Counter(pair for pairs in touches for pair in pairs)),
-        keyframe=model.keyframes[0].name if model.keyframes else None,
-        breaks=tuple(breaks),
-        finer=finer,
-        state=tuple(name for name, size in get_state(model, data).layout if size),
-        ways=ways_back(model, data.ctrl),
-        own_ways=room(model.backend).ways_back(model),
+        first_run=first_run,
+        second_run=second_run,
+        hinges=_hinges(model),
+        free=_free_position(model),
+        contacts=contacts,
+        pairs=steps_of_pair,
+        keyframe=keyframe,
+        state=tuple(state),
+        ways=ways_back(model, ctrl),
+        own_ways=own_ways,
         provenance=provenance(model),
     )
 
 
-def _poses(runs: Sequence[Figures], nstep: int) -> list[Array]:
-    """Qpos after each counted step (n+1, nq) of each run; one step more is not counted."""
-    return [np.array(course.qpos[-nstep - 1 :]) for course in runs]
+def _counted(qpos: Sequence[Array], nstep: int) -> Array:
+    """Return qpos after each counted step (n+1, nq); one step more is not counted."""
+    return np.array(qpos[-nstep - 1 :])
 
 
-def _finer(model: Model, options: Options, end: Array) -> Figures | None:
-    """Determinism is not truth: half the timestep replays as exactly, and ends elsewhere."""
+def _hinges(model: Model) -> tuple[int, ...]:
+    """Return where in qpos the hinges are."""
+    return tuple(model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)].tolist())
+
+
+def _free_position(model: Model) -> tuple[int, int, int] | None:
+    """Return where in qpos the first free body's position is."""
+    for start in model.jnt_qposadr[model.jnt_type == int(JointType.FREE)].tolist():
+        return start, start + 1, start + 2
+    return None
+
+
+def _finer(model: Model, options: Options, end: Array) -> FinerRuns | None:
+    """Run with half the timestep: it replays as exactly, and ends elsewhere.
+
+    Args:
+        model: With the usual timestep.
+        options: Of the lesson.
+        end: (nq,) the end of the run with the usual timestep.
+    """
     try:
         finer = model.replace(timestep=model.timestep / 2)
     except UnsupportedError:
@@ -161,82 +264,116 @@ def _finer(model: Model, options: Options, end: Array) -> Figures | None:
     twice = {**options, "steps": 2 * options["steps"]}
     with CodeRun(code(finer, twice, "sm.load()"), finer) as play:
         ends = play()
-    return Figures(
+    return FinerRuns(
         timestep=finer.timestep,
         identical=bool(np.array_equal(ends["first"], ends["second"])),
         difference=float(np.abs(ends["first"] - end).max()),
     )
 
 
-def slots(result: Figures) -> dict[str, Any]:
-    """What the page says."""
-    (peak, row), end = largest(result.difference), float(result.difference[-1])
-    steps, finer = len(result.contacts), result.finer
-    # Grown to the end, shrunk, or stayed near its peak.
-    course = 1 if end < peak / 3 else 0 if row == steps else 2
-    return {
-        "steps": count(steps, "step"),
-        "right": course if result.broken_by else 0 if result.identical else None,
-        "start": f'the keyframe "{result.keyframe}"' if result.keyframe else "the default state",
-        "peak": f"{peak:.1e}",
-        "peak_step": row,
-        "end": f"{end:.1e}",
-        "shrinks": end < peak / 10,
-        "held_in_state": ", ".join(result.state),
-        "truth": bool(finer and finer.identical and finer.difference > 0),
-        "finer_timestep": f"{finer.timestep * 1e3:g} ms" if finer else "",
-        "finer_off": f"{finer.difference:.1e}" if finer else "",
-    }
+def slots(result: ReplayResult) -> dict[str, Any]:
+    """Fill the slots of the page."""
+    peak, row = largest(result.difference)
+    end = float(result.difference[-1])
+    slots: dict[str, Any] = {}
+    slots["right"] = _right_choice(result)
+    slots["identical"] = result.identical
+    slots["steps"] = count(len(result.contacts), "step")
+    slots["start"] = "the default state"
+    if result.keyframe:
+        slots["start"] = f'the keyframe "{result.keyframe}"'
+    slots["peak"] = f"{peak:.1e}"
+    slots["peak_step"] = row
+    slots["end"] = f"{end:.1e}"
+    slots["shrinks"] = end < peak / 10
+    slots["held_in_state"] = ", ".join(result.state)
+    slots["truth"] = False
+    if result.finer is not None:
+        slots["truth"] = result.finer.identical and result.finer.difference > 0
+        slots["finer_timestep"] = f"{result.finer.timestep * 1e3:g} ms"
+        slots["finer_off"] = f"{result.finer.difference:.1e}"
+    return slots
 
 
-def tables(results: Results, first: Figures) -> dict[str, Any]:
-    """Equal or not, what touched on the way, and the ways back."""
-    gaps = {name: result.difference for name, result in results.items()}
-    bodies = {name: result.apart for name, result in results.items()}
-    outcome = {
-        "np.array_equal": lambda r: str(r.identical),
-        "np.allclose": lambda r: str(r.close),
-        "difference at the end": lambda r: f"{r.difference[-1]:.1e}",
-        "largest on the way": lambda r: f"{r.difference.max():.1e}",
-        "largest turn of a hinge": lambda r: degrees(r.travel, 1),
-    }
-    touched = {
-        "fewest contacts in a step": lambda r: str(r.contacts.min()),
-        "most": lambda r: str(r.contacts.max()),
-        "on average": lambda r: f"{r.contacts.mean():.1f}",
-        **{
-            pair: lambda r, pair=pair: f"{r.pairs.get(pair, 0)} of {len(r.contacts)} steps"
-            for pair in dict.fromkeys(pair for r in results.values() for pair in r.pairs)
-        },
-    }
-    return {
-        "outcome": by_engine(results, outcome, "Two runs compared"),
-        "touched": by_engine(results, touched, "What touched, in the first run"),
-        "growth": growth(gaps, bodies) if first.broken_by else [],
-        "ways": through_us({name: result.ways for name, result in results.items()})
-        if first.ways
-        else [],
-        "own": of_its_own({name: result.own_ways for name, result in results.items()}),
-        "breaks": broken_table({name: result.breaks for name, result in results.items()}),
-        "differences": differences(
-            results,
-            {
-                "hinges at the end, worst": _hinges_apart,
-                "free body at the end": _bodies_apart,
-                "contacts a step, on average": lambda a, b: (
-                    f"{b.contacts.mean():.1f} instead of {a.contacts.mean():.1f}"
-                ),
-            },
-        ),
-    }
+def _right_choice(result: ReplayResult) -> int | None:
+    """Return the number of the right choice, None if no choice is right.
+
+    The choices of a second run that was made to differ: its difference grew to the end, shrank,
+    or stayed near its peak.
+    """
+    if result.broken_by is None:
+        return 0 if result.identical else None
+    peak, row = largest(result.difference)
+    if result.difference[-1] < peak / 3:
+        return 1
+    return 0 if row == len(result.contacts) else 2
 
 
-def _hinges_apart(left: Figures, right: Figures) -> str:
+def tables(results: Results[ReplayResult], first: ReplayResult) -> Blocks:
+    """Show whether the runs are equal, what touched on the way, and the ways back."""
+    blocks: dict[str, Table | Sequence[Block]] = {}
+    blocks["outcome"] = _outcome(results)
+    blocks["touched"] = _touched(results)
+    blocks["growth"] = []
+    if first.broken_by:
+        gaps = {name: result.difference for name, result in results.items()}
+        bodies = {name: result.apart for name, result in results.items()}
+        blocks["growth"] = growth(gaps, bodies)
+    blocks["ways"] = through_us({name: result.ways for name, result in results.items()})
+    blocks["own"] = of_its_own({name: result.own_ways for name, result in results.items()})
+    blocks["breaks"] = broken_table({name: result.breaks for name, result in results.items()})
+    blocks["differences"] = differences(results, _DIFFERENCES)
+    return blocks
+
+
+def _outcome(results: Results[ReplayResult]) -> Table:
+    """Show whether the two runs are equal, and how far they are apart."""
+    rows: dict[str, Callable[[ReplayResult], str]] = {}
+    rows["np.array_equal"] = lambda result: str(result.identical)
+    rows["np.allclose"] = lambda result: str(result.close)
+    rows["difference at the end"] = lambda result: f"{result.difference[-1]:.1e}"
+    rows["largest on the way"] = lambda result: f"{result.difference.max():.1e}"
+    rows["largest turn of a hinge"] = lambda result: degrees(result.travel, 1)
+    return by_engine(results, rows, "Two runs compared")
+
+
+def _touched(results: Results[ReplayResult]) -> Table:
+    """Show how many contacts the steps of the first run found, and which pairs touched."""
+    rows: dict[str, Callable[[ReplayResult], str]] = {}
+    rows["fewest contacts in a step"] = lambda result: str(result.contacts.min())
+    rows["most"] = lambda result: str(result.contacts.max())
+    rows["on average"] = lambda result: f"{result.contacts.mean():.1f}"
+    for result in results.values():
+        for pair in result.pairs:
+            rows[pair] = partial(_steps_of_pair, pair)
+    return by_engine(results, rows, "What touched, in the first run")
+
+
+def _steps_of_pair(pair: str, result: ReplayResult) -> str:
+    """Say in how many of the steps a pair of bodies touched."""
+    return f"{result.pairs.get(pair, 0)} of {len(result.contacts)} steps"
+
+
+def _hinges_apart(left: ReplayResult, right: ReplayResult) -> str:
+    """Return the largest distance of a hinge between two ends."""
     gaps = np.abs(left.qpos - right.qpos)[list(left.hinges)]
     return degrees(float(gaps.max()), 3) if len(gaps) else "there are none"
 
 
-def _bodies_apart(left: Figures, right: Figures) -> str:
+def _bodies_apart(left: ReplayResult, right: ReplayResult) -> str:
+    """Return the distance of the free body between two ends."""
     if left.free is None:
         return "there is none"
     return millimetres(float(np.linalg.norm((left.qpos - right.qpos)[list(left.free)])))
+
+
+def _contacts_apart(left: ReplayResult, right: ReplayResult) -> str:
+    """Compare the average number of contacts in a step."""
+    return f"{right.contacts.mean():.1f} instead of {left.contacts.mean():.1f}"
+
+
+_DIFFERENCES: dict[str, Callable[[ReplayResult, ReplayResult], str]] = {
+    "hinges at the end, worst": _hinges_apart,
+    "free body at the end": _bodies_apart,
+    "contacts a step, on average": _contacts_apart,
+}

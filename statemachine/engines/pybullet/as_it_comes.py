@@ -20,6 +20,7 @@ from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ...page import Figures
+from ..records import LeftAlone, WayBack
 from .driven import DrivenClient
 from .world import fresh_world, gravity_of, limp, saved_in_memory
 
@@ -114,8 +115,8 @@ def _figures(values: Array) -> str:
     return " ".join(f"{value + 0.0:.4g}" for value in np.round(values, 12))
 
 
-def left_alone(model: Model, seconds: float, joint: int) -> tuple[Figures, ...]:
-    """A joint of a freshly loaded arm that nobody commands, and what its motor exerts.
+def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
+    """Leave a joint of a freshly loaded arm alone, and read what its motor exerts.
 
     Args:
         model: The model; its gravity is set, where a run says so.
@@ -123,7 +124,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[Figures, ...]:
         joint: Id of a hinge or slide.
     """
     steps = max(1, round(seconds / ENGINE_TIMESTEP))
-    runs = []
+    runs: list[LeftAlone] = []
     with fresh_world() as client:
         fresh = float(np.linalg.norm(gravity_of(client)))
     for label, gravity, motors, damping in (
@@ -147,7 +148,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[Figures, ...]:
             state = pb.getJointState(tree.body, index, world.client)
             places = [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
             runs.append(
-                Figures(
+                LeftAlone(
                     label=label,
                     time=steps * ENGINE_TIMESTEP,
                     position=float(state[0]),
@@ -189,8 +190,8 @@ def _as_loaded(model: Model, qpos: Array, ctrl: Array, steps: int) -> Iterator[D
         yield machine
 
 
-def ways_back(model: Model) -> tuple[Figures, ...]:
-    """Which of the engine's own ways to go back is exact, in the middle of contact.
+def ways_back(model: Model) -> tuple[WayBack, ...]:
+    """Try each of the engine's own ways to go back, in the middle of contact.
 
     Each run starts in a new client from keyframe 0 (or the default pose), squeezes by
     POSITION_CONTROL, goes on, goes back, and goes on again: are the two futures the same?
@@ -224,7 +225,7 @@ def ways_back(model: Model) -> tuple[Figures, ...]:
         first = machine.positions_along(_AFTER)
         machine.world.put(*state)
         differences[f"written back {moment}"] = _largest(first, machine.positions_along(_AFTER))
-    return tuple(Figures(name=name, difference=off) for name, off in differences.items())
+    return tuple(WayBack(name, off) for name, off in differences.items())
 
 
 def _largest(first: Array, second: Array) -> float:
