@@ -22,7 +22,7 @@ from typing import Any
 
 from .errors import BadInputError, EngineError, MissingEngineError
 from .installed import DEFAULT, engine_version
-from .release_names import engine_of, is_release, version_of  # noqa: F401 (for others, too)
+from .release_names import is_release, version_of
 
 if sys.platform == "win32":
     fcntl = None

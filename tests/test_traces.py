@@ -26,7 +26,7 @@ from statemachine.interface import MOCAP
 from statemachine.lessons import LESSONS
 from statemachine.lessons.hold import OLDER
 from statemachine.lessons.session import take
-from statemachine.releases import is_release
+from statemachine.release_names import is_release
 from statemachine.runs import (
     COLUMNS,
     CONTACTS,

@@ -99,7 +99,7 @@ def _simulate(options: argparse.Namespace, name: str, port: int) -> int:
     """A session on one engine or two."""
     from ..backends.starts import overlap_warning, places_in
     from ..drawing import drawing_of
-    from ..releases import engine_of
+    from ..release_names import engine_of
     from ..view.session import LiveSession
 
     chosen = chosen_backends(options.backend)

@@ -15,7 +15,7 @@ from ..installed import DEFAULT
 from ..interface import Model
 from ..measures import common_moments
 from ..measures.text import command, milliseconds
-from ..releases import engine_of
+from ..release_names import engine_of
 from ..runs import (
     Rerun,
     SideStart,

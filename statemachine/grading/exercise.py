@@ -28,7 +28,7 @@ from ..models import AnyPath, what_is_there
 from ..page import Figures
 from ..processes import sandbox
 from ..processes.parallel import in_parallel, unwinding
-from ..releases import is_release
+from ..release_names import is_release
 from ..runs.drive import Progress, silent
 from .inside.worlds import ExerciseWorld, Scenes, worlds_of
 from .judges import JUDGES, Judgement, judge_of, judged

@@ -9,23 +9,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from ..drawing.scene import posed
-from ..errors import BadInputError, ModelError, UnknownNameError, refuse
+from ..errors import BadInputError, ModelError, UnknownNameError
 from ..installed import WITNESS
 from ..interface import Array, JointType, Model, make_data
 from ..interface.options import as_count
 from ..kinematics import Kind, Kinematics, shared_joints
 from ..measures import largest_or_inf
 from ..models import AnyPath
-from ..page import Figures
+from ..page import only_on_pages
 from ..rotations import Placement, angle_between, matrix_from_quat
 from ..runs.drive import Progress, silent
-from ..runs.header import provenance
+from ..runs.header import Provenance, provenance
 from ..runs.robot import carried_by
-from ..witness import labels
+from ..witness import OWN_READING, labels
 from ._robot import Tip, tips_of
 
 _MOST = 1_000_000
@@ -33,12 +35,181 @@ _WIDE = 100.0  # a range beyond this [m or rad] is not a limit
 _TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
 _SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
 
+Verdict = Literal["different frames", "disagrees", "agrees", "same place"]
 
-def _offset(distance: float, angle: float) -> Figures:
-    """From the engine's frame to the witness's [m, rad], and whether the two are one frame."""
-    return Figures(
-        distance=distance, angle=angle, same=distance <= _SAME_FRAME and angle <= _SAME_FRAME
-    )
+
+@dataclass(frozen=True)
+class FrameOffset:
+    """Offset from the engine's frame of a name to the witness's.
+
+    Attributes:
+        distance: Between the two origins [m].
+        angle: Between the two orientations [rad].
+    """
+
+    distance: float
+    angle: float
+
+    @property
+    def same(self) -> bool:
+        """Tell whether the two are one frame."""
+        return self.distance <= _SAME_FRAME and self.angle <= _SAME_FRAME
+
+
+@dataclass(frozen=True)
+class TipGap:
+    """Gap between where an engine puts a site or body, and where the witness puts it.
+
+    The differences are None where the two frames are not the same: they would say nothing about
+    the engine then.
+
+    Attributes:
+        site: The site or body on the engine.
+        witness_frame: Its name for the witness.
+        body: The body that it is, or that carries it, on the engine.
+        frames: Offset between the two frame definitions; None where the files name no common
+            body and the offset between the poses is not steady.
+        default_pose: (3,) Where it is at the model's default qpos on the engine [m].
+        position_worst: Largest difference in position over all poses [m].
+        position_median: Median difference in position [m].
+        rotation_worst: Largest entry of the difference of the rotation matrices, over all poses.
+        rotation_median: Median over the poses of the largest entry.
+    """
+
+    site: str
+    witness_frame: str
+    body: str
+    frames: FrameOffset | None
+    default_pose: tuple[float, ...]
+    position_worst: float | None = None
+    position_median: float | None = None
+    rotation_worst: float | None = None
+    rotation_median: float | None = None
+
+    @property
+    def worst(self) -> float:
+        """Return the larger worst difference; infinite without one, or if it is no number."""
+        if self.position_worst is None or self.rotation_worst is None:
+            return math.inf
+        return largest_or_inf(np.array([self.position_worst, self.rotation_worst]))
+
+    @property
+    def agrees(self) -> bool:
+        """Tell whether both worst differences are within the tolerance."""
+        return self.worst <= _TOLERANCE
+
+
+@dataclass(frozen=True)
+class FingertipResult:
+    """Certificate of an engine: its poses of sites or bodies against those of a witness.
+
+    Attributes:
+        tips: The gap of each site or body that was compared, the worst first.
+        left_out: Sites or bodies that the witness's file does not have.
+        poses: Number of poses that were compared.
+        tolerance: What the worst differences must not exceed [m, and entries of a matrix].
+        witness_file: The file that the witness read, with its folder.
+        grade: `OWN_READING` if Pinocchio's parser read the file, `SAME_READING` if it computed
+            from the numbers of the engine's model.
+        reason: Why it is not an own reading; "" if it is.
+        prepared: What was done to the file's text before Pinocchio read it.
+        provenance: What it was computed with, the seed of the poses included.
+    """
+
+    tips: tuple[TipGap, ...]
+    left_out: tuple[str, ...]
+    poses: int
+    tolerance: float
+    witness_file: str
+    grade: str
+    reason: str
+    prepared: tuple[str, ...]
+    provenance: Provenance
+
+    @property
+    @only_on_pages
+    def worst_tip(self) -> TipGap:
+        """Return the worst gap, which JSON shows beside the list of all."""
+        return self.tips[0]
+
+    @property
+    def site(self) -> str:
+        """Return the site or body of the worst gap."""
+        return self.worst_tip.site
+
+    @property
+    def witness_frame(self) -> str:
+        """Return the witness's name for it."""
+        return self.worst_tip.witness_frame
+
+    @property
+    def body(self) -> str:
+        """Return the body that it is, or that carries it."""
+        return self.worst_tip.body
+
+    @property
+    def frames(self) -> FrameOffset | None:
+        """Return the offset between its two frame definitions."""
+        return self.worst_tip.frames
+
+    @property
+    def default_pose(self) -> tuple[float, ...]:
+        """Return where it is (3,) at the model's default qpos on the engine [m]."""
+        return self.worst_tip.default_pose
+
+    @property
+    def position_worst(self) -> float | None:
+        """Return its largest difference in position [m]."""
+        return self.worst_tip.position_worst
+
+    @property
+    def position_median(self) -> float | None:
+        """Return its median difference in position [m]."""
+        return self.worst_tip.position_median
+
+    @property
+    def rotation_worst(self) -> float | None:
+        """Return the largest entry of its difference of the rotation matrices."""
+        return self.worst_tip.rotation_worst
+
+    @property
+    def rotation_median(self) -> float | None:
+        """Return the median over the poses of the largest entry."""
+        return self.worst_tip.rotation_median
+
+    @property
+    def agrees(self) -> bool:
+        """Tell whether all gaps are within the tolerance."""
+        return all(gap.agrees for gap in self.tips)
+
+    @property
+    @only_on_pages
+    def has_one_tip(self) -> bool:
+        """Tell whether one site or body was compared, and not several."""
+        return len(self.tips) == 1
+
+    @property
+    @only_on_pages
+    def is_own_reading(self) -> bool:
+        """Tell whether the witness read the file with its own parser."""
+        return self.grade == OWN_READING
+
+    @property
+    @only_on_pages
+    def verdict(self) -> Verdict:
+        """Return what the certificate says.
+
+        Returns:
+            "different frames": The files give one name to two frames; nothing was compared.
+            "disagrees": A difference exceeds the tolerance.
+            "agrees": None does, and the witness read the file itself.
+            "same place": None does, from the same numbers; the reading was not checked.
+        """
+        if self.frames is not None and not self.frames.same:
+            return "different frames"
+        if not self.agrees:
+            return "disagrees"
+        return "agrees" if self.is_own_reading else "same place"
 
 
 def checked_poses(poses: int, seed: int) -> int:
@@ -66,7 +237,7 @@ def certify(
     witness: AnyPath | None = None,
     witness_frame: str | None = None,
     progress: Progress = silent,
-) -> Figures:
+) -> FingertipResult:
     """Compare poses on an engine with Pinocchio's, at random poses within the limits.
 
     Pinocchio reads the model's file itself where it can. Else it computes from the numbers
@@ -82,18 +253,6 @@ def certify(
         witness_frame: The frame's name there; by default `site`.
         progress: Told the fraction that is done.
 
-    Returns:
-        What `_gap` gives of the worst tip, and:
-        poses: How many were compared.
-        tolerance: What both worst differences must not exceed.
-        agrees: Whether those of all tips do not.
-        grade: "own reading" if Pinocchio's parser read the file, "same reading" if it
-            computed from the numbers of the engine's model.
-        reason: Why it is not an own reading; "" if it is.
-        prepared: What was done to the file's text before Pinocchio read it.
-        tips: All that were compared, the worst first.
-        left_out: Tips that the witness's file does not have.
-
     Raises:
         MissingEngineError: Pinocchio is not installed here.
         ModelError: Pinocchio cannot read `witness`.
@@ -103,89 +262,129 @@ def certify(
     """
     wanted = checked_poses(poses, seed)
     tips = tips_of(model, site)
-    refuse(
-        (
-            witness_frame is not None and len(tips) > 1,
-            "--witness-frame names one frame: say which with --site",
-        )
-    )
-    known, asked, reason = _asked(model, tips, witness, witness_frame)
+    if witness_frame is not None and len(tips) > 1:
+        raise BadInputError("--witness-frame names one frame: say which with --site")
+    asked = _ask(model, tips, witness, witness_frame)
+    known = asked.kinematics
     joints = shared_joints(known, model.joint_names)
     configurations = random_qpos(model, joints, wanted, seed)
-    ours = _engine_poses(model, configurations, asked, progress)
+    ours = _engine_poses(model, configurations, asked.tips, progress)
     theirs = configurations[:, slots(model, joints)]
-    gaps = [
-        _gap(
-            model,
-            tip,
-            known,
-            witness_frame or tip.name,
-            Placement(ours.pos[:, k], ours.mat[:, k]),
-            theirs,
-        )
-        for k, tip in enumerate(asked)
-    ]
+    gaps = []
+    for k, tip in enumerate(asked.tips):
+        places = Placement(ours.pos[:, k], ours.mat[:, k])
+        name = witness_frame or tip.name
+        gaps.append(_gap(model, tip, known, name, places, theirs))
     gaps.sort(key=lambda gap: -gap.worst)
-    return Figures(
-        **{name: figure for name, figure in vars(gaps[0]).items() if name != "worst"}
-        | {"agrees": all(gap.agrees for gap in gaps)},
-        witness_file="/".join(known.path.parts[-2:]),
+    left_out = tuple(tip.name for tip in tips if tip not in asked.tips)
+    return FingertipResult(
+        tips=tuple(gaps),
+        left_out=left_out,
         poses=len(configurations),
         tolerance=_TOLERANCE,
-        provenance=provenance(model, seed, **{WITNESS: known.version}),
+        witness_file=asked.file,
         grade=known.grade,
-        reason=reason,
+        reason=asked.reason,
         prepared=known.prepared,
-        tips=tuple(gaps),
-        left_out=tuple(tip.name for tip in tips if tip not in asked),
+        provenance=provenance(model, seed, **{WITNESS: known.version}),
     )
 
 
-def _asked(
+@dataclass(frozen=True)
+class _Witness:
+    """Witness, and what it is asked for.
+
+    Attributes:
+        kinematics: What it computes places with, its joints in the model's order.
+        tips: Sites and bodies that it is asked for.
+        reason: Why it has not read the file itself; "" if it has.
+    """
+
+    kinematics: Kinematics
+    tips: list[Tip]
+    reason: str = ""
+
+    @property
+    def file(self) -> str:
+        """Return the file that it read, with its folder."""
+        return "/".join(self.kinematics.path.parts[-2:])
+
+
+def _ask(
     model: Model,
     tips: list[Tip],
-    witness: AnyPath | None,
+    file: AnyPath | None,
     witness_frame: str | None,
-) -> tuple[Kinematics, list[Tip], str]:
-    """The witness to ask, what it is asked for, and why it has not read the file itself."""
-    if witness is not None:
-        known = Kinematics(witness)
-        if len(tips) > 1:  # another file need not have all of them
-            known_bodies = set(known.body_names)
-            tips = [tip for tip in tips if tip.name in known_bodies and tip.named] or tips
-        return _matched(model, tips, known, witness_frame), tips, ""
+) -> _Witness:
+    """Choose the witness, and what it is asked for.
+
+    Args:
+        model: On the engine to be certified.
+        tips: Its sites and bodies that are asked for.
+        file: What the witness reads; None for the engine's own file.
+        witness_frame: The frame's name there; None for that of the tip.
+    """
+    if file is not None:
+        known = Kinematics(file)
+        if len(tips) > 1:
+            tips = _common(tips, known)
+        return _Witness(_matched(model, tips, known, witness_frame), tips)
     try:
-        return _matched(model, tips, Kinematics(model.path), witness_frame), tips, ""
+        return _Witness(_matched(model, tips, Kinematics(model.path), witness_frame), tips)
     except (ModelError, BadInputError, UnknownNameError) as error:
         if witness_frame is not None or model.compiled is None:
             raise
         reason = str(error)
-    return _matched(model, tips, Kinematics.same_reading(model), None), tips, reason
+    known = _matched(model, tips, Kinematics.same_reading(model), None)
+    return _Witness(known, tips, reason)
+
+
+def _common(tips: list[Tip], known: Kinematics) -> list[Tip]:
+    """Return the tips that another file has, too; all of them if it has none."""
+    bodies = set(known.body_names)
+    common = [tip for tip in tips if tip.named and tip.name in bodies]
+    return common if common else tips
 
 
 def _matched(
     model: Model, tips: list[Tip], known: Kinematics, witness_frame: str | None
 ) -> Kinematics:
-    """A witness with its joints in the model's order; raises if it lacks what a tip needs."""
+    """Return a witness with its joints in the model's order.
+
+    Raises:
+        BadInputError: It lacks a joint that moves a tip, or a tip has no name to find it by.
+        UnknownNameError: It has no such frame.
+    """
     joints = shared_joints(known, model.joint_names)
     bodies_agree = known.body_names == tuple(labels("body", model.body_names))
     for tip in tips:
-        for joint, name in enumerate(model.joint_names):
-            carrier = int(model.jnt_bodyid[joint])
-            if joint not in joints and tip.body in carried_by(model, [carrier]):
-                raise BadInputError(
-                    f"{known.path.name} lacks the joint {name!r}, which moves {tip.name!r}"
-                )
+        missing = _missing_joint(model, tip, joints)
+        if missing is not None:
+            raise BadInputError(
+                f"{known.path.name} lacks the joint {missing!r}, which moves {tip.name!r}"
+            )
         if not (tip.named or bodies_agree or witness_frame):
             raise BadInputError(f"{tip.name} has no name to find it by in {known.path.name}")
         _frame(known, witness_frame or tip.name, tip.kind)
     names = [model.joint_names[joint] for joint in joints]
-    return known if tuple(names) == known.joint_names else Kinematics(known.path, joint_names=names)
+    if tuple(names) == known.joint_names:
+        return known
+    return Kinematics(known.path, joint_names=names)
+
+
+def _missing_joint(model: Model, tip: Tip, joints: Sequence[int]) -> str | None:
+    """Return the name of a joint that moves a tip and is not among `joints`; None without one."""
+    for joint, name in enumerate(model.joint_names):
+        carrier = int(model.jnt_bodyid[joint])
+        if joint not in joints and tip.body in carried_by(model, [carrier]):
+            return name
+    return None
 
 
 def _frame(kinematics: Kinematics, name: str, kind: Kind) -> Kind:
-    """What a name is to the witness: a site of an MJCF, or a body; of a URDF, a link."""
-    if name in kinematics.body_names and not (kind == "site" and name in kinematics.site_names):
+    """Return what a name is to the witness: a site of an MJCF, or a body; of a URDF, a link."""
+    is_site = kind == "site" and name in kinematics.site_names
+    if name in kinematics.body_names and not is_site:
         return "body"
     kinematics.definition(name, "site")  # raises if there is none
     return "site"
@@ -198,50 +397,58 @@ def _gap(
     name: str,
     ours: Placement,
     qpos: Array,
-) -> Figures:
-    """How far one site or body is from where the witness puts it.
+) -> TipGap:
+    """Measure how far one site or body is from where the witness puts it.
 
-    Returns:
-        site: The site or body on the engine; witness_frame: its name for the witness.
-        body: The body that it is, or that carries it, on the engine.
-        frames: Offset between the two frame definitions; None where the files name
-            no common body and the offset between the poses is not steady.
-        position_worst, position_median: Difference in position [m]; None if refused.
-        rotation_worst, rotation_median: Largest entry of the difference of the
-            rotation matrices; None if refused.
-        worst: The larger of the two worst differences; infinite if refused or no number.
-        agrees: Whether that is within the tolerance.
-        default_pose: Where it is (3,) at the model's default qpos on the engine [m].
+    Args:
+        model: On the engine.
+        tip: The site or body.
+        kinematics: Of the witness.
+        name: Of the frame there.
+        ours: Where the engine puts it: (N, 3) [m], (N, 3, 3).
+        qpos: (N, nq) The same poses for the witness.
     """
     kind = _frame(kinematics, name, tip.kind)
     theirs = kinematics.poses(qpos, name, kind)
     offset = _declared_offset(model, tip, kinematics, name, kind) or _steady_offset(ours, theirs)
-    moved = np.linalg.norm(ours.pos - theirs.pos, axis=1)
-    rotated = np.abs(ours.mat - theirs.mat).max(axis=(1, 2))
-    compared = offset is None or offset.same
-    worst = largest_or_inf(np.array([moved.max(), rotated.max()])) if compared else math.inf
-    return Figures(
+    gap = TipGap(
         site=tip.name,
         witness_frame=name,
         body=labels("body", model.body_names)[tip.body],
         frames=offset,
-        position_worst=float(moved.max()) if compared else None,
-        position_median=float(np.median(moved)) if compared else None,
-        rotation_worst=float(rotated.max()) if compared else None,
-        rotation_median=float(np.median(rotated)) if compared else None,
-        worst=worst,
-        agrees=worst <= _TOLERANCE,
         default_pose=tuple(ours.pos[0].tolist()),
+    )
+    if offset is not None and not offset.same:
+        return gap
+    moved = np.linalg.norm(ours.pos - theirs.pos, axis=1)
+    rotated = np.abs(ours.mat - theirs.mat).max(axis=(1, 2))
+    return replace(
+        gap,
+        position_worst=float(moved.max()),
+        position_median=float(np.median(moved)),
+        rotation_worst=float(rotated.max()),
+        rotation_median=float(np.median(rotated)),
     )
 
 
 def _engine_poses(
     model: Model, configurations: Array, tips: Sequence[Tip], progress: Progress
 ) -> Placement:
-    """Positions (N, tips, 3) and rotation matrices (N, tips, 3, 3), by the engine's forward."""
+    """Compute places by the engine's forward.
+
+    Args:
+        model: On the engine.
+        configurations: (N, nq) Poses.
+        tips: Sites and bodies to be placed.
+        progress: Told the fraction that is done.
+
+    Returns:
+        Positions (N, tips, 3) [m] and rotation matrices (N, tips, 3, 3).
+    """
     sites = [k for k, tip in enumerate(tips) if tip.kind == "site"]
     bodies = [k for k, tip in enumerate(tips) if tip.kind == "body"]
-    site_ids, body_ids = ([tips[k].number for k in chosen] for chosen in (sites, bodies))
+    site_ids = [tips[k].number for k in sites]
+    body_ids = [tips[k].number for k in bodies]
     pos = np.empty((len(configurations), len(tips), 3))
     mat = np.empty((len(configurations), len(tips), 3, 3))
     if "contacts" in model.capabilities.options:
@@ -258,8 +465,8 @@ def _engine_poses(
 
 def _declared_offset(
     model: Model, tip: Tip, kinematics: Kinematics, name: str, kind: str
-) -> Figures | None:
-    """Offset between the two files' definitions, if both fix the frame to one body."""
+) -> FrameOffset | None:
+    """Return the offset between the two files' definitions, if both fix the frame to one body."""
     if kind != "site" or tip.kind != "site":
         return None
     theirs = kinematics.definition(name, "site")
@@ -267,11 +474,11 @@ def _declared_offset(
         return None
     distance = float(np.linalg.norm(theirs.pos - model.site_pos[tip.number]))
     angle = float(angle_between(matrix_from_quat(model.site_quat[tip.number]), theirs.mat))
-    return _offset(distance, angle)
+    return FrameOffset(distance, angle)
 
 
-def _steady_offset(ours: Placement, theirs: Placement) -> Figures | None:
-    """The offset that all poses share; None if it changes with the pose.
+def _steady_offset(ours: Placement, theirs: Placement) -> FrameOffset | None:
+    """Return the offset that all poses share; None if it changes with the pose.
 
     Where the files call their bodies differently, definitions cannot be compared
     word by word. But a frame that is merely another one stays put in the engine's
@@ -283,11 +490,14 @@ def _steady_offset(ours: Placement, theirs: Placement) -> Figures | None:
     spread = max(float(np.ptp(shift, axis=0).max()), float(np.ptp(turn, axis=0).max()))
     if spread > _SAME_FRAME:
         return None
-    return _offset(float(np.linalg.norm(shift[0])), float(angle_between(np.eye(3), turn[0])))
+    distance = float(np.linalg.norm(shift[0]))
+    return FrameOffset(distance, float(angle_between(np.eye(3), turn[0])))
 
 
 def random_qpos(model: Model, joints: Sequence[int], count: int, seed: int) -> Array:
-    """(count, nq): the default pose, then uniform within limits; without, ±π rad and ±1 m.
+    """Draw poses (count, nq): the default one, then random ones.
+
+    A hinge or a slide is drawn uniformly within its limits; without, within ±π rad or ±1 m.
 
     Args:
         model: The robot.
@@ -302,10 +512,7 @@ def random_qpos(model: Model, joints: Sequence[int], count: int, seed: int) -> A
         place, kind = int(model.jnt_qposadr[joint]), JointType(int(model.jnt_type[joint]))
         entries = drawn[1:, place : place + kind.nq]
         if kind in (JointType.HINGE, JointType.SLIDE):
-            low, high = model.jnt_range[joint]
-            if not model.jnt_limited[joint] or high - low > _WIDE:
-                high = np.pi if kind == JointType.HINGE else 1.0
-                low = -high
+            low, high = _drawn_range(model, joint, kind)
             entries[:] = random.uniform(low, high, entries.shape)
             continue
         if kind == JointType.FREE:
@@ -315,7 +522,18 @@ def random_qpos(model: Model, joints: Sequence[int], count: int, seed: int) -> A
     return drawn
 
 
+def _drawn_range(model: Model, joint: int, kind: JointType) -> tuple[float, float]:
+    """Return the range in which a hinge [rad] or a slide [m] is drawn."""
+    low, high = model.jnt_range[joint]
+    if model.jnt_limited[joint] and high - low <= _WIDE:
+        return low, high
+    return (-np.pi, np.pi) if kind == JointType.HINGE else (-1.0, 1.0)
+
+
 def slots(model: Model, joints: Sequence[int]) -> list[int]:
-    """Slots of qpos that belong to these joints, in their order."""
-    starts, kinds = model.jnt_qposadr.tolist(), model.jnt_type.tolist()
-    return [starts[j] + k for j in joints for k in range(JointType(kinds[j]).nq)]
+    """Return the slots of qpos that belong to these joints, in their order."""
+    entries = []
+    for joint in joints:
+        start = int(model.jnt_qposadr[joint])
+        entries += range(start, start + JointType(int(model.jnt_type[joint])).nq)
+    return entries

@@ -15,7 +15,8 @@ from ..interface import Array, Data, Ints, JointType, Model, forward, make_data,
 from ..measures import largest, together
 from ..measures.text import position, short_time
 from ..page import Block, Table, Traces
-from ..releases import is_here, version_of
+from ..release_names import version_of
+from ..releases import is_here
 from ..runs import record_scenario, shipped
 from ..runs.drive import Progress, steps_in
 from ..runs.header import Provenance, model_digest, provenance

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,12 @@ from ..errors import BadInputError
 from ..interface import Array, Data, Model, make_data, step
 from ..interface.options import as_count
 from ..measures.text import count, duration
-from ..page import Figures
+from ..page import Block, Table
 from ..runs.drive import Progress, part_of
-from ..runs.header import provenance
+from ..runs.header import Provenance, provenance
 from .in_turns import in_turns
 from .session import CodeRun, Options
-from .template import Results, by_engine, differences
+from .template import by_engine, differences
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 _TIMES = 5  # repetitions; the median counts
@@ -28,7 +29,7 @@ _WORLDS_MOST = 100
 
 
 def code(model: Model, options: Options, load: str) -> str:
-    """Two Data of one Model, of which one is stepped."""
+    """Write code that makes two Data of one Model, and steps one of them."""
     worlds = as_count(options["worlds"], "worlds")
     if not 2 <= worlds <= _WORLDS_MOST:
         raise BadInputError(f"worlds must be from 2 to {_WORLDS_MOST}; got {worlds}")
@@ -44,49 +45,73 @@ print(round(data.time, 6), round(other.time, 6))
 """
 
 
-def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
-    """Time the parts, then let several Data of the Model step in turn.
+@dataclass(frozen=True)
+class ObjectsResult:
+    """Costs of the two objects and of the function, and what several Data of one Model did.
 
-    Returns:
-        loading, making, stepping: Median wall time of `load`, of `make_data` and of
-            one `step` [s]; of a step within a bulk of `nstep`.
-        ratio: How many steps one `load` costs.
-        worlds: How many Data stepped in turn, each under a ctrl of its own.
-        nstep: Steps of each.
+    Attributes:
+        loading: Median wall time of `load` [s].
+        making: Median wall time of `make_data` [s].
+        stepping: Median wall time of one `step` within a bulk of `nstep` [s].
+        worlds: Number of Data that stepped in turn, each under a ctrl of its own.
+        nstep: Steps of each of them.
         alone: Whether each ended bit for bit where it ends when it runs alone.
-        different: How many of the worlds' ends are different.
-        arrays: How many arrays the Model and the engine's own model hold; constant:
-            whether all of them are unchanged.
+        different: Number of different ends of the worlds.
+        arrays: Number of arrays that the Model and the engine's own model hold.
+        constant: Whether all these arrays are unchanged.
         shared: Whether each Data's engine object names the Model's as its own.
+        provenance: What it was computed with.
     """
+
+    loading: float
+    making: float
+    stepping: float
+    worlds: int
+    nstep: int
+    alone: bool
+    different: int
+    arrays: int
+    constant: bool
+    shared: bool
+    provenance: Provenance
+
+    @property
+    def ratio(self) -> float:
+        """Return the number of steps that take as long as one `load`."""
+        return self.loading / self.stepping
+
+
+def run(play: CodeRun, options: Options, progress: Progress) -> ObjectsResult:
+    """Time the parts, then let several Data of the Model step in turn."""
     model, worlds = play.model, options["worlds"]
     before = _arrays(model)
     play()
     extra: list[Data] = []
     (_, data), (_, other) = play.worlds
-    ways: dict[str, Callable[[], object]] = {
+    ways = {
         "load": lambda: load(model.path, backend=model.backend),
         "make": lambda: extra.append(make_data(model)),
         "step": lambda: step(model, data, _STEPS),
     }
     walls = in_turns(ways, _TIMES, part_of(progress, 0.0, 0.5))
-    costs = {name: statistics.median(times) for name, times in walls.items()}
-    several = (data, other, *extra)
-    shared = all(getattr(world.raw, "model", None) is model.raw for world in several)
+    loading, making, bulk = (statistics.median(times) for times in walls.values())
+    shared = all(_names_model(world, model) for world in (data, other, *extra))
     for world in extra:
         world.close()
-    shares = [part_of(progress, 0.5 + 0.25 * k / worlds, 0.25 / worlds) for k in range(worlds)]
-    singly = [_in_turn(model, [k], worlds, shares[k])[0] for k in range(worlds)]
+    singly = []
+    for k in range(worlds):
+        share = part_of(progress, 0.5 + 0.25 * k / worlds, 0.25 / worlds)
+        singly += _in_turn(model, [k], worlds, share)
     together = _in_turn(model, range(worlds), worlds, part_of(progress, 0.75, 0.25))
-    return Figures(
-        loading=costs["load"],
-        making=costs["make"],
-        stepping=costs["step"] / _STEPS,
-        ratio=_STEPS * costs["load"] / costs["step"],
+    different = len({end.tobytes() for end in together})
+    return ObjectsResult(
+        loading=loading,
+        making=making,
+        stepping=bulk / _STEPS,
         worlds=worlds,
         nstep=_STEPS,
-        alone=all(map(np.array_equal, singly, together)),
-        different=len({end.tobytes() for end in together}),
+        alone=_all_equal(singly, together),
+        different=different,
         arrays=len(before),
         constant=before == _arrays(model),
         shared=shared,
@@ -94,10 +119,29 @@ def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
     )
 
 
-def _in_turn(model: Model, numbers: Sequence[int], count: int, progress: Progress) -> list[Array]:
-    """Where some of `count` Data end if they take their steps in turn, each under its command.
+def _all_equal(arrays: Sequence[Array], others: Sequence[Array]) -> bool:
+    """Tell whether each array has the numbers of its partner."""
+    return all(np.array_equal(a, b) for a, b in zip(arrays, others, strict=True))
 
-    Another one for each: of the first actuator, over a part of its range.
+
+def _names_model(data: Data, model: Model) -> bool:
+    """Tell whether the engine's object of a Data names the engine's model as its own."""
+    return getattr(data.raw, "model", None) is model.raw
+
+
+def _in_turn(model: Model, numbers: Sequence[int], count: int, progress: Progress) -> list[Array]:
+    """Return where some of `count` Data end if they take their steps in turn.
+
+    Each has a command of its own: of the first actuator, over a part of its range.
+
+    Args:
+        model: The Model of all of them.
+        numbers: Which of them are made, from 0.
+        count: How many there are.
+        progress: Told the fraction that is done.
+
+    Returns:
+        qpos (nq,) of each at its end.
     """
     with ExitStack() as stack:
         worlds = [stack.enter_context(make_data(model)) for _ in numbers]
@@ -113,7 +157,7 @@ def _in_turn(model: Model, numbers: Sequence[int], count: int, progress: Progres
 
 
 def _arrays(model: Model) -> dict[str, bytes]:
-    """The bytes of every array of a Model, and of the engine's own model."""
+    """Return the bytes of every array of a Model, and of the engine's own model, by name."""
     fields = {name: getattr(model, name) for name in vars(model)}
     raw = [name for name in dir(model.raw) if not name.startswith("_")]
     fields |= {f"raw.{name}": getattr(model.raw, name) for name in raw}
@@ -122,8 +166,8 @@ def _arrays(model: Model) -> dict[str, bytes]:
     }
 
 
-def slots(result: Figures) -> dict[str, Any]:
-    """What the page says."""
+def slots(result: ObjectsResult) -> dict[str, Any]:
+    """Return what the page's slots take beside the fields of the result."""
     return {
         "right": 0 if result.alone else 1,
         "stepped": f"{100 * result.provenance.timestep:g} s",
@@ -132,20 +176,39 @@ def slots(result: Figures) -> dict[str, Any]:
     }
 
 
-def tables(results: Results, _first: Figures) -> dict[str, Any]:
-    """What each part costs."""
-    costs = {
-        "load: the file, once": lambda r: duration(r.loading),
-        "make_data": lambda r: duration(r.making),
-        "step: one timestep": lambda r: duration(r.stepping),
-        "a load costs as much as": lambda r: f"{r.ratio:,.0f} steps",
-    }
-    against = {
-        "a load takes": lambda a, b: f"{b.loading / a.loading:.1f} ×",
-        "a Data takes": lambda a, b: f"{b.making / a.making:.1f} ×",
-        "a step takes": lambda a, b: f"{b.stepping / a.stepping:.1f} ×",
-    }
-    return {
-        "costs": by_engine(results, costs, "What each costs on this machine, now (median of five)"),
-        "differences": differences(results, against),
-    }
+def tables(
+    results: Mapping[str, ObjectsResult], _first: ObjectsResult
+) -> dict[str, Block | Sequence[Block]]:
+    """Return what each part costs."""
+    return {"costs": _costs(results), "differences": _differences(results)}
+
+
+def _costs(results: Mapping[str, ObjectsResult]) -> Table:
+    """Return the wall time of each part by engine."""
+    return by_engine(
+        results,
+        {
+            "load: the file, once": lambda r: duration(r.loading),
+            "make_data": lambda r: duration(r.making),
+            "step: one timestep": lambda r: duration(r.stepping),
+            "a load costs as much as": lambda r: f"{r.ratio:,.0f} steps",
+        },
+        "What each costs on this machine, now (median of five)",
+    )
+
+
+def _differences(results: Mapping[str, ObjectsResult]) -> Sequence[Table]:
+    """Return how much longer each part takes on another engine than on the first."""
+    return differences(
+        results,
+        {
+            "a load takes": lambda a, b: _times(a.loading, b.loading),
+            "a Data takes": lambda a, b: _times(a.making, b.making),
+            "a step takes": lambda a, b: _times(a.stepping, b.stepping),
+        },
+    )
+
+
+def _times(first: float, other: float) -> str:
+    """Write how many times as long as the first another takes."""
+    return f"{other / first:.1f} ×"

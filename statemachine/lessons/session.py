@@ -9,25 +9,52 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stdout
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import statemachine
 
 from ..backends import backend_engine
-from ..interface import Data, Model, make_data, step
-from ..page import Code, Figures, Page, Printed
+from ..interface import Array, Data, Model, make_data, step
+from ..page import Block, Code, Page, Printed
 from ..probes.calls import record, recorded_engines, statements
 from ..runs.drive import Progress, silent, steps_in
 from ..runs.robot import is_the_arm, warn_of_start
 from . import Lesson, module, template
 
+if TYPE_CHECKING:
+    from ..probes.calls import Recording
+    from .template import HasProvenance
+
 Options = Mapping[str, Any]  # of a lesson, by key
+L = TypeVar("L")  # what is looked at after a step
+
+
+@dataclass
+class Course(Generic[L]):
+    """Course of a Data through the n steps of a run.
+
+    Attributes:
+        ctrl: (nu,) Command before the first step [unit of the actuator].
+        time: (n + 1) Times of the states that it went through [s].
+        qpos: (n + 1) Positions (nq,) in each of these states [rad or m].
+        looks: (n) What was looked at after each step.
+    """
+
+    ctrl: Array
+    time: list[float] = field(default_factory=list)
+    qpos: list[Array] = field(default_factory=list)
+    looks: list[L] = field(default_factory=list)
+
+    def add_state(self, data: Data) -> None:
+        """Add the state that the Data is in."""
+        self.time.append(data.time)
+        self.qpos.append(data.qpos.copy())
 
 
 class CodeRun(ExitStack):
-    """The code of a lesson on one Model, to be run once.
+    """Code of a lesson on one Model, to be run once.
 
         with CodeRun(code, model) as play:
             play()
@@ -50,11 +77,11 @@ class CodeRun(ExitStack):
 
     @property
     def printed(self) -> str:
-        """What the code printed."""
+        """Return what the code printed."""
         return self._out.getvalue()
 
     def lines(self, each_step: Callable[[Model, Data], object] | None = None) -> Iterator[str]:
-        """Run the code; yields each statement after it was run.
+        """Run the code, and yield each statement after it was run.
 
         Args:
             each_step: Called for each timestep in place of `step`, which it calls. Then
@@ -63,82 +90,104 @@ class CodeRun(ExitStack):
         Raises:
             Exception: Whatever the code raised.
         """
+        facade = self._facade(each_step)
+
+        def imported(name: str, *args: Any, **kwargs: Any) -> Any:
+            return facade if name == statemachine.__name__ else __import__(name, *args, **kwargs)
+
+        self.names["__name__"] = "__main__"
+        self.names["__builtins__"] = {**vars(builtins), "__import__": imported}
+        for source, _, run in statements(self._code):
+            with redirect_stdout(self._out):
+                run(self.names)
+            yield source
+
+    def _facade(self, each_step: Callable[[Model, Data], object] | None) -> ModuleType:
+        """Return the package as the code imports it: its Model is given, its steps are looked at.
+
+        Args:
+            each_step: See `lines`.
+        """
+
+        def load(*_args: Any, **_options: Any) -> Model:
+            return self.model
 
         def make(model: Model) -> Data:
             data = self.enter_context(make_data(model))
             self.worlds.append((model, data))
             return data
 
-        def watched(model: Model, data: Data, nstep: int = 1) -> None:
+        def step_one_by_one(model: Model, data: Data, nstep: int = 1) -> None:
             for _ in range(nstep):
                 (each_step or step)(model, data)
 
-        # The package as the code imports it: its Model is given, its steps are looked at.
         facade = ModuleType(statemachine.__name__)
-        vars(facade).update(
-            vars(statemachine),
-            load=lambda *_args, **_options: self.model,
-            make_data=make,
-            step=watched if each_step else step,
-        )
-
-        def imported(name: str, *args: Any, **kwargs: Any) -> Any:
-            return facade if name == statemachine.__name__ else __import__(name, *args, **kwargs)
-
-        self.names |= {
-            "__name__": "__main__",
-            "__builtins__": {**vars(builtins), "__import__": imported},
-        }
-        for source, _, run in statements(self._code):
-            with redirect_stdout(self._out):
-                run(self.names)
-            yield source
+        vars(facade).update(vars(statemachine), load=load, make_data=make, step=step)
+        if each_step is not None:
+            vars(facade).update(step=step_one_by_one)
+        return facade
 
     def __call__(
         self, each_step: Callable[[Model, Data], object] | None = None
     ) -> Mapping[str, Any]:
-        """Run the code as `lines` does; its variables."""
+        """Run the code as `lines` does, and return its variables."""
         for _ in self.lines(each_step):
             pass
         return self.names
 
     def follow(
-        self, look: Callable[[Model, Data], Any], steps: int, progress: Progress
-    ) -> list[Figures]:
-        """Run the code; where each Data that it stepped went.
+        self, look: Callable[[Model, Data], L], steps: int, progress: Progress
+    ) -> list[Course[L]]:
+        """Run the code, and return the course of each Data that it stepped.
 
         Args:
-            look: What to keep of a Data after each step. Its contacts are then those of the state
-                that the step began from.
-            steps: How many there are.
+            look: Returns what to keep of a Data after each step. Its contacts are then those of the
+                state that the step began from.
+            steps: Number of steps of all Data together.
             progress: Told the fraction that is done.
-
-        Returns:
-            ctrl: (nu,) its command before the first step.
-            time: (n+1) times of the states that it went through [s]; qpos: (nq,) in each.
-            looks: (n) what was looked at after each step.
         """
-        courses: dict[Data, Figures] = {}
+        courses: dict[Data, Course[L]] = {}
         numbers = itertools.count()
 
-        def note(data: Data) -> None:
+        def course_of(data: Data) -> Course[L]:
             if data not in courses:
                 warn_of_start(data.model, data)
-                courses[data] = Figures(ctrl=data.ctrl.copy(), time=[], qpos=[], looks=[])
-            courses[data].time.append(data.time)
-            courses[data].qpos.append(data.qpos.copy())
+                courses[data] = Course(data.ctrl.copy())
+            return courses[data]
 
         def each_step(model: Model, data: Data) -> None:
-            note(data)
+            course = course_of(data)
+            course.add_state(data)
             step(model, data)
-            courses[data].looks.append(look(model, data))
-            if (number := next(numbers)) % 100 == 0:
+            course.looks.append(look(model, data))
+            number = next(numbers)
+            if number % 100 == 0:
                 progress(number / steps)
 
         self(each_step)
         for _, data in self.worlds:
-            note(data)
+            course_of(data).add_state(data)
         return list(courses.values())
+
+
+@dataclass(frozen=True)
+class LessonRun:
+    """Lesson that was taken on one backend.
+
+    Attributes:
+        result: What its module measured, a dataclass of that module.
+        code: Its code as it was typed.
+        printed: What the code printed.
+        arm: Whether it was taken on an SO-101, which is what its text is about.
+        calls: What the code made the engine do; None where that was not asked for, or where the
+            engine's room cannot tell.
+    """
+
+    result: HasProvenance
+    code: str
+    printed: str
+    arm: bool
+    calls: Recording | None = None
 
 
 def take(
@@ -150,7 +199,7 @@ def take(
     menagerie: str | None = None,
     progress: Progress = silent,
     calls: bool = False,
-) -> Figures:
+) -> LessonRun:
     """Run the code of a lesson, and what else the lesson looks at.
 
     Args:
@@ -163,74 +212,78 @@ def take(
         progress: Told the fraction that is done.
         calls: Whether to run the code once more, recording what it makes the engine do, if the
             engine's room can tell.
-
-    Returns:
-        result: What its module measured, and its provenance.
-        code: As it was typed; printed: what it printed.
-        arm: Whether it was taken on an SO-101, which is what its text is about.
-        calls: What the engine was made to do by it, if that was to be recorded and can be.
     """
     values = fitted(lesson, model, options or {})
     lesson_module = module(lesson.name)
     code = lesson_module.code(model, values, load_line(name or lesson.model, backend, menagerie))
     with CodeRun(code, model) as play:
         result = lesson_module.run(play, values, progress)
+    recording = None
     engine = backend_engine(backend) or backend
-    recorded = record(code, engine) if calls and engine in recorded_engines() else None
-    return Figures(
-        result=result, code=code, printed=play.printed, arm=is_the_arm(model), calls=recorded
-    )
+    if calls and engine in recorded_engines():
+        recording = record(code, engine)
+    return LessonRun(result, code, play.printed, is_the_arm(model), recording)
 
 
 def fitted(lesson: Lesson, model: Model, options: Options) -> dict[str, Any]:
-    """All options of a lesson; what is left open is what the Model suggests."""
+    """Return all options of a lesson; what is left open is what the Model suggests."""
     values = lesson.defaults | dict(options)
     fit = getattr(module(lesson.name), "fit", None)
     return fit(model, values) if fit else values
 
 
-def page_of_lesson(lesson: Lesson, taken: Mapping[str, Figures]) -> Page:
-    """The page of a lesson that was taken on one backend or several."""
-    first, *others = taken
-    code = taken[first].code
-    if others:  # each ran with its own name there
-        then = ", then ".join(f'"{name}"' for name in others)
-        loads = re.compile(f'^.*backend="{re.escape(first)}".*$', re.MULTILINE)
-        code = loads.sub(lambda line: f"{line[0]}  # then {then}", code)
+def page_of_lesson(lesson: Lesson, taken: Mapping[str, LessonRun]) -> Page:
+    """Return the page of a lesson that was taken on one backend or several."""
     lesson_module = module(lesson.name)
     results = {name: run.result for name, run in taken.items()}
     slots = {name: vars(result) | lesson_module.slots(result) for name, result in results.items()}
-    has_tables = hasattr(lesson_module, "tables")
-    blocks = {
-        "code": Code(code.splitlines()),
+    first = next(iter(taken.values()))
+    blocks: dict[str, Block | Sequence[Block]] = {
+        "code": Code(_code_shown(taken).splitlines()),
         "printed": Printed({name: run.printed for name, run in taken.items()}),
-        **(lesson_module.tables(results, results[first]) if has_tables else {}),
     }
-    page = template.page(lesson.name, results, slots, blocks, prose=taken[first].arm)
-    asked = (
-        lesson.question if taken[first].arm else "code and figures; its text is about the SO-101"
-    )
-    return replace(page, title=f"{lesson.name}: {asked}")
+    if hasattr(lesson_module, "tables"):
+        blocks |= lesson_module.tables(results, first.result)
+    page = template.page(lesson.name, results, slots, blocks, prose=first.arm)
+    heading = "code and figures; its text is about the SO-101"
+    if first.arm:
+        heading = lesson.question
+    return replace(page, title=f"{lesson.name}: {heading}")
+
+
+def _code_shown(taken: Mapping[str, LessonRun]) -> str:
+    """Return the code of the first backend, with the names of the others beside its `load`."""
+    first, *others = taken
+    code = taken[first].code
+    if not others:
+        return code
+    then = ", then ".join(f'"{name}"' for name in others)
+    loads = re.compile(f'^.*backend="{re.escape(first)}".*$', re.MULTILINE)
+    return loads.sub(lambda line: f"{line[0]}  # then {then}", code)
 
 
 def stepping_loop(model: Model, marks: Sequence[float], seconds: float) -> tuple[str, str]:
-    """The head of a loop that steps from mark to mark, and what it gives `step` as nstep.
+    """Return the head of a loop that steps from mark to mark, and what it gives `step` as nstep.
 
     Args:
         model: Its timestep counts.
-        marks: Times at which the loop stops [s]; seconds: the last.
-        seconds: See marks.
+        marks: Times at which the loop stops [s].
+        seconds: The last of these times [s].
     """
     total = steps_in(model, seconds)
-    ends = sorted({0, total, *(k for t in marks if 0 < (k := round(t / model.timestep)) < total)})
-    counts = [end - start for start, end in itertools.pairwise(ends)]
+    ends = {0, total}
+    for time in marks:
+        end = round(time / model.timestep)
+        if 0 < end < total:
+            ends.add(end)
+    counts = [end - start for start, end in itertools.pairwise(sorted(ends))]
     if len(set(counts)) == 1:
         return f"for _ in range({len(counts)}):", str(counts[0])
     return f"for n in ({', '.join(map(str, counts))}):", "n"
 
 
 def load_line(model: str, backend: str, menagerie: str | None = None) -> str:
-    """The call that loads a model, as one types it."""
+    """Return the call that loads a model, as one types it."""
     name, engine = (json.dumps(text, ensure_ascii=False) for text in (model, backend))
     folder = f", menagerie={menagerie!r}" if menagerie else ""
     return f"sm.load({name}, backend={engine}{folder})"

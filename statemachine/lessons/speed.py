@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from ..backends import load as load_model
@@ -10,12 +11,12 @@ from ..engines import room
 from ..interface import Data, Model
 from ..interface.options import as_count
 from ..measures.text import count, duration
-from ..page import Figures
+from ..page import Block, Table
 from ..runs.drive import Progress
-from ..runs.header import provenance
+from ..runs.header import Provenance, provenance
 from .in_turns import Ratio, in_turns
 from .session import CodeRun, Options
-from .template import Results, by_engine, differences
+from .template import by_engine, differences
 
 _ROUNDS = 20
 _MOST = 20_000  # steps of a call or a round; between two the progress moves and Ctrl-C is heard
@@ -23,10 +24,14 @@ _BULK, _AGAIN, _LOOP, _OWN = "in bulk", "in bulk again", "step by step", "as it 
 
 
 def code(model: Model, options: Options, load: str) -> str:
-    """The same steps by the clock, both ways, once."""
+    """Write code that takes the same steps by the clock, both ways, once."""
     steps = as_count(options["steps"], "steps")
     full, rest = divmod(steps, _MOST)
-    bulk = f"[{steps}]" if not full else f"[{_MOST}] * {full}" + f" + [{rest}]" * bool(rest)
+    bulk = f"[{steps}]"
+    if full:
+        bulk = f"[{_MOST}] * {full}"
+        if rest:
+            bulk += f" + [{rest}]"
     return f"""\
 import time
 import statemachine as sm
@@ -54,25 +59,51 @@ for name, seconds in (
 """
 
 
-def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
-    """Measure the same steps again with the code's own functions, in rounds, the ways in turns.
+@dataclass(frozen=True)
+class SpeedResult:
+    """Wall times of one run of some steps, taken in several ways.
 
-    Returns:
-        nstep: Steps of each run; simulated: their simulated time [s].
+    Attributes:
+        nstep: Steps of the run.
+        simulated: Their simulated time [s].
         bulk: Wall time of `step(model, data, n)`, once a round [s].
         one_by_one: Wall time of as many single calls from a Python loop [s].
-        bulk_factor, one_by_one_factor: Simulated over wall time of both.
         as_it_comes: Wall time in bulk of the engine without the emulated servo, as its own
             users drive it [s]; None where nothing is emulated.
         loop: Cost of single calls over that of one call, round by round.
         null: Cost of one call over that of the same call once more: the noise.
         told_apart: Whether the two differ by more than the noise.
         bulk_rounds: Wall time of each round in bulk [s].
+        provenance: What it was computed with.
     """
+
+    nstep: int
+    simulated: float
+    bulk: float
+    one_by_one: float
+    as_it_comes: float | None
+    loop: Ratio
+    null: Ratio
+    told_apart: bool
+    bulk_rounds: tuple[float, ...]
+    provenance: Provenance
+
+    @property
+    def bulk_factor(self) -> float:
+        """Return the simulated time over the wall time in bulk."""
+        return self.simulated / self.bulk
+
+    @property
+    def one_by_one_factor(self) -> float:
+        """Return the simulated time over the wall time of single calls."""
+        return self.simulated / self.one_by_one
+
+
+def run(play: CodeRun, options: Options, progress: Progress) -> SpeedResult:
+    """Measure the same steps again with the code's own functions, in rounds, the ways in turns."""
     model, total = play.model, options["steps"]
     names = play()
-    size = max(1, min(total // _ROUNDS, _MOST))
-    rounds = [size] * (total // size) + [total % size] * bool(total % size)
+    rounds = _rounds(total)
     models = {_BULK: model, _AGAIN: model, _LOOP: model}
     if room(model.backend).emulated:
         as_it_comes = load_model(model.path, backend=model.backend, defaults="engine")
@@ -82,78 +113,150 @@ def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
         for name, variant in models.items()
     }
     walls = in_turns(ways, len(rounds), progress)
-    simulated, seconds = total * model.timestep, {way: sum(times) for way, times in walls.items()}
-    loop, null = (Ratio.of(way, walls[way], walls[_BULK]) for way in (_LOOP, _AGAIN))
-    return Figures(
+    seconds = {name: sum(times) for name, times in walls.items()}
+    bulk_rounds = tuple(walls[_BULK])
+    loop = Ratio.of(_LOOP, walls[_LOOP], bulk_rounds)
+    null = Ratio.of(_AGAIN, walls[_AGAIN], bulk_rounds)
+    told_apart = loop.differs_from(null)
+    return SpeedResult(
         nstep=total,
-        simulated=simulated,
+        simulated=total * model.timestep,
         bulk=seconds[_BULK],
-        bulk_factor=simulated / seconds[_BULK],
         one_by_one=seconds[_LOOP],
-        one_by_one_factor=simulated / seconds[_LOOP],
         as_it_comes=seconds.get(_OWN),
         loop=loop,
         null=null,
-        told_apart=loop.differs_from(null),
-        bulk_rounds=tuple(walls[_BULK]),
+        told_apart=told_apart,
+        bulk_rounds=bulk_rounds,
         provenance=provenance(model),
     )
+
+
+def _rounds(steps: int) -> list[int]:
+    """Divide steps into rounds of one size, and one for the rest."""
+    size = max(1, min(steps // _ROUNDS, _MOST))
+    full, rest = divmod(steps, size)
+    rounds = [size] * full
+    if rest:
+        rounds.append(rest)
+    return rounds
 
 
 def _way(
     wall: Callable[..., float], model: Model, data: Data, rounds: Sequence[int], bulk: bool
 ) -> Callable[[], float]:
-    """What takes a Data through the rounds, one at each call: together they are one run."""
-    return (wall(model, data, [n] if bulk else [1] * n) for n in rounds).__next__
+    """Return what takes a Data through the rounds, one at each call: together they are one run.
+
+    Args:
+        wall: The code's function that takes the steps of some calls: (model, data, calls) -> [s].
+        model: The Model to step.
+        data: A Data of it.
+        rounds: Steps of each round.
+        bulk: Whether a round is one call, and not one for each of its steps.
+    """
+    remaining = iter(rounds)
+
+    def take_round() -> float:
+        nstep = next(remaining)
+        return wall(model, data, [nstep] if bulk else [1] * nstep)
+
+    return take_round
 
 
-def slots(result: Figures) -> dict[str, Any]:
-    """What the page says."""
+def slots(result: SpeedResult) -> dict[str, Any]:
+    """Return what the page's slots take beside the fields of the result."""
     return {
-        "right": int(result.told_apart) and sum(result.loop.median > limit for limit in (1, 2)),
+        "right": _right(result),
         "simulated": f"{result.simulated:g}",
         "steps": count(result.nstep, "step"),
         "timestep": f"{result.provenance.timestep:g} s",
+        "emulated": result.as_it_comes is not None,
+        **_cost_slots(result),
+    }
+
+
+def _cost_slots(result: SpeedResult) -> dict[str, str]:
+    """Return what the page says of the cost of a step, and of the two ways."""
+    return {
+        "step_cost": duration(result.bulk / result.nstep),
         "rounds": count(result.loop.rounds, "round"),
         "loop_cost": f"{result.loop.median:.2f}",
         "noise": f"{result.null.median:.2f}",
-        "step_cost": duration(result.bulk / result.nstep),
-        "emulated": result.as_it_comes is not None,
     }
 
 
-def tables(results: Results, _first: Figures) -> dict[str, Any]:
-    """Times and factors; they are this machine's, now."""
-    times: dict[str, Callable[[Figures], str]] = {
-        "in bulk": lambda r: _cell(r, r.bulk),
-        "step by step": lambda r: _cell(r, r.one_by_one),
-        "one step, in bulk": lambda r: f"{r.bulk / r.nstep * 1e6:.1f} µs",
-    }
-    if any(result.as_it_comes is not None for result in results.values()):
-        times["in bulk, as the engine comes"] = lambda r: _cell(r, r.as_it_comes)
-    relative = {
-        "step by step": lambda r: r.loop.spread(),
-        "in bulk again": lambda r: r.null.spread(),
-    }
+def _right(result: SpeedResult) -> int:
+    """Return the number of the right choice: how much longer a loop of single calls takes."""
+    cost = result.loop.median
+    if not result.told_apart or cost <= 1:
+        return 0
+    return 1 if cost <= 2 else 2
+
+
+def tables(
+    results: Mapping[str, SpeedResult], _first: SpeedResult
+) -> dict[str, Block | Sequence[Block]]:
+    """Return times and factors; they are this machine's, now."""
     return {
-        "times": by_engine(results, times, "Wall time, and × real time, on this machine, now"),
-        "relative": by_engine(
-            results, relative, "Cost relative to bulk: median of the rounds, and their middle half"
-        ),
+        "times": _times(results),
+        "relative": _relative(results),
         "differences": differences(results, {"time of a step, in bulk": _against}),
     }
 
 
-def _against(left: Figures, right: Figures) -> str:
-    """How much longer a step takes on another engine; the engines were measured one by one."""
+def _times(results: Mapping[str, SpeedResult]) -> Table:
+    """Return the wall time of each way by engine."""
+    rows = {"in bulk": _bulk, "step by step": _one_by_one, "one step, in bulk": _one_step}
+    if any(result.as_it_comes is not None for result in results.values()):
+        rows["in bulk, as the engine comes"] = _as_it_comes
+    return by_engine(results, rows, "Wall time, and × real time, on this machine, now")
+
+
+def _bulk(result: SpeedResult) -> str:
+    """Write the wall time in bulk."""
+    return _by_the_clock(result, result.bulk)
+
+
+def _one_by_one(result: SpeedResult) -> str:
+    """Write the wall time of single calls."""
+    return _by_the_clock(result, result.one_by_one)
+
+
+def _one_step(result: SpeedResult) -> str:
+    """Write the wall time of one step in bulk."""
+    return f"{result.bulk / result.nstep * 1e6:.1f} µs"
+
+
+def _as_it_comes(result: SpeedResult) -> str:
+    """Write the wall time of the engine as it comes."""
+    if result.as_it_comes is None:
+        return "the same"
+    return _by_the_clock(result, result.as_it_comes)
+
+
+def _by_the_clock(result: SpeedResult, wall: float) -> str:
+    """Write a wall time [s], and how much faster that is than real time."""
+    return f"{wall:.3f} s, {result.simulated / wall:.0f} × real time"
+
+
+def _relative(results: Mapping[str, SpeedResult]) -> Table:
+    """Return the cost of each way relative to that in bulk, by engine."""
+    return by_engine(
+        results,
+        {
+            "step by step": lambda r: r.loop.spread(),
+            "in bulk again": lambda r: r.null.spread(),
+        },
+        "Cost relative to bulk: median of the rounds, and their middle half",
+    )
+
+
+def _against(left: SpeedResult, right: SpeedResult) -> str:
+    """Write how much longer a step takes on another engine.
+
+    The engines were measured one after the other, and not in turns.
+    """
     ratio = Ratio.of("", right.bulk_rounds, left.bulk_rounds)
     if not (ratio.differs_from(left.null) and ratio.differs_from(right.null)):
         return "cannot be told apart here"
     return ratio.spread(" ×", 1)
-
-
-def _cell(result: Figures, wall: float | None) -> str:
-    """A wall time [s], and how much faster that is than real time; None is as the rest."""
-    if wall is None:
-        return "the same"
-    return f"{wall:.3f} s, {result.simulated / wall:.0f} × real time"

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from ..engines import room
 from ..interface import JointType, Model, make_data, reset
 from ..measures.text import grouped, listed
-from ..page import Figures, Slots, Table
+from ..page import Block, Slots, Table
 from ..runs.drive import Progress
-from ..runs.header import provenance
+from ..runs.header import Provenance, provenance
 from .session import CodeRun, Options
-from .template import Results, differences
+from .template import differences
 
 NO_NAME = "(no name)"
 _SIZES = ("nq", "nv", "nu", "nbody")
 
 
 def code(model: Model, options: Options, load: str) -> str:
-    """Sizes, and the slots of each joint."""
+    """Write code that prints sizes, and the slots of each joint."""
     return f"""\
 import statemachine as sm
 
@@ -29,120 +31,214 @@ for j, name in enumerate(model.joint_names):
 """
 
 
-def run(play: CodeRun, options: Options, progress: Progress) -> Figures:
-    """Read the layout off the Model, and the time off a Data at keyframe 0.
+@dataclass(frozen=True)
+class JointSlots:
+    """Slots of a joint: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop].
 
-    Returns:
-        nq, nv, nu, nbody: Sizes of the Model.
-        joints: The slots of each: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop].
-        fresh_time: `data.time` of a fresh Data.
-        keyframe: Name of keyframe 0; keyframe_time: `data.time` after a reset to it; None without
-            one.
-        terms: What the engine itself calls all this, where that differs.
+    Attributes:
+        name: Of the joint; "" where it has none.
+        type: "free", "ball", "slide" or "hinge".
+        qpos_start: Its first slot in qpos.
+        qpos_stop: The slot after its last one in qpos.
+        qvel_start: Its first slot in qvel.
+        qvel_stop: The slot after its last one in qvel.
     """
+
+    name: str
+    type: str
+    qpos_start: int
+    qpos_stop: int
+    qvel_start: int
+    qvel_stop: int
+
+
+@dataclass(frozen=True)
+class Term:
+    """Name that the engine itself has for a thing, and ours.
+
+    Attributes:
+        thing: What is meant.
+        ours: What the interface has for it.
+        engine: What the engine has for it.
+    """
+
+    thing: str
+    ours: str
+    engine: str
+
+
+@dataclass(frozen=True)
+class StateResult:
+    """Layout of the state of a Model, and its time.
+
+    Attributes:
+        nq: Length of qpos.
+        nv: Length of qvel.
+        nu: Length of ctrl.
+        nbody: Number of bodies, the world included.
+        joints: The slots of each joint.
+        fresh_time: `data.time` of a fresh Data [s].
+        keyframe: Name of keyframe 0; None without one.
+        keyframe_time: `data.time` after a reset to it [s]; None without one.
+        terms: What the engine itself calls all this, where that differs.
+        provenance: What it was computed with.
+    """
+
+    nq: int
+    nv: int
+    nu: int
+    nbody: int
+    joints: tuple[JointSlots, ...]
+    fresh_time: float
+    keyframe: str | None
+    keyframe_time: float | None
+    terms: tuple[Term, ...]
+    provenance: Provenance
+
+
+def run(play: CodeRun, options: Options, progress: Progress) -> StateResult:
+    """Read the layout off the Model, and the time off a Data at keyframe 0."""
     play()
     model = play.model
-    rows = zip(
-        model.joint_names,
-        (JointType(int(kind)) for kind in model.jnt_type),
-        model.jnt_qposadr.tolist(),
-        model.jnt_dofadr.tolist(),
-        strict=True,
-    )
-    joints = tuple(
-        Figures(
-            name=name,
-            type=kind.name.lower(),
-            qpos_start=place,
-            qpos_stop=place + kind.nq,
-            qvel_start=dof,
-            qvel_stop=dof + kind.nv,
-        )
-        for name, kind, place, dof in rows
-    )
+    joints = tuple(_slots_of(model, joint) for joint in range(model.njnt))
+    keyframe = keyframe_time = None
     with make_data(model) as data:
-        fresh, name, time = data.time, None, None
+        fresh_time = data.time
         if model.keyframes:
             reset(model, data, keyframe=0)
-            name, time = model.keyframes[0].name, data.time
-    return Figures(
+            keyframe, keyframe_time = model.keyframes[0].name, data.time
+    return StateResult(
         nq=model.nq,
         nv=model.nv,
         nu=model.nu,
         nbody=model.nbody,
         joints=joints,
-        fresh_time=fresh,
-        keyframe=name,
-        keyframe_time=time,
-        terms=room(model.backend).terms(model),
+        fresh_time=fresh_time,
+        keyframe=keyframe,
+        keyframe_time=keyframe_time,
+        terms=_terms_of(model),
         provenance=provenance(model),
     )
 
 
-def slots(result: Figures) -> dict[str, Any]:
-    """What the page says."""
-    shifted = [
-        joint.name or NO_NAME
-        for joint in result.joints
-        if (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
-    ]
+def _terms_of(model: Model) -> tuple[Term, ...]:
+    """Return what the engine itself calls what the interface has a name for."""
+    terms = room(model.backend).terms(model)
+    return tuple(Term(term.thing, term.ours, term.engine) for term in terms)
+
+
+def _slots_of(model: Model, joint: int) -> JointSlots:
+    """Return the slots of a joint."""
+    kind = JointType(int(model.jnt_type[joint]))
+    place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+    return JointSlots(
+        name=model.joint_names[joint],
+        type=kind.name.lower(),
+        qpos_start=place,
+        qpos_stop=place + kind.nq,
+        qvel_start=dof,
+        qvel_stop=dof + kind.nv,
+    )
+
+
+def slots(result: StateResult) -> dict[str, Any]:
+    """Return what the page's slots take beside the fields of the result."""
+    shifted = [_name(joint) for joint in result.joints if _is_shifted(joint)]
     return {
         "shifted": ", ".join(shifted),
         "right": 0 if result.nv == result.nq else 2,
     }
 
 
-def tables(results: Results, first: Figures) -> dict[str, Any]:
-    """Sizes, and who owns which slots; engines that say the same share a table."""
-    sizes = [
-        (name, *(str(getattr(layout, size)) for size in _SIZES)) for name, layout in results.items()
-    ]
-    owners = grouped((tuple(map(_row, layout.joints)), name) for name, layout in results.items())
+def _name(joint: JointSlots) -> str:
+    """Return the name of a joint as tables show it."""
+    return joint.name if joint.name else NO_NAME
+
+
+def _is_shifted(joint: JointSlots) -> bool:
+    """Tell whether a joint has other slots in qvel than in qpos."""
+    return (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
+
+
+def tables(
+    results: Mapping[str, StateResult], first: StateResult
+) -> dict[str, Block | Sequence[Block]]:
+    """Return sizes, and who owns which slots; engines that say the same share a table."""
     return {
-        "sizes": Table(
-            ("", *_SIZES),
-            sizes,
-            title="Lengths of qpos, qvel and ctrl; number of bodies, the world included",
-        ),
-        "owners": [
-            Table(
-                ("joint", "type", "qpos", "qvel"),
-                rows,
-                title=f"Which slots are whose, on {listed(names)}",
-                words=frozenset({0, 1}),
-            )
-            for rows, names in owners.items()
-        ],
-        "picture": Slots(
-            "Which slots are whose",
-            {
-                "qpos": [(j.name, j.qpos_start, j.qpos_stop) for j in first.joints],
-                "qvel": [(j.name, j.qvel_start, j.qvel_stop) for j in first.joints],
-            },
-        ),
-        "terms": [
-            Table(
-                ("", "here", f"in {name} itself"),
-                [(term.thing, term.ours, term.engine) for term in layout.terms],
-                title=f"What {name} calls it",
-                words=frozenset({0, 1, 2}),
-            )
-            for name, layout in results.items()
-            if layout.terms
-        ],
+        "sizes": _sizes(results),
+        "owners": _owners(results),
+        "picture": _picture(first),
+        "terms": [_terms_table(name, result) for name, result in results.items() if result.terms],
         "differences": differences(results, {"names, sizes and slots": _compared}),
     }
 
 
-def _row(joint: Figures) -> tuple[str, ...]:
-    places = (joint.qpos_start, joint.qpos_stop), (joint.qvel_start, joint.qvel_stop)
-    return (joint.name or NO_NAME, joint.type, *(_slots(*ends) for ends in places))
+def _sizes(results: Mapping[str, StateResult]) -> Table:
+    """Return the sizes of the Model by engine."""
+    rows = [
+        (name, str(result.nq), str(result.nv), str(result.nu), str(result.nbody))
+        for name, result in results.items()
+    ]
+    title = "Lengths of qpos, qvel and ctrl; number of bodies, the world included"
+    return Table(("", *_SIZES), rows, title)
 
 
-def _compared(left: Figures, right: Figures) -> str:
-    same = all(getattr(left, name) == getattr(right, name) for name in (*_SIZES, "joints"))
-    return "none" if same else "they differ: see above"
+def _owners(results: Mapping[str, StateResult]) -> list[Table]:
+    """Return the slots of each joint; engines that say the same share a table."""
+    names_by_joints = grouped((result.joints, name) for name, result in results.items())
+    return [_slots_table(joints, names) for joints, names in names_by_joints.items()]
 
 
-def _slots(start: int, stop: int) -> str:
+def _slots_table(joints: Sequence[JointSlots], engines: Sequence[str]) -> Table:
+    """Return the slots of each joint on some engines."""
+    title = f"Which slots are whose, on {listed(engines)}"
+    return Table.of(
+        joints,
+        {
+            "joint": _name,
+            "type": lambda joint: joint.type,
+            "qpos": lambda joint: _interval(joint.qpos_start, joint.qpos_stop),
+            "qvel": lambda joint: _interval(joint.qvel_start, joint.qvel_stop),
+        },
+        title=title,
+        words=("type",),
+    )
+
+
+def _picture(result: StateResult) -> Slots:
+    """Return the slots of each joint as a picture."""
+    return Slots(
+        "Which slots are whose",
+        {
+            "qpos": [(joint.name, joint.qpos_start, joint.qpos_stop) for joint in result.joints],
+            "qvel": [(joint.name, joint.qvel_start, joint.qvel_stop) for joint in result.joints],
+        },
+    )
+
+
+def _terms_table(engine: str, result: StateResult) -> Table:
+    """Return what an engine itself calls what we have a name for."""
+    theirs = f"in {engine} itself"
+    return Table.of(
+        result.terms,
+        {
+            "": lambda term: term.thing,
+            "here": lambda term: term.ours,
+            theirs: lambda term: term.engine,
+        },
+        title=f"What {engine} calls it",
+        words=("here", theirs),
+    )
+
+
+def _compared(left: StateResult, right: StateResult) -> str:
+    """Say whether two engines have the same layout."""
+    same_sizes = all(getattr(left, size) == getattr(right, size) for size in _SIZES)
+    if same_sizes and left.joints == right.joints:
+        return "none"
+    return "they differ: see above"
+
+
+def _interval(start: int, stop: int) -> str:
+    """Write some slots as an index, or as a slice where there are several."""
     return f"[{start}]" if stop == start + 1 else f"[{start}:{stop}]"

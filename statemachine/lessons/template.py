@@ -31,7 +31,7 @@ from ..interface import Array
 from ..measures import largest
 from ..measures.text import apart, milliseconds, short_time
 from ..page import Block, Heading, Items, Page, Question, Table, Text, Verdict
-from ..releases import engine_of
+from ..release_names import engine_of
 
 if TYPE_CHECKING:
     from ..runs.header import Provenance

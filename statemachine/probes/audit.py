@@ -18,7 +18,7 @@ from ..interface import Array, Data, Model, State, get_state, make_data, reset, 
 from ..interface.options import as_count
 from ..measures import JointPlaces, farthest, largest_or_inf, turns
 from ..measures.text import rough
-from ..releases import engine_of
+from ..release_names import engine_of
 
 _WIDTH = 80
 _BEFORE = 50  # steps until a run is saved

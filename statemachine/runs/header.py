@@ -21,7 +21,7 @@ from ..errors import TraceError, refuse
 from ..interface import OPTIONS, JointType, Model
 from ..interface.options import HUGE
 from ..models import included_file
-from ..releases import engine_of
+from ..release_names import engine_of
 
 # What a result was computed with, so that it can be computed again.
 

@@ -32,7 +32,7 @@ from ...installed import DEFAULT
 from ...model_files import checked_file
 from ...models import resolve
 from ...page import Figures
-from ...releases import engine_of, is_release
+from ...release_names import engine_of, is_release
 from .compiled import compiled, enter_rest
 from .diff import diff
 from .ledger import Ledger

@@ -14,7 +14,7 @@ from ...interface import JointType, Model
 from ...measures import Deviation
 from ...measures.text import milliseconds
 from ...page import Figures
-from ...releases import engine_of
+from ...release_names import engine_of
 from ...runs import Trace
 from ...runs.drive import Progress, silent
 from ...runs.header import provenance
