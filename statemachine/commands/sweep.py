@@ -146,7 +146,7 @@ def run(options: argparse.Namespace) -> int:
             progress=bar,
         )
     if not (options.report and options.json):
-        show(words.summary_page(ready, summary), summary, options.json)
+        show(words.summary_page(summary), summary, options.json)
     if options.report:
         try:
             answer, page = _report(options, out)

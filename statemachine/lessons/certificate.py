@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
 
 from ..installed import WITNESS
-from ..measures.text import degrees, listed, millimetres, vector
-from ..page import Block, Items, Page, Table
+from ..measures.text import degrees, grouped, millimetres, vector
+from ..page import Page, Table
+from ..show.templates import PageContent, render
 from . import template
 from .fingertip import FingertipResult, FrameOffset, TipGap
 from .template import by_engine, differences
@@ -16,54 +17,93 @@ from .template import by_engine, differences
 _SHOWN = 12  # rows of a table of tips
 
 
+@dataclass(frozen=True)
+class _OfEngines:
+    """What is said of engines of which the same is to be said.
+
+    Attributes:
+        label: Their names with a colon; "" where the same is said of all.
+        result: Of the first of them.
+    """
+
+    label: str
+    result: FingertipResult
+
+    @property
+    def version(self) -> str:
+        """Version of the witness."""
+        return self.result.provenance.versions[WITNESS]
+
+    @property
+    def seed(self) -> str:
+        """Seed of the random poses."""
+        return str(self.result.provenance.seed)
+
+    @property
+    def offset(self) -> str:
+        """How far the two frames are apart."""
+        return _offset(self.result.frames)
+
+
+@dataclass(frozen=True)
+class FingertipPage(PageContent):
+    """Content of the page of a certificate.
+
+    Attributes:
+        origin: Model, engines and timestep.
+        has_pybullet: Whether PyBullet is among the engines.
+        readings: What the witness read, by engines.
+        findings: What the certificate says, by engines.
+        gaps: Tables of the gaps.
+        differences: Tables of how far the engines themselves are apart.
+    """
+
+    template = "certificate.md.j2"
+    origin: str
+    has_pybullet: bool
+    readings: Sequence[_OfEngines]
+    findings: Sequence[_OfEngines]
+    gaps: Sequence[Table]
+    differences: Sequence[Table]
+
+
 def page(results: Mapping[str, FingertipResult]) -> Page:
     """Return the page of a certificate: frames first, then the differences."""
-    first = next(iter(results.values()))
-    blocks: dict[str, Block | Sequence[Block]] = {
-        "prepared": Items(first.prepared),
-        "tips": tables_of_gaps(results),
-        "differences": tables_of_differences(results),
-    }
-    slots = {name: _slots(result) for name, result in results.items()}
-    return template.page("certificate", results, slots, blocks)
+    content = FingertipPage(
+        template.origin(results),
+        "pybullet" in results,
+        _by_engines(results, _reading_of),
+        _by_engines(results, _finding_of),
+        tables_of_gaps(results),
+        tables_of_differences(results),
+    )
+    return render(content)
 
 
-def _slots(result: FingertipResult) -> dict[str, Any]:
-    """Return what the page's slots take."""
-    return {
-        **_witness_slots(result),
-        **_tip_slots(result),
-        "poses": result.poses,
-        "seed": result.provenance.seed,
-        "refused": result.verdict == "different frames",
-        "same_place": result.verdict == "same place",
-        "agrees": result.agrees,
-        "within": f"{result.tolerance:g}",
-    }
+def _by_engines(
+    results: Mapping[str, FingertipResult], told: Callable[[FingertipResult], Hashable]
+) -> list[_OfEngines]:
+    """Return the engines of which the same is told together."""
+    groups = grouped((told(result), engine) for engine, result in results.items())
+    found: list[_OfEngines] = []
+    for engines in groups.values():
+        label = f"{', '.join(engines)}: " if len(groups) > 1 else ""
+        found.append(_OfEngines(label, results[engines[0]]))
+    return found
 
 
-def _witness_slots(result: FingertipResult) -> dict[str, Any]:
-    """Return what the page says of the witness, and of what it read."""
-    return {
-        "version": result.provenance.versions[WITNESS],
-        "file": result.witness_file,
-        "own_reading": result.is_own_reading,
-        "grade": result.grade,
-        "reason": result.reason,
-        "rewritten": bool(result.prepared),
-        "left_out": listed(result.left_out),
-    }
+def _reading_of(result: FingertipResult) -> Hashable:
+    """Return all that the page says of what the witness read."""
+    tips = result.site if result.has_one_tip else len(result.tips)
+    read = (result.grade, result.reason, result.witness_file, result.prepared)
+    return tips, read, result.left_out, result.poses, result.provenance.seed
 
 
-def _tip_slots(result: FingertipResult) -> dict[str, Any]:
-    """Return what the page says of the tips that were compared."""
-    return {
-        "one": result.has_one_tip,
-        "tips_count": len(result.tips),
-        "site": result.site,
-        "witness_frame": result.witness_frame,
-        "frames": _offset(result.frames),
-    }
+def _finding_of(result: FingertipResult) -> Hashable:
+    """Return all that the page says of what the certificate found."""
+    frames = (result.site, result.witness_frame, _offset(result.frames))
+    is_refused = result.verdict == "different frames"
+    return result.verdict, result.grade, result.tolerance, frames if is_refused else None
 
 
 def tables_of_gaps(results: Mapping[str, FingertipResult]) -> list[Table]:

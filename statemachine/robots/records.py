@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from ..errors import BadInputError
 from ..models import check_is_file
+from ..page import only_on_pages
 from ..runs.whole import replace_csv, replace_text
 
 TOLERANCE = 1e-6  # of a gap without contacts [rad or m]
@@ -97,6 +98,7 @@ class RunGap:
         return self.shrinks is not None and self.shrinks >= _FIRST_ORDER
 
     @property
+    @only_on_pages
     def outcome(self) -> GapOutcome:
         """The first of these that holds; "measured" where the size of the gap says it all."""
         if self.explodes:
@@ -148,6 +150,7 @@ class BackendRow:
         return not self.refusal
 
     @property
+    @only_on_pages
     def loading(self) -> Loading:
         """With what it loads."""
         if self.loads:
@@ -193,11 +196,13 @@ class WitnessRow:
     gap: float | None = None
 
     @property
+    @only_on_pages
     def refuses(self) -> bool:
         """Whether it compares nothing."""
         return self.gap is None
 
     @property
+    @only_on_pages
     def has_no_own_reading(self) -> bool:
         """Whether it compares, and says why it does so without a reading of its own."""
         return self.gap is not None and bool(self.refusal)
@@ -245,6 +250,7 @@ class ExaminedModel:
         return not self.part_of or bool(self.nv)
 
     @property
+    @only_on_pages
     def ran_experiments(self) -> bool:
         """Whether an experiment was tried on a backend."""
         return any(backend.scenarios for backend in self.backends.values())

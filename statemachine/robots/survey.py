@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from ..page import only_on_pages
 from .records import TOLERANCE, BackendRow, ExaminedModel
 
 
@@ -76,11 +77,13 @@ class Survey:
         return {file: said for file, said in by_file.items() if said}
 
     @property
+    @only_on_pages
     def is_of_one_model(self) -> bool:
         """Whether it is of one model alone, of which all that was found is worth showing."""
         return len(self.models) == 1 and not self.parts
 
     @property
+    @only_on_pages
     def backends(self) -> tuple[str, ...]:
         """Every backend that a model was examined on."""
         names: dict[str, None] = {}
@@ -89,21 +92,25 @@ class Survey:
         return tuple(names)
 
     @property
+    @only_on_pages
     def others(self) -> tuple[str, ...]:
         """The backends that are compared with the default one."""
         return tuple(name for name in self.backends if name != self.default)
 
     @property
+    @only_on_pages
     def ran_experiments(self) -> bool:
         """Whether an experiment was tried on a model."""
         return any(model.ran_experiments for model in self.models)
 
     @property
+    @only_on_pages
     def engines(self) -> tuple[EngineTally, ...]:
         """The sums of each backend, the default one first."""
         return tuple(self._tally(engine) for engine in (self.default, *self.others))
 
     @property
+    @only_on_pages
     def grades(self) -> Mapping[str, int]:
         """The number of models that the witness compared by each of its readings, or "refused"."""
         witnesses = [model.witness for model in self.models if model.witness is not None]

@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import BadInputError, check_name
 from ..interface import Array
 from ..measures.text import listed
+from ..page import only_on_pages
 from .design import Value
 from .folder import design_of, read_manifest
 from .main_effects import main_effects
@@ -108,26 +109,31 @@ class SweepEffects:
     missing: int
 
     @property
+    @only_on_pages
     def is_of_a_gap(self) -> bool:
         """Whether the quantity is the gap between two engines."""
         return len(self.backends) > 1
 
     @property
+    @only_on_pages
     def has_shares(self) -> bool:
         """Whether parameters have shares of the variance."""
         return not self.why_none
 
     @property
+    @only_on_pages
     def has_no_errors(self) -> bool:
         """Whether there are shares, and no share has a standard error."""
         return self.has_shares and all(effect.error is None for effect in self.effects)
 
     @property
+    @only_on_pages
     def is_sampled(self) -> bool:
         """Whether a range is varied, whose samples are divided into classes."""
         return self.samples > 0
 
     @property
+    @only_on_pages
     def where_largest(self) -> Mapping[str, Value]:
         """The value of each parameter in the cell with the largest value."""
         return dict(zip(self.parameters, self.largest.settings, strict=True))

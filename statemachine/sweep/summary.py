@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ..page import only_on_pages
+
 
 @dataclass(frozen=True)
 class SweepSummary:
@@ -45,11 +47,13 @@ class SweepSummary:
     versions: Mapping[str, str] = field(metadata={"json": False})
 
     @property
+    @only_on_pages
     def failed_cells(self) -> int:
         """How many cells have no result."""
         return sum(self.failed.values())
 
     @property
+    @only_on_pages
     def cells_before(self) -> int:
         """How many cells were there before, or have not run."""
         return self.cells - self.ran
