@@ -17,7 +17,7 @@ from ..measures import largest
 from ..measures.text import count, millimetres, short_time, vector
 from ..page import Block, Table
 from ..runs.drive import Progress, steps_in
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ._robot import coordinate, tips_of, usual_tip, with_joint
 from ._stages import (
     ArrayChange,
