@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine import runs
 from statemachine.compare.why import Explanation, explain
 from statemachine.compare.why.settings import NEEDS, TITLES
 from statemachine.compare.why.shapley import shapley
@@ -23,7 +22,7 @@ from statemachine.errors import BadInputError, DivergedError, EngineWarning, Unk
 from statemachine.interface import Model
 from statemachine.report import why as report
 from statemachine.report.as_json import dumps
-from statemachine.runs import record_scenario
+from statemachine.runs import record_scenario, rerun
 from statemachine.runs.scenarios import Scenario, scenario
 
 from .conftest import (
@@ -78,8 +77,8 @@ def test_leaving_out_the_motion_is_no_explanation(arm: Model) -> None:
 
 
 def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    record = Mock(side_effect=runs.record)
-    monkeypatch.setattr(runs, "record", record)
+    record = Mock(side_effect=rerun.record)
+    monkeypatch.setattr(rerun, "record", record)
     result = explain(arm, arm.replace(gravity=[0, 0, -9]), HOLD, uncertain=None, jobs=1)
     # Both as they come, and the right with the left's gravity.
     assert record.call_count == result.runs == 3

@@ -17,7 +17,7 @@ from ..measures import largest
 from ..measures.text import count, millimetres, short_time, vector
 from ..page import Block, Table
 from ..runs.drive import Progress, steps_in
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ._robot import coordinate, tips_of, usual_tip, with_joint
 from ._stages import (
     ArrayChange,
@@ -209,15 +209,14 @@ def _slots_of_lag(lag: Lag | None) -> dict[str, Any]:
         return {"lag": False}
     steps = len(lag.time)
     worst, step = largest(lag.distance)
-    return {
-        "lag": True,
-        "lags": worst > 0 and not lag.neither,
-        "steps": count(steps, "step"),
-        "of_before": lag.of_before[lag.array] == steps > lag.of_after[lag.array],
-        "array": lag.array,
-        "behind": millimetres(worst),
-        "behind_at": short_time(lag.time[step]),
-    }
+    slots: dict[str, Any] = {"lag": True}
+    slots["lags"] = worst > 0 and not lag.neither
+    slots["steps"] = count(steps, "step")
+    slots["of_before"] = lag.of_before[lag.array] == steps > lag.of_after[lag.array]
+    slots["array"] = lag.array
+    slots["behind"] = millimetres(worst)
+    slots["behind_at"] = short_time(lag.time[step])
+    return slots
 
 
 def tables(results: Results[ForwardResult], first: ForwardResult) -> Blocks:

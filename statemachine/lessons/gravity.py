@@ -16,7 +16,7 @@ from ..interface import Model, make_data, reset
 from ..measures.text import NONE, apart, position, signed
 from ..page import Block, Table, Traces
 from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ..runs.robot import is_the_arm, start_keyframe, touching
 from ..runs.scenarios import SCENARIOS
 from ._falling import BALANCE, EQUALITY, SERVO, Droop, Forces, droop, milestones

@@ -19,7 +19,7 @@ from ..release_names import version_of
 from ..releases import is_here
 from ..runs import record_scenario, shipped
 from ..runs.drive import Progress, steps_in
-from ..runs.header import Provenance, model_digest, provenance
+from ..runs.provenance import Provenance, model_digest, provenance
 from ..runs.robot import command, hold_ctrl, is_servo, start_keyframe, touching, trees_of_actuators
 from ..runs.scenarios import SCENARIOS
 from ._robot import check_servos, start_line

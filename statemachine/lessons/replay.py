@@ -19,7 +19,7 @@ from ..measures import largest
 from ..measures.text import count, degrees, millimetres
 from ..page import Block, Table
 from ..runs.drive import Progress, part_of
-from ..runs.header import Provenance, provenance
+from ..runs.provenance import Provenance, provenance
 from ..runs.robot import body_pairs, command, is_the_arm
 from ._two_runs import (
     BREAKS,

@@ -34,7 +34,7 @@ from ..page import Block, Heading, Items, Page, Question, Table, Text, Verdict
 from ..release_names import engine_of
 
 if TYPE_CHECKING:
-    from ..runs.header import Provenance
+    from ..runs.provenance import Provenance
 
 R = TypeVar("R")  # the result of a lesson on one engine
 Results = Mapping[str, R]  # the results of a lesson, by backend

@@ -26,7 +26,8 @@ from ..errors import (
 from ..interface import MOCAP, JointType
 from ..models import AnyPath, resolve, what_is_there
 from .formats import read_npz, read_parquet, write_npz, write_parquet
-from .header import COLUMNS, Header, model_digest
+from .header import COLUMNS, Header
+from .provenance import model_digest
 from .trace import Trace
 from .whole import beside, replace_file
 

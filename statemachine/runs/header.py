@@ -3,95 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import json
 import math
-import platform
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
-import numpy as np
-
-from .. import __version__
 from ..errors import TraceError, refuse
-from ..interface import OPTIONS, JointType, Model
+from ..interface import OPTIONS, JointType
 from ..interface.options import HUGE
-from ..models import included_file
 from ..release_names import engine_of
-
-# What a result was computed with, so that it can be computed again.
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """What a result was computed with, so that it can be computed again.
-
-    `model_sha256` is the digest of the model's file and of those it includes; `emulated` are
-    the promises of the contract that the backend keeps instead of its engine.
-    """
-
-    backend: str
-    versions: dict[str, str]
-    model_file: str
-    model_sha256: str
-    timestep: float
-    emulated: tuple[str, ...]
-    seed: int | None = None
-
-
-def provenance(model: Model, seed: int | None = None, **others: str) -> Provenance:
-    """The record of a run on `model`; `others` are further versions by name."""
-    versions = {
-        "statemachine": __version__,
-        model.backend: model.engine_version,
-        "numpy": np.__version__,
-        "python": platform.python_version(),
-        **others,
-    }
-    return Provenance(
-        backend=model.backend,
-        versions=versions,
-        # The folder and name, not the machine's path: a result is read elsewhere.
-        model_file="/".join(model.path.parts[-2:]).encode(errors="replace").decode(),
-        model_sha256=model_digest(model.path),
-        timestep=model.timestep,
-        emulated=tuple(
-            name
-            for name, behaviour in model.capabilities.behaviours.items()
-            if behaviour.support == "emulated"
-        ),
-        seed=seed,
-    )
-
-
-def model_digest(path: Path) -> str:
-    """SHA-256 of a model's file and of those it includes or attaches."""
-    return hashlib.sha256(b"".join(file.read_bytes() for file in model_files(path))).hexdigest()
-
-
-def model_files(path: Path) -> Iterator[Path]:
-    """A model's file, then those it includes or attaches, theirs and so on, each once."""
-    if not path.is_file():
-        return
-    waiting, seen = [path], set[Path]()
-    while waiting:
-        file = waiting.pop(0)
-        if file.resolve() in seen:
-            continue
-        seen.add(file.resolve())
-        yield file
-        try:
-            root = ElementTree.parse(file)
-        except ElementTree.ParseError:  # a binary model
-            continue
-        parts = [*root.iter("include"), *root.iterfind("asset/model")]
-        included = [included_file(element.get("file", ""), path, file) for element in parts]
-        waiting += [part for part in included if part is not None]
-
+from .provenance import Provenance, model_digest, model_files, provenance  # noqa: F401
 
 SCHEMA = 1
 # Columns of numbers, one row for each moment; widths are numbers or counts of the header.

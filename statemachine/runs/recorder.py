@@ -36,7 +36,8 @@ from ..interface import (
 from ..interface.options import HUGE
 from ..interface.records import Arrays, Defaults
 from .drive import Controller, Progress, drive, part_of, silent, steps_in
-from .header import Header, provenance
+from .header import Header
+from .provenance import provenance
 from .robot import warn_of_start
 from .trace import COLUMNS, CONTACTS, Trace
 
