@@ -212,6 +212,23 @@ class FingertipResult:
         return "agrees" if self.is_own_reading else "same place"
 
 
+def checked_poses(poses: int, seed: int) -> int:
+    """Return the number of poses, once it and the seed of those that are drawn are checked.
+
+    Raises:
+        BadInputError: One of them is not a whole number in range.
+    """
+    wanted = as_count(poses, "poses")
+    if not 2 <= wanted <= _MOST:
+        raise BadInputError(
+            f"poses must be from 2, as one cannot tell a frame from a joint, to {_MOST:,}; "
+            f"got {wanted:,}"
+        )
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+    return wanted
+
+
 def certify(
     model: Model,
     poses: int = 200,
@@ -243,7 +260,7 @@ def certify(
         BadInputError: `poses` or `seed` is not a whole number in range, `witness` has joints
             that the model has not, or nothing moves.
     """
-    wanted = _checked_count(poses, seed)
+    wanted = checked_poses(poses, seed)
     tips = tips_of(model, site)
     if witness_frame is not None and len(tips) > 1:
         raise BadInputError("--witness-frame names one frame: say which with --site")
@@ -271,19 +288,6 @@ def certify(
         prepared=known.prepared,
         provenance=provenance(model, seed, **{WITNESS: known.version}),
     )
-
-
-def _checked_count(poses: int, seed: int) -> int:
-    """Return the number of poses, or raise BadInputError."""
-    count = as_count(poses, "poses")
-    if not 2 <= count <= _MOST:
-        raise BadInputError(
-            f"poses must be from 2, as one cannot tell a frame from a joint, to {_MOST:,}; "
-            f"got {count:,}"
-        )
-    if seed < 0:
-        raise BadInputError(f"seed must not be negative; got {seed}")
-    return count
 
 
 @dataclass(frozen=True)
