@@ -20,8 +20,9 @@ from statemachine.lessons import fingertip, in_turns, session
 from statemachine.lessons._falling import Forces, milestones
 from statemachine.lessons.certificate import page
 from statemachine.lessons.fingertip import random_qpos
+from statemachine.lessons.speed import SpeedResult
 from statemachine.models import models_dir
-from statemachine.page import Figures, Verdict
+from statemachine.page import Verdict
 from statemachine.runs.header import provenance
 
 from .conftest import (
@@ -115,7 +116,7 @@ def test_speed_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> Non
     assert found.simulated == pytest.approx(47 * 0.005)
 
 
-def _times(monkeypatch: pytest.MonkeyPatch, cost: Any) -> Figures:
+def _times(monkeypatch: pytest.MonkeyPatch, cost: Any) -> SpeedResult:
     """The lesson by a clock that only `cost` moves: of a call of n steps, after so many."""
     now, calls = [0.0], [-1 - 400]  # those of the code come before the rounds
 

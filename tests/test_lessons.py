@@ -36,10 +36,9 @@ from statemachine.commands import lesson as lesson_command
 from statemachine.errors import BadInputError, StateMachineError
 from statemachine.lessons import LESSONS, PATH, module, template, worlds
 from statemachine.lessons.in_turns import Ratio
-from statemachine.lessons.session import CodeRun, load_line, page_of_lesson, take
+from statemachine.lessons.session import CodeRun, LessonRun, load_line, page_of_lesson, take
 from statemachine.page import (
     Code,
-    Figures,
     Heading,
     Page,
     Printed,
@@ -78,7 +77,8 @@ _QUICK = {
 }
 
 
-def _take(name: str, backend: str, **options: Any) -> tuple[Page, Figures]:
+def _take(name: str, backend: str, **options: Any) -> tuple[Page, Any]:
+    """The page of a lesson, and its run; the fields of its result are read as they come."""
     lesson = LESSONS[name]
     taken = take(
         lesson, sm.load(lesson.model, backend=backend), backend, _QUICK.get(name, {}) | options
@@ -89,7 +89,7 @@ def _take(name: str, backend: str, **options: Any) -> tuple[Page, Figures]:
 def _repage(name: str, backend: str, result: Any) -> Page:
     """The page of a result that was changed."""
     return page_of_lesson(
-        LESSONS[name], {backend: Figures(result=result, code="", printed="", arm=True)}
+        LESSONS[name], {backend: LessonRun(result=result, code="", printed="", arm=True)}
     )
 
 
@@ -107,7 +107,7 @@ def test_what_a_shared_model_saves(backend: str, monkeypatch: pytest.MonkeyPatch
     fractions: list[float] = []
     lesson = LESSONS["worlds"]
     model = sm.load(lesson.model, backend=backend)
-    taken = take(lesson, model, backend, {"most": 4}, progress=fractions.append)
+    taken: Any = take(lesson, model, backend, {"most": 4}, progress=fractions.append)
     result, page = taken.result, page_of_lesson(lesson, {backend: taken})
     assert taken.printed.startswith("worlds: 1, ")
     assert max(map(len, taken.code.splitlines())) <= 76
@@ -402,7 +402,7 @@ def test_what_cannot_be_told_apart_is_said_so() -> None:
 )
 def test_an_answer_that_its_run_belies_is_none(part: str, change: Change) -> None:
     result = _on_mujoco("questions")
-    answers = {**result.answers, part: change(result.answers[part])}
+    answers = with_figures(result.answers, **{part: change(getattr(result.answers, part))})
     page = _repage("questions", "mujoco", with_figures(result, answers=answers))
     assert not page.holds
     assert Counter(question.right is None for question in blocks(page, Question)) == {
@@ -474,7 +474,7 @@ def test_a_slide_is_printed_in_millimetres_and_a_reset_tells_its_own_time(tmp_pa
     file = written(tmp_path / "slide.xml", _SLIDE)
     model = sm.load(file)
     options = {"joint": "s", "seconds": 0.5, "longer": 0}
-    taken = take(LESSONS["gravity"], model, "mujoco", options, str(file))
+    taken: Any = take(LESSONS["gravity"], model, "mujoco", options, str(file))
     assert float(taken.printed.split()[0]) == round(1000 * taken.result.servos_on.position[-1], 2)
     reset = take(LESSONS["reset"], model, "mujoco", {}, str(file))
     page = _repage("reset", "mujoco", reset.result)
@@ -486,9 +486,9 @@ def test_a_slide_is_printed_in_millimetres_and_a_reset_tells_its_own_time(tmp_pa
 
 def test_the_second_engine_is_named_after_what_follows_the_load() -> None:
     line = f"model = {load_line('so101', 'mujoco', 'robots')}.replace(timestep=0.01)"
-    taken = Figures(
-        **vars(take(LESSONS["reset"], sm.load("so101"), "mujoco"))
-        | {"code": f"import statemachine as sm\n\n{line}\n"}
+    taken = with_figures(
+        take(LESSONS["reset"], sm.load("so101"), "mujoco"),
+        code=f"import statemachine as sm\n\n{line}\n",
     )
     page = page_of_lesson(LESSONS["reset"], {"mujoco": taken, "other": taken})
     (shown,) = blocks(page, Code)

@@ -37,8 +37,6 @@ from statemachine.errors import (
 )
 from statemachine.installed import engine_version
 from statemachine.interface import Behaviour
-from statemachine.lessons import LESSONS
-from statemachine.lessons.session import take
 from statemachine.processes import resident_memory
 from statemachine.worlds import make_worlds, step
 
@@ -47,6 +45,7 @@ from .conftest import (
     after,
     assert_in,
     bits,
+    lesson_result,
     lives,
     opened,
     path,
@@ -431,7 +430,7 @@ class TestReleases:
                 lambda: sm.load("so101", backend=OLD),
             ),
         )
-        assert take(LESSONS["hold"], sm.load("so101/scene"), "mujoco").result.older.recorded
+        assert lesson_result("hold", sm.load("so101/scene")).older.recorded
         releases.remove(OLD)
         assert not broken.exists()
 

@@ -19,7 +19,15 @@ FEWEST = 5  # rounds; the middle half of fewer says nothing
 
 @dataclass(frozen=True)
 class Ratio:
-    """Cost of one way over another's: the median, and the middle half of the rounds."""
+    """Cost of one way over another's, round by round.
+
+    Attributes:
+        name: Of the way.
+        median: Of the ratios of the rounds.
+        low: Where their middle half begins.
+        high: Where it ends.
+        rounds: Number of rounds.
+    """
 
     name: str
     median: float
@@ -29,19 +37,21 @@ class Ratio:
 
     @classmethod
     def of(cls, name: str, times: Sequence[float], baseline: Sequence[float]) -> Ratio:
-        """From the times of each round."""
+        """Return the ratio of the times of each round to those of a baseline [both s]."""
         ratios = [a / b for a, b in zip(times, baseline, strict=True)]
-        # Of one round there are no quartiles; it is taken twice.
-        low, median, high = statistics.quantiles(ratios * 2 if len(ratios) < 2 else ratios, n=4)
-        return cls(name, median, low, high, len(ratios))
+        rounds = len(ratios)
+        if rounds == 1:  # which has no quartiles, unless it is taken twice
+            ratios *= 2
+        low, median, high = statistics.quantiles(ratios, n=4)
+        return cls(name, median, low, high, rounds)
 
     def spread(self, sign: str = "", decimals: int = 2) -> str:
-        """The median, and the middle half, as text."""
+        """Write the median, and the middle half."""
         middle, low, high = (f"{x:.{decimals}f}" for x in (self.median, self.low, self.high))
         return f"{middle}{sign}  ({low} to {high})"
 
     def differs_from(self, null: Ratio) -> bool:
-        """Whether the middle halves of the rounds lie apart."""
+        """Tell whether the middle halves of the rounds lie apart."""
         if min(self.rounds, null.rounds) < FEWEST:
             return False
         return self.low > null.high or self.high < null.low

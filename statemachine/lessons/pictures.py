@@ -24,8 +24,11 @@ _SLOW = 4  # the same, for four times as slow
 _SWING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)  # what the keyframe "held" commands, but to the side
 
 
+_Poses = tuple[Array, Array | None]  # qpos (n, nq) of what is drawn solid, and as a ghost over it
+
+
 def with_picture(page: Page, lesson: str) -> Page:
-    """The page of a lesson, and after what its code printed a picture of the robot."""
+    """Return the page of a lesson with a picture of the robot after what its code printed."""
     printed = [k for k, block in enumerate(page.blocks) if isinstance(block, Printed)]
     if lesson not in PICTURES or not printed:
         return page
@@ -42,7 +45,20 @@ def _poses(
     every: int = _EVERY,
     **qpos: float,
 ) -> Array:
-    """Rows of qpos (pictures, nq) of a run, so many steps apart; `qpos`: where joints start."""
+    """Run a model, and return its poses.
+
+    Args:
+        name: Of the model.
+        pictures: Number of poses.
+        ctrl: (nu,) Command; None where nobody writes it.
+        keyframe: Number of the keyframe to start at; None for the default state.
+        options: That the model is given.
+        every: Steps from a pose to the next.
+        **qpos: By the names of joints where they start instead [rad].
+
+    Returns:
+        (pictures, nq) Rows of qpos.
+    """
     model = load(name).replace(**(options or {}))
     rows = np.empty((pictures, model.nq))
     with make_data(model) as data:
@@ -57,14 +73,30 @@ def _poses(
     return rows
 
 
-def _to_the_goal(beside: Sequence[float] | None = None) -> tuple[Array, Array]:
-    """The arm on its way, and a pose that stays; by default that of the start."""
+def _towards_the_goal() -> _Poses:
+    """Return the arm on its way to the goal, and where it starts."""
     run = _poses(_ARM, 16, ctrl=TARGET, every=_SLOW)
-    return run, np.tile(run[0] if beside is None else beside, (len(run), 1))
+    return run, np.tile(run[0], (len(run), 1))
 
 
-def _lag() -> tuple[Array, Array]:
-    """Where the bodies are by site_xpos after a step, and where they are by qpos."""
+def _short_of_the_goal() -> _Poses:
+    """Return the arm on its way to the goal, and the goal."""
+    run = _poses(_ARM, 16, ctrl=TARGET, every=_SLOW)
+    return run, np.tile(TARGET, (len(run), 1))
+
+
+def _box_held() -> _Poses:
+    """Return the arm that holds the box."""
+    return _poses(_BOX, 1, keyframe=0), None
+
+
+def _before_and_after_a_write() -> _Poses:
+    """Return the arm by xpos after a write, and by qpos."""
+    return _poses(_ARM, 1), _poses(_ARM, 1, shoulder_lift=0.8)
+
+
+def _lag() -> _Poses:
+    """Return the arm by site_xpos after a step, and by qpos."""
     model = load(_ARM)
     with make_data(model) as data:
         data.ctrl[:] = TARGET
@@ -75,6 +107,26 @@ def _lag() -> tuple[Array, Array]:
         return before, data.qpos[None].copy()
 
 
+def _servos_off_and_on() -> _Poses:
+    """Return the arm without its servos, and with them, while nobody writes ctrl."""
+    return _poses(_ARM, 22, options=SCENARIOS["gravity"].options), _poses(_ARM, 22)
+
+
+def _two_starts() -> _Poses:
+    """Return the scene at keyframe 0, and in its default state."""
+    return _poses(_BOX, 1, keyframe=0), _poses(_BOX, 1)
+
+
+def _two_runs() -> _Poses:
+    """Return the same swing of the box, run twice."""
+    return _poses(_BOX, 16, _SWING, keyframe=0), _poses(_BOX, 16, _SWING, keyframe=0)
+
+
+def _while_waiting() -> _Poses:
+    """Return the arm after 100 steps, twice: nothing is called in between."""
+    return _poses(_ARM, 2, every=100)[1:], _poses(_ARM, 2, every=100)[1:]
+
+
 PICTURES: Mapping[str, RobotPicture] = {
     "objects": RobotPicture(
         "Two Data of one Model, four times as slow: one is commanded and advanced; the other, in "
@@ -83,14 +135,14 @@ PICTURES: Mapping[str, RobotPicture] = {
         "stretched out where both began, for nobody advances it.",
         "statemachine view so101/scene",
         _ARM,
-        _to_the_goal,
+        _towards_the_goal,
     ),
     "state": RobotPicture(
         "Six hinges and a box that nothing holds but the jaws: 13 positions, 12 velocities.",
         "The arm with a small box between its jaws, above the floor.",
         "statemachine view --keyframe held",
         _BOX,
-        lambda: (_poses(_BOX, 1, keyframe=0), None),
+        _box_held,
     ),
     "write": RobotPicture(
         "What xpos still says, and in violet what was written into qpos.",
@@ -98,7 +150,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "shoulder_lift by 0.8 rad, where qpos says that it is, part of it below the floor.",
         "statemachine view so101/scene --paused",
         _ARM,
-        lambda: (_poses(_ARM, 1), _poses(_ARM, 1, shoulder_lift=0.8)),
+        _before_and_after_a_write,
     ),
     "forward": RobotPicture(
         "After the step from 0.250 s: the arm by site_xpos, and in violet by qpos, 9.95 mm on.",
@@ -115,7 +167,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "with a finger, and stays a degree short of it.",
         "statemachine trace record hold && statemachine view hold.mujoco.npz",
         _ARM,
-        lambda: _to_the_goal(TARGET),
+        _short_of_the_goal,
     ),
     "gravity": RobotPicture(
         "Nobody writes ctrl: the servos off, and in violet on.",
@@ -123,7 +175,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "with servos, in violet, it stays stretched out above it.",
         "statemachine trace record gravity && statemachine view gravity.mujoco.npz",
         _ARM,
-        lambda: (_poses(_ARM, 22, options=SCENARIOS["gravity"].options), _poses(_ARM, 22)),
+        _servos_off_and_on,
     ),
     "reset": RobotPicture(
         "The keyframe 'held', and in violet the default state of the arm.",
@@ -131,7 +183,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "joints at zero, and the box stands away from it.",
         "statemachine view --keyframe held",
         _BOX,
-        lambda: (_poses(_BOX, 1, keyframe=0), _poses(_BOX, 1)),
+        _two_starts,
     ),
     "replay": RobotPicture(
         "Two runs in one picture. The second would be violet wherever it parts from the first.",
@@ -139,20 +191,20 @@ PICTURES: Mapping[str, RobotPicture] = {
         "in the same place all the time.",
         "statemachine view --keyframe held",
         _BOX,
-        lambda: (_poses(_BOX, 16, _SWING, keyframe=0), _poses(_BOX, 16, _SWING, keyframe=0)),
+        _two_runs,
     ),
     "time": RobotPicture(
         "After 100 steps, and 0.2 s later by the clock: the second is drawn in violet.",
         "One arm, stretched out. No violet is to be seen: while nobody called step, nothing moved.",
         "statemachine view so101/scene --paused",
         _ARM,
-        lambda: (_poses(_ARM, 2, every=100)[1:], _poses(_ARM, 2, every=100)[1:]),
+        _while_waiting,
     ),
     "speed": RobotPicture(
         "What is advanced here: six joints, a box, and the contacts between them.",
         "The arm with a small box between its jaws, above the floor.",
         "statemachine view --keyframe held --speed 4",
         _BOX,
-        lambda: (_poses(_BOX, 1, keyframe=0), None),
+        _box_held,
     ),
 }

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stdout
 from dataclasses import dataclass, field, replace
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import statemachine
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Options = Mapping[str, Any]  # of a lesson, by key
 L = TypeVar("L")  # what is looked at after a step
+R_co = TypeVar("R_co", covariant=True)  # the result of a lesson
 
 
 @dataclass
@@ -170,6 +171,18 @@ class CodeRun(ExitStack):
         return list(courses.values())
 
 
+class LessonModule(Protocol[R_co]):
+    """Module of a lesson whose result is of one class."""
+
+    def code(self, model: Model, options: Options, load: str) -> str:
+        """Write what a student types for a Model, where `load` is the call that loads it."""
+        ...
+
+    def run(self, play: CodeRun, options: Options, progress: Progress) -> R_co:
+        """Run that code once, look on, and return what was measured."""
+        ...
+
+
 @dataclass(frozen=True)
 class LessonRun:
     """Lesson that was taken on one backend.
@@ -236,7 +249,7 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, LessonRun]) -> Page:
     """Return the page of a lesson that was taken on one backend or several."""
     lesson_module = module(lesson.name)
     results = {name: run.result for name, run in taken.items()}
-    slots = {name: vars(result) | lesson_module.slots(result) for name, result in results.items()}
+    slots = {name: slots_of(lesson.name, result) for name, result in results.items()}
     first = next(iter(taken.values()))
     blocks: dict[str, Block | Sequence[Block]] = {
         "code": Code(_code_shown(taken).splitlines()),
@@ -249,6 +262,16 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, LessonRun]) -> Page:
     if first.arm:
         heading = lesson.question
     return replace(page, title=f"{lesson.name}: {heading}")
+
+
+def slots_of(name: str, result: HasProvenance) -> dict[str, Any]:
+    """Return what the slots of a lesson's page take: the fields of its result, and more.
+
+    Args:
+        name: Of the lesson.
+        result: What its module measured.
+    """
+    return vars(result) | module(name).slots(result)
 
 
 def _code_shown(taken: Mapping[str, LessonRun]) -> str:

@@ -143,7 +143,7 @@ def _slots_of(model: Model, joint: int) -> JointSlots:
 
 def slots(result: StateResult) -> dict[str, Any]:
     """Return what the page's slots take beside the fields of the result."""
-    shifted = [_name(joint) for joint in result.joints if _is_shifted(joint)]
+    shifted = [_name(joint) for joint in result.joints if is_shifted(joint)]
     return {
         "shifted": ", ".join(shifted),
         "right": 0 if result.nv == result.nq else 2,
@@ -155,7 +155,7 @@ def _name(joint: JointSlots) -> str:
     return joint.name if joint.name else NO_NAME
 
 
-def _is_shifted(joint: JointSlots) -> bool:
+def is_shifted(joint: JointSlots) -> bool:
     """Tell whether a joint has other slots in qvel than in qpos."""
     return (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
 

@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
-from itertools import takewhile, zip_longest
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from ..backends import load
@@ -85,19 +84,22 @@ class Shown:
         letters = iter(self.prediction)
         for block in self.page.blocks[len(_leading(self.page)) :]:  # they stand there already
             if isinstance(block, Question):
-                parts += [block.text] if block.always else []
-                letter = next(letters, "")
-                if letter:
-                    verdict = judged(block, LETTERS.index(letter))
-                    parts.append(block_as_markdown(verdict, inline))
-                else:
-                    parts.append(f"You made no prediction. The run says: {answer(block)}")
+                if block.always:
+                    parts.append(block.text)
+                parts.append(_judgement(block, next(letters, "")))
             elif not isinstance(block, (Code, Printed)):
                 parts.append(block_as_markdown(block, inline))
-        return "\n\n".join(filter(None, parts))
+        return "\n\n".join(part for part in parts if part)
 
     def __repr__(self) -> str:
         return f"<Shown {self.page.title!r}: a notebook renders it>"
+
+
+def _judgement(question: Question, letter: str) -> str:
+    """Say what the run says of a prediction, a letter or ""."""
+    if not letter:
+        return f"You made no prediction. The run says: {answer(question)}"
+    return block_as_markdown(judged(question, LETTERS.index(letter)), inline)
 
 
 def lesson(name: str, backend: str = DEFAULT, prediction: str = "", **options: Any) -> Shown:
@@ -115,44 +117,43 @@ def lesson(name: str, backend: str = DEFAULT, prediction: str = "", **options: A
         BadInputError: A prediction is not a letter of its question.
     """
     check_name("lesson", name, LESSONS)
-    known = LESSONS[name].defaults
+    defaults = LESSONS[name].defaults
     for key in options:
-        check_name("option", key, known)
+        check_name("option", key, defaults)
     page = _page(LESSONS[name], backend, options)
     letters = "".join(prediction.lower().split())
-    questions = [block for block in page.blocks if isinstance(block, Question)]
-    for letter, question in zip_longest(letters, questions[: len(letters)]):
-        known = LETTERS[: len(question.choices)] if question else ""
-        if letter not in known or not known:
-            raise BadInputError(
-                f"a prediction is a letter for each question, such as {LETTERS[0]!r}; "
-                f"got {prediction!r}"
-            )
+    if not _are_choices(letters, _questions(page)):
+        raise BadInputError(
+            f"a prediction is a letter for each question, such as {LETTERS[0]!r}; "
+            f"got {prediction!r}"
+        )
     return Shown(page if options else with_picture(page, name), letters)
 
 
+def _questions(page: Page) -> list[Question]:
+    """Return the questions of a page."""
+    return [block for block in page.blocks if isinstance(block, Question)]
+
+
+def _are_choices(letters: str, questions: Sequence[Question]) -> bool:
+    """Tell whether each letter is a choice of its question; the last questions may have none."""
+    if len(letters) > len(questions):
+        return False
+    return all(
+        letter in LETTERS[: len(question.choices)]
+        for letter, question in zip(letters, questions, strict=False)
+    )
+
+
 def build() -> str:
-    """The notebook as JSON, without outputs; its questions come from a run on MuJoCo."""
+    """Return the notebook as JSON, without outputs; its questions come from a run on MuJoCo."""
     cells = [
         _cell("start", "markdown", _INTRODUCTION),
         _cell("install", "code", _INSTALL),
         _cell("setup", "code", _START),
     ]
-    for number, (name, entry) in enumerate(LESSONS.items(), start=1):
-        page = _page(entry, DEFAULT, {})
-        title = f"{number}. {page.title}" if entry.on_path else page.title
-        cells.append(_cell(f"{name}-text", "markdown", f"## {title}\n\n{_opening(page)}"))
-        questions = [block for block in page.blocks if isinstance(block, Question)]
-        asks = {0: "", 1: f"  # {_letters(questions)}"}.get(len(questions), _SEVERAL)
-        if questions:
-            cells.append(_cell(f"{name}-prediction", "code", f'prediction = ""{asks}'))
-        line = f'sm.load("{entry.model}", backend=BACKEND)'
-        model = load(entry.model)
-        code = module(name).code(model, fitted(entry, model, {}), line)
-        if code:
-            cells.append(_cell(f"{name}-code", "code", code))
-        given = ", prediction" if questions else ""
-        cells.append(_cell(f"{name}-run", "code", f'lesson("{name}", BACKEND{given})'))
+    for number, entry in enumerate(LESSONS.values(), start=1):
+        cells += _lesson_cells(entry, number)
     cells.append(_cell("end", "markdown", _END))
     notebook = {
         "cells": cells,
@@ -166,11 +167,28 @@ def build() -> str:
     return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
 
 
-_SEVERAL = "  # a letter for each question, in their order, like cab…"
+def _lesson_cells(entry: Lesson, number: int) -> Iterator[dict[str, Any]]:
+    """Yield the cells of a lesson: its text, a prediction, its code, and what a run says."""
+    name = entry.name
+    page = _page(entry, DEFAULT, {})
+    title = f"{number}. {page.title}" if entry.on_path else page.title
+    yield _cell(f"{name}-text", "markdown", f"## {title}\n\n{_opening(page)}")
+    questions = _questions(page)
+    if questions:
+        yield _cell(f"{name}-prediction", "code", f'prediction = ""  # {_letters(questions)}')
+    model = load(entry.model)
+    line = f'sm.load("{entry.model}", backend=BACKEND)'
+    code = module(name).code(model, fitted(entry, model, {}), line)
+    if code:
+        yield _cell(f"{name}-code", "code", code)
+    prediction = ", prediction" if questions else ""
+    yield _cell(f"{name}-run", "code", f'lesson("{name}", BACKEND{prediction})')
 
 
 def _letters(questions: list[Question]) -> str:
-    """The letters to choose from, as "a, b or c"."""
+    """Say which letters to choose from, as "a, b or c"."""
+    if len(questions) > 1:
+        return "a letter for each question, in their order, like cab…"
     *first, last = LETTERS[: len(questions[0].choices)]
     return f"{', '.join(first)} or {last}"
 
@@ -181,17 +199,20 @@ def _page(entry: Lesson, backend: str, options: dict[str, Any]) -> Page:
 
 
 def _leading(page: Page) -> list[Text]:
-    """The paragraphs with which a page begins."""
-    return list(takewhile(lambda block: isinstance(block, Text), page.blocks))  # pyright: ignore
+    """Return the paragraphs with which a page begins."""
+    paragraphs = []
+    for block in page.blocks:
+        if not isinstance(block, Text):
+            break
+        paragraphs.append(block)
+    return paragraphs
 
 
 def _opening(page: Page) -> str:
-    """The first paragraphs and the questions, without what answers them."""
-    blocks = [*_leading(page), *(block for block in page.blocks if isinstance(block, Question))]
-    return "\n\n".join(
-        asked(block) if isinstance(block, Question) else block_as_markdown(block, inline)
-        for block in blocks
-    )
+    """Write the first paragraphs and the questions, without what answers them."""
+    paragraphs = [block_as_markdown(block, inline) for block in _leading(page)]
+    questions = [asked(question) for question in _questions(page)]
+    return "\n\n".join([*paragraphs, *questions])
 
 
 def _cell(name: str, kind: str, source: str) -> dict[str, Any]:
@@ -208,18 +229,18 @@ _SPECIAL = re.compile(r"(`[^`|\n]+`)|([\\`*\[\]<>|])")
 
 
 def markdown(page: Page, picture: Callable[[Picture], str]) -> str:
-    """A page as Markdown.
+    """Write a page as Markdown.
 
     Args:
         page: The page.
-        picture: Where the file of a picture is, or a data address; "" to leave it out.
+        picture: Returns where the file of a picture is, or a data address; "" to leave it out.
     """
-    parts = [f"# {_escaped(page.title)}", *filter(None, body(page, picture))]
-    return "\n\n".join(parts) + "\n"
+    parts = [part for part in body(page, picture) if part]
+    return "\n\n".join([f"# {_escaped(page.title)}", *parts]) + "\n"
 
 
 def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
-    """The page under its heading, block by block.
+    """Yield the page under its heading, block by block.
 
     What follows a question is folded away, up to the next one: it would give the answer away.
     So is what follows a heading, under the heading's own words.
@@ -229,38 +250,41 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
         yield f"**{_escaped(page.headline.text)}**"
     groups: list[list[Block]] = [[]]
     for block in page.blocks:
-        groups += [[]] if isinstance(block, Question | Heading) else []
+        if isinstance(block, Question | Heading):
+            groups.append([])
         groups[-1].append(block)
     yield from (block_as_markdown(block, picture) for block in groups[0])
     for opening, *rest in groups[1:]:
         inside = [block_as_markdown(block, picture) for block in rest]
         if isinstance(opening, Question):
-            says = Verdict if opening.always else Printed  # stands before the answer
-            place = next(
-                (k for k, block in enumerate(rest) if not isinstance(block, says)), len(rest)
-            )
-            inside.insert(place, answer(opening))
+            inside.insert(_place_of_answer(opening, rest), answer(opening))
             yield f"{asked(opening)}\n\n{_folded(inside)}"
         elif isinstance(opening, Heading):
             yield _folded(inside, _escaped(opening.text))
 
 
+def _place_of_answer(question: Question, blocks: Sequence[Block]) -> int:
+    """Return before which of the blocks under a question its answer stands."""
+    before = Verdict if question.always else Printed
+    for place, block in enumerate(blocks):
+        if not isinstance(block, before):
+            return place
+    return len(blocks)
+
+
 def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
-    """One block; empty if there is nothing to show."""
+    """Write one block; "" if there is nothing to show."""
     match block:
         case Heading(text):
             return f"**{_escaped(text)}**"
         case Text(text, (_, heading)):
             return _escaped(f"{text} {heading}." if heading else text)
-        case Items(texts, ordered):
-            return "\n".join(f"{'1.' if ordered else '-'} {_escaped(text)}" for text in texts)
+        case Items():
+            return _items(block)
         case Code(lines):
             return _fenced("\n".join(lines), "python")
-        case Printed(by_engine):
-            return "\n\n".join(
-                f"{', '.join(names)}:\n\n{_fenced(text.rstrip() or '(nothing)', 'text')}"
-                for names, text in together(by_engine)
-            )
+        case Printed():
+            return _printed(block)
         case Question():
             return f"{asked(block)}\n\n{_folded([answer(block)])}"
         case Table():
@@ -272,55 +296,75 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
         case Interactive():
             return ""
         case RobotPicture():
-            where = picture(block)
-            shown = f"![{_escaped(block.words)}]({where})" if where else _escaped(block.words)
-            return f"{shown}\n\n*{_escaped(block.title)}* Live: `{block.view}`"
+            return _robot_picture(block, picture)
         case _:
             where = picture(block)
             return f"![{_escaped(block.title)}]({where})" if where else ""
 
 
+def _items(block: Items) -> str:
+    mark = "1." if block.ordered else "-"
+    return "\n".join(f"{mark} {_escaped(text)}" for text in block.texts)
+
+
+def _printed(block: Printed) -> str:
+    parts = []
+    for names, text in together(block.by_engine):
+        printed = text.rstrip()
+        if not printed:
+            printed = "(nothing)"
+        parts.append(f"{', '.join(names)}:\n\n{_fenced(printed, 'text')}")
+    return "\n\n".join(parts)
+
+
+def _robot_picture(block: RobotPicture, picture: Callable[[Picture], str]) -> str:
+    where, words = picture(block), _escaped(block.words)
+    shown = f"![{words}]({where})" if where else words
+    return f"{shown}\n\n*{_escaped(block.title)}* Live: `{block.view}`"
+
+
 def _section(block: Section, picture: Callable[[Picture], str]) -> str:
-    parts = [part for inner in block.blocks if (part := block_as_markdown(inner, picture))]
-    if not parts:
-        return ""
+    inside = [block_as_markdown(inner, picture) for inner in block.blocks]
+    text = "\n\n".join(part for part in inside if part)
     heading = _escaped(block.heading)
-    if not heading:
-        return "\n\n".join(parts)
+    if not text or not heading:
+        return text
     if block.folded or block.detail:
-        inside = "\n\n".join(parts)
-        return f"<details><summary>{heading}</summary>\n\n{inside}\n\n</details>"
-    return "\n\n".join([f"## {heading}", *parts])
+        return _folded([text], heading)
+    return f"## {heading}\n\n{text}"
 
 
 def asked(block: Question) -> str:
-    """A question and its choices, without the answer."""
+    """Write a question and its choices, without the answer."""
     text = "" if block.always else "**Before you read on:** "
     choices = [f"- {_escaped(choice)}" for choice in lettered(block)]
     return "\n".join([f"{text}{_escaped(block.text)}", "", *choices])
 
 
 def answer(block: Question) -> str:
-    """What the run says about it."""
+    """Write what the run says about a question."""
     return f"{_escaped(answer_of(block))}. {_escaped(block.because)}"
 
 
 def _folded(inside: list[str], summary: str = "What the run says") -> str:
-    text = "\n\n".join(filter(None, inside))
+    text = "\n\n".join(part for part in inside if part)
     return f"<details><summary>{summary}</summary>\n\n{text}\n\n</details>"
 
 
 def _table(block: Table) -> str:
-    def row(cells: Iterator[str]) -> str:
-        return f"| {' | '.join(cells)} |"
-
     title = f"*{_escaped(block.title)}*\n\n" if block.title else ""
-    marks = (":--" if k in block.words else "--:" for k in range(len(block.headers)))
-    lines = [row(_escaped(header) for header in block.headers), row(marks)]
+    marks = [":--" if k in block.words else "--:" for k in range(len(block.headers))]
+    lines = [_row([_escaped(header) for header in block.headers]), _row(marks)]
     for k, cells in enumerate(block.rows):
-        bold = "**" if k in block.emphasis else ""
-        lines.append(row(f"{bold}{_escaped(c)}{bold}" if c else "" for c in cells))
+        texts = [_escaped(cell) for cell in cells]
+        if k in block.emphasis:
+            texts = [f"**{text}**" if text else "" for text in texts]
+        lines.append(_row(texts))
     return title + "\n".join(lines)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
 
 
 def _fenced(text: str, language: str) -> str:

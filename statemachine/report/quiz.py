@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import re
 import shutil
 import sys
@@ -14,6 +15,7 @@ import textwrap
 from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from .. import __version__
 from ..grading import KIND, answers_in
@@ -21,7 +23,7 @@ from ..page import LETTERS, Question
 from ..runs.whole import replace_text
 
 _WIDTH_MOST = 100
-_SPLIT = 0.25  # what it costs to part a block: as much as half of a window that stays empty
+_SPLIT = 0.25  # what it costs to split a block: as much as half of a window that stays empty
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -30,17 +32,17 @@ class Stopped(Exception):  # noqa: N818  (nothing is wrong)
 
 
 def lettered(question: Question) -> list[str]:
-    """Its choices as they are shown: "a) 12"."""
+    """Return its choices as they are shown: "a) 12"."""
     return [f"{letter}) {text}" for letter, text in zip(LETTERS, question.choices, strict=False)]
 
 
 def answer_of(question: Question) -> str:
-    """The choice that the run gave."""
+    """Return the choice that the run gave."""
     return "none of them" if question.right is None else lettered(question)[question.right]
 
 
 def can_ask() -> bool:
-    """Whether somebody is there to answer: both ends are a terminal."""
+    """Tell whether somebody is there to answer: both ends are a terminal."""
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
 
 
@@ -75,7 +77,7 @@ class Reader:
         sys.stdout.flush()
 
     def ask(self, question: Question) -> int | None:
-        """The number of the choice; None if the reader passes (Enter, Ctrl-D).
+        """Ask, and return the number of the choice; None if the reader passes (Enter, Ctrl-D).
 
         Raises:
             Stopped: The reader typed q.
@@ -87,7 +89,7 @@ class Reader:
             typed = self._typed(f"Your prediction (a-{letters[-1]}, Enter to pass, q to stop): ")
             if not typed:
                 return None
-            if typed in [*letters]:
+            if typed in list(letters):
                 return letters.index(typed)
             print(f"Please type one of {', '.join(letters)}.")
 
@@ -102,7 +104,7 @@ class Reader:
             print("Please press Enter alone, or type q.")
 
     def _typed(self, prompt: str, end: str = "") -> str:
-        """What the reader types, in small letters; `end` if there is nothing more to come."""
+        """Return what the reader types, in small letters; `end` if nothing more is to come."""
         _forget_typed_ahead()
         try:
             typed = input(prompt).strip().lower().rstrip(")")
@@ -139,26 +141,25 @@ class RecordedReader(Reader):
     def ask(self, question: Question) -> int | None:
         """Ask, and keep the answer."""
         choice = super().ask(question)
-        if choice is not None:
-            right, predicted = question.right, question.choices[choice]
-            first = self._answers.setdefault(
-                f"{self.lesson}: {question.text}",
-                {
-                    "lesson": self.lesson,
-                    "question": question.text,
-                    "predicted": predicted,
-                    "found": None if right is None else question.choices[right],
-                    "right": choice == right,
-                },
-            )
-            self._write()
-            if first["predicted"] != predicted:
-                print(f"(In {self._file.name} your first answer counts: {first['predicted']}.)")
+        if choice is None:
+            return None
+        right, predicted = question.right, question.choices[choice]
+        answer = {
+            "lesson": self.lesson,
+            "question": question.text,
+            "predicted": predicted,
+            "found": None if right is None else question.choices[right],
+            "right": choice == right,
+        }
+        first = self._answers.setdefault(f"{self.lesson}: {question.text}", answer)
+        self._write()
+        if first["predicted"] != predicted:
+            print(f"(In {self._file.name} your first answer counts: {first['predicted']}.)")
         return choice
 
     @property
     def summary(self) -> str:
-        """What the file says by now, in a line."""
+        """Return what the file says by now, in a line."""
         right = sum(bool(answer["right"]) for answer in self._answers.values())
         return f"{self._file.name}: {right} of {len(self._answers)} predictions right"
 
@@ -192,51 +193,77 @@ def _forget_typed_ahead() -> None:
 
 
 def windows(rows: Sequence[int], blocks: Container[int], room: int) -> list[int]:
-    """Part lines into windows that are filled evenly, so that none has a line or two alone.
+    """Split lines into windows that are filled evenly, so that none has a line or two alone.
 
     The sum over all windows of the square of the rows that stay empty is least.
 
     Args:
         rows: (n,) rows that each line takes.
-        blocks: Lines with which a block begins, by number; a block is parted only where windows
+        blocks: Lines with which a block begins, by number; a block is split only where windows
             would stay emptier otherwise.
         room: Rows of a window.
 
     Returns:
         For each window the line before which it ends.
     """
-    best: list[tuple[float, list[int]]] = [(0.0, [])]  # of the lines before each: cost, windows
+    best = [_Layout(0.0, ())]  # of the lines before each
     for end in range(1, len(rows) + 1):
-        parted = _SPLIT * room**2 * (end < len(rows) and end not in blocks)
-        best.append(
-            min(
-                (
-                    best[begin][0] + (room - sum(rows[begin:end])) ** 2 + parted,
-                    [*best[begin][1], end],
-                )
-                for begin in range(max(0, end - room - 1), end)
-                if begin == end - 1 or sum(rows[begin:end]) <= room
-            )
-        )
-    return best[-1][1]
+        splits_block = end < len(rows) and end not in blocks
+        layouts = []
+        for begin in _beginnings(rows, end, room):
+            empty = room - sum(rows[begin:end])
+            cost = best[begin].cost + empty**2
+            if splits_block:
+                cost += _SPLIT * room**2
+            layouts.append(_Layout(cost, (*best[begin].ends, end)))
+        best.append(min(layouts))
+    return list(best[-1].ends)
+
+
+class _Layout(NamedTuple):
+    """Windows for the first lines; of two that cost the same, the one that ends windows earlier.
+
+    Attributes:
+        cost: The sum over all windows of the square of the rows that stay empty, and of what
+            it costs to split a block.
+        ends: For each window the line before which it ends.
+    """
+
+    cost: float
+    ends: tuple[int, ...]
+
+
+def _beginnings(rows: Sequence[int], end: int, room: int) -> Iterator[int]:
+    """Yield the lines with which a window may begin that ends before another.
+
+    Args:
+        rows: (n,) rows that each line takes.
+        end: The line before which the window ends.
+        room: Rows of a window; a line that takes more has one of its own.
+    """
+    for begin in range(max(0, end - room - 1), end):
+        if begin == end - 1 or sum(rows[begin:end]) <= room:
+            yield begin
 
 
 def _room() -> int:
-    """Rows of the window above a prompt, which takes two where it is narrow."""
+    """Return the rows of the window above a prompt, which takes two where it is narrow."""
     window = shutil.get_terminal_size()
-    return max(window.lines - (1 if window.columns >= 80 else 2), 2)
+    prompt = 1 if window.columns >= 80 else 2
+    return max(window.lines - prompt, 2)
 
 
 def _rows(line: str) -> int:
-    """How many rows of the window a line takes."""
+    """Return how many rows of the window a line takes."""
     from rich.cells import cell_len
 
     columns = max(shutil.get_terminal_size().columns, 1)
-    return max(-(-cell_len(_COLOUR.sub("", line.rstrip("\n"))) // columns), 1)
+    cells = cell_len(_COLOUR.sub("", line.rstrip("\n")))
+    return max(math.ceil(cells / columns), 1)
 
 
 def _asked(question: Question) -> Iterator[str]:
-    """A question and its choices in lines of the window's width."""
+    """Yield a question and its choices in lines of the window's width."""
     width = max(min(shutil.get_terminal_size().columns, _WIDTH_MOST), 20)
     text = question.text if question.always else f"Before you read on: {question.text}"
     yield from textwrap.wrap(text.replace("`", ""), width)

@@ -12,7 +12,7 @@ from ..compare import Request, compare, run_sides, witness
 from ..compare.why import explain
 from ..errors import MissingEngineError
 from ..installed import available
-from ..lessons import LESSONS
+from ..lessons import LESSONS, Lesson
 from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
 from ..measures.text import reading
@@ -44,15 +44,18 @@ def make_path(
     written = []
     for number, lesson in enumerate(LESSONS.values(), start=1):
         say(f"running the lesson {lesson.name} ...")
-        models = {name: load(lesson.model, backend=name) for name in names}
-        taken = {
-            name: take(lesson, model, name, dict.fromkeys(lesson.more, True))
-            for name, model in models.items()
-        }
-        page = with_picture(page_of_lesson(lesson, taken), lesson.name)
-        name, typed = f"{number:02}-{lesson.name}", f"statemachine lesson {lesson.name}"
-        written.append(_write(folder, name, page, typed))
+        page = _lesson_page(lesson, names)
+        typed = f"statemachine lesson {lesson.name}"
+        written.append(_write(folder, f"{number:02}-{lesson.name}", page, typed))
     return written
+
+
+def _lesson_page(lesson: Lesson, backends: Sequence[str]) -> Page:
+    """Run a lesson on some backends, with all that it can show, and return its page."""
+    models = {name: load(lesson.model, backend=name) for name in backends}
+    options = dict.fromkeys(lesson.more, True)
+    taken = {name: take(lesson, model, name, options) for name, model in models.items()}
+    return with_picture(page_of_lesson(lesson, taken), lesson.name)
 
 
 def make_reference(folder: Path) -> list[Path]:
@@ -106,7 +109,7 @@ def make_comparisons(folder: Path) -> list[Path]:
 
 
 def _why_as_they_come(name: str, backends: tuple[str, str]) -> Page:
-    """The page that says why, for engines as they come."""
+    """Return the page that says why, for engines as they come."""
     asked = scenario(name)
     left = load(asked.model, backend=backends[0])
     right = load(asked.model, backend=backends[1], defaults="engine")
