@@ -17,6 +17,18 @@ if TYPE_CHECKING:
     Numbers = Sequence[float] | NDArray[Any]
 
 R = TypeVar("R")  # a record that is a row of a table
+V = TypeVar("V")  # the value of a property
+
+
+def only_on_pages(get: Callable[[R], V]) -> Callable[[R], V]:
+    """Mark the function of a property that pages read and JSON leaves out.
+
+    @property
+    @only_on_pages
+    def verdict(self) -> str: ...
+    """
+    vars(get)["json"] = False
+    return get
 
 
 class Figures(SimpleNamespace):

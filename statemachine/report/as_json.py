@@ -24,7 +24,7 @@ def plain(value: Any) -> Any:
     if fields or isinstance(value, Figures):
         names = [field.name for field in fields if field.metadata.get("json", True)]
         names = names or [name for name in vars(value) if not name.startswith("_")]
-        names += [name for name, kind in vars(type(value)).items() if isinstance(kind, property)]
+        names += [name for name, kind in vars(type(value)).items() if _is_in_json(kind)]
         return {name: plain(getattr(value, name)) for name in names}
     match value:
         case dict():
@@ -40,3 +40,8 @@ def plain(value: Any) -> Any:
         case Path():
             return str(value)
     return value
+
+
+def _is_in_json(attribute: Any) -> bool:
+    """Tell whether an attribute of a class is a property that JSON has."""
+    return isinstance(attribute, property) and getattr(attribute.fget, "json", True)
