@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from statemachine.grading import exercise, recording
 from statemachine.grading.inside.answers import Answer, OtherValue, decode, encode
 from statemachine.grading.inside.calls import FaultError, answers_of, answers_of_file
 from statemachine.grading.inside.watch import EngineRun, Inputs, engine_watched
-from statemachine.grading.inside.worlds import ExerciseWorld, Scenes, worlds_of
+from statemachine.grading.inside.worlds import AnyWorld, Scenes, worlds_of
 from statemachine.grading.judges import JUDGES, Judgement, judge_of, judged
 from statemachine.processes import sandbox
 
@@ -44,7 +44,7 @@ from .conftest import (
 )
 from .exercises import RIGHT, SOLUTION, TEMPLATE, WRONG, Attempt
 
-Prepared = tuple[list[ExerciseWorld], list[Any]]
+Prepared = tuple[Sequence[AnyWorld], list[Any]]
 
 
 def _verdict(attempt: Attempt, prepared: Prepared) -> Judgement:

@@ -26,11 +26,11 @@ from statemachine.grading.classroom import (
     submission_in,
     submissions,
 )
-from statemachine.grading.exercise import LOOK, ExerciseJudge, grade_of
+from statemachine.grading.exercise import LOOK, ExerciseJudge, Grade
 from statemachine.grading.faults import FAULTS
-from statemachine.grading.faults.run import examination_of, trial_of
+from statemachine.grading.faults.run import Examination, FailedTest, FaultTrial
 from statemachine.grading.judges import JUDGES, Judgement
-from statemachine.page import Figures, Text
+from statemachine.page import Text
 from statemachine.report.grading import class_page, gradescope_results
 from statemachine.runs.whole import csv_text, replace_csv
 
@@ -80,7 +80,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Files are judged by what is in them, in no time; the names of those that were."""
     seen: list[str] = []
 
-    def judge(self: ExerciseJudge, file: Path, progress: Any = None, own: Any = None) -> Figures:
+    def judge(self: ExerciseJudge, file: Path, progress: Any = None, own: Any = None) -> Grade:
         seen.append(Path(file).name)
         text = Path(file).read_text()
         if "refuse" in text:
@@ -90,7 +90,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
             Judgement(name, written, written and passed, (f"because: of {name}", "and so on"))
             for name in JUDGES
         )
-        return grade_of(Path(file).name, "0", self.backend, self.versions, marks)
+        return Grade(Path(file).name, "0", self.backend, self.versions, marks)
 
     monkeypatch.setattr(ExerciseJudge, "judge", judge)
     return seen
@@ -273,15 +273,15 @@ def test_tests_and_predictions_are_in_the_same_table(
 ) -> None:
     ran: list[Path] = []
 
-    def examined(file: Path, backend: str, own: dict[str, Path]) -> Figures:
+    def examined(file: Path, backend: str, own: dict[str, Path]) -> Examination:
         assert own[file.name] == file
         ran.append(file)
-        caught = (Figures(test="test_x", why="no"),)
+        caught = (FailedTest("test_x", "no"),)
         trials = tuple(
-            trial_of(fault, caught if k else ()) for k, fault in enumerate(FAULTS.values())
+            FaultTrial(fault, caught if k else ()) for k, fault in enumerate(FAULTS.values())
         )
         bad = caught if "bad" in file.read_text() else ()
-        return examination_of(file.name, backend, "4", ("test_x",), bad, () if bad else trials)
+        return Examination(file.name, backend, "4", ("test_x",), bad, () if bad else trials)
 
     monkeypatch.setattr(classroom, "examine", examined)
     answers = [{"lesson": "a", "question": str(k), "right": k > 0} for k in range(3)]
@@ -413,7 +413,7 @@ def test_what_gradescope_reads(judged: list[str]) -> None:
         Judgement("demo_forward", False, False, ("not written yet",)),
         Judgement("demo_replay", True, False, ("busy",), judged=False),
     )
-    grade = grade_of("step_loop.py", "0", "mujoco", {"mujoco": "4"}, marks)
+    grade = Grade("step_loop.py", "0", "mujoco", {"mujoco": "4"}, marks)
     read = json.loads(gradescope_results(grade))
     tests = {each["name"]: each for each in read["tests"]}
     assert list(tests) == list(JUDGES)

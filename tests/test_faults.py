@@ -18,8 +18,7 @@ from statemachine import cli as command_line
 from statemachine.errors import BadInputError, EngineError
 from statemachine.grading.faults import FAULTS, Fault, run
 from statemachine.grading.faults.patches import PATCHES
-from statemachine.grading.faults.run import examination_of, examine, trial_of
-from statemachine.page import Figures
+from statemachine.grading.faults.run import Examination, FailedTest, FaultTrial, examine
 from statemachine.report.grading import faults_page
 
 from .conftest import (
@@ -299,8 +298,8 @@ def test_a_test_starts_no_process(write: Write) -> None:
     found = examine(write(text), only=["xyzw"])
     refused = "line 2: PermissionError: it starts another process: not here"
     assert found.failures == (
-        Figures(test="test_a", why=refused),
-        Figures(test="test_b", why="line 3: no"),
+        FailedTest(test="test_a", why=refused),
+        FailedTest(test="test_b", why="line 3: no"),
     )
 
 
@@ -337,9 +336,11 @@ def test_another_pytests_settings_do_not_disturb(
 
 def test_the_page_keeps_to_its_columns() -> None:
     name = "test_" + "a_name_that_goes_on_and_on_" * 4
-    one = Figures(test=name, why="why")
-    trials = tuple(trial_of(fault, (one,) * (k % 3 * 6)) for k, fault in enumerate(FAULTS.values()))
-    page = faults_page(examination_of("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
+    one = FailedTest(test=name, why="why")
+    trials = tuple(
+        FaultTrial(fault, (one,) * (k % 3 * 6)) for k, fault in enumerate(FAULTS.values())
+    )
+    page = faults_page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
     assert not page.holds
     text = shown(page)
     assert max(map(cell_len, text.splitlines())) <= 80

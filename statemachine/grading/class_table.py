@@ -10,8 +10,8 @@ from pathlib import Path
 
 from ..errors import BadInputError
 from ..models import check_is_file
+from ..page import only_on_pages
 from .exercise import LOOK
-from .inside.calls import reason
 from .judges import JUDGES, Judgement
 
 _HEAD = (
@@ -67,6 +67,22 @@ class ClassEntry:
         return complete or self.refusal == NOTHING
 
     @property
+    @only_on_pages
+    def why_not_judged(self) -> str:
+        """Why there is no verdict on it, or on one of its functions; "" where there is."""
+        if self.judged:
+            return ""
+        if self.refusal:
+            return self.refusal
+        return next(each.remarks[0] for each in self.functions if not each.judged)
+
+    @property
+    @only_on_pages
+    def solved(self) -> bool:
+        """Whether all functions of the exercise do what they should."""
+        return self.right == len(JUDGES)
+
+    @property
     def watched(self) -> bool:
         """Whether it was judged where what a student's code reads is only watched."""
         return self.made_with.endswith(WATCHED)
@@ -80,67 +96,84 @@ class ClassEntry:
     @property
     def reasons(self) -> str:
         """What is not right, in a line with a few words for each function; "" if all is."""
-        words = {
-            judgement.function: few_words(judgement)
-            for judgement in self.functions
-            if not judgement.passed
-        }
+        words: dict[str, str] = {}
+        for judgement in self.functions:
+            if not judgement.passed:
+                words[judgement.function] = few_words(judgement)
         if len(words) == len(JUDGES) and len(set(words.values())) == 1:
             return next(iter(words.values()))  # of the file, and not of a function
         texts = [f"{name.removeprefix('demo_')}: {text}" for name, text in words.items()]
-        return "; ".join([self.refusal] * bool(self.refusal) + texts)
+        if self.refusal:
+            texts.insert(0, self.refusal)
+        return "; ".join(texts)
 
 
 def few_words(judgement: Judgement) -> str:
-    """Why a function is not right: its first remark, as far as there is room for it."""
+    """Return why a function is not right: its first remark, as far as there is room for it."""
     text = judgement.remarks[0] if judgement.written else verdict_word(judgement)
     return textwrap.shorten(text, _FEW, placeholder=" …")
 
 
 def rows_of(entries: Iterable[ClassEntry]) -> Iterator[tuple[object, ...]]:
-    """The table: its head, and a row a submission; details have a line for each remark."""
+    """Yield the table: its head, and a row a submission."""
     yield _HEAD
     for entry in entries:
-        words = {judgement.function: verdict_word(judgement) for judgement in entry.functions}
-        remarks = [
-            f"{judgement.function}: {text}"
-            for judgement in entry.functions
-            for text in judgement.remarks
-        ]
-        if (
-            len(entry.functions) > 1
-            and len({judgement.remarks for judgement in entry.functions}) == 1
-        ):
-            remarks = list(entry.functions[0].remarks)  # of the file, and not of a function
         yield (
-            entry.name,
-            entry.right if entry.judged else "",
-            len(JUDGES),
-            *(words.get(name, "not written" if entry.judged else "not judged") for name in JUDGES),
-            "; ".join(filter(None, (entry.reasons, *entry.looks))),
+            *_verdicts_of(entry),
             entry.tests,
             entry.predictions,
             entry.student,
             entry.same_as,
             entry.alike,
-            "\n".join([entry.refusal] if entry.refusal else remarks),
+            _details_of(entry),
             entry.sha256,
             entry.made_with,
         )
 
 
+def _verdicts_of(entry: ClassEntry) -> list[object]:
+    """Return the cells up to the remarks; among them a word for each function of the exercise."""
+    right = entry.right if entry.judged else ""
+    words = {judgement.function: verdict_word(judgement) for judgement in entry.functions}
+    other = "not written" if entry.judged else "not judged"
+    verdicts = [words.get(name, other) for name in JUDGES]
+    return [entry.name, right, len(JUDGES), *verdicts, _remarks_of(entry)]
+
+
+def _remarks_of(entry: ClassEntry) -> str:
+    """Return what is not right, and what somebody should look at."""
+    remarks = list(entry.looks)
+    if entry.reasons:
+        remarks.insert(0, entry.reasons)
+    return "; ".join(remarks)
+
+
+def _details_of(entry: ClassEntry) -> str:
+    """Return a line for each remark."""
+    if entry.refusal:
+        return entry.refusal
+    several = len(entry.functions) > 1
+    if several and len({judgement.remarks for judgement in entry.functions}) == 1:
+        return "\n".join(entry.functions[0].remarks)  # of the file, and not of a function
+    lines: list[str] = []
+    for judgement in entry.functions:
+        lines += [f"{judgement.function}: {text}" for text in judgement.remarks]
+    return "\n".join(lines)
+
+
 def verdict_word(judgement: Judgement) -> str:
-    """A judgement in a word of the table."""
-    return reason(
-        (not judgement.judged, "not judged"),
-        (not judgement.written, "not written"),
-        (judgement.passed, "right"),
-        (True, "wrong"),
-    )
+    """Return a judgement in a word of the table."""
+    if not judgement.judged:
+        return "not judged"
+    if not judgement.written:
+        return "not written"
+    if judgement.passed:
+        return "right"
+    return "wrong"
 
 
 def read(table: Path) -> dict[tuple[str, str], ClassEntry]:
-    """What a table says, by digest and by what it was made with.
+    """Read what a table says, by digest and by what it was made with.
 
     Raises:
         BadInputError: It is no such table, so that nothing of it is overwritten.
@@ -158,14 +191,20 @@ def read(table: Path) -> dict[tuple[str, str], ClassEntry]:
             f"{table.name} is there and has not the columns of a table of grades "
             f"({', '.join(_HEAD)}): name another file, or remove it"
         )
-    entries = {}
+    entries: dict[tuple[str, str], ClassEntry] = {}
     for row in rows[1:]:
         cells = dict(zip(_HEAD, row, strict=False))
         complete = len(row) == len(_HEAD) and all(cells[name] in _WORDS for name in JUDGES)
         if not complete or not cells["sha256"]:
             continue  # judged again
-        entry = ClassEntry(cells["file"], cells["sha256"], _judgements(cells), "",
-                           cells["made_with"], tests=cells["tests"])  # fmt: skip
+        entry = ClassEntry(
+            name=cells["file"],
+            sha256=cells["sha256"],
+            functions=_judgements(cells),
+            refusal="",
+            made_with=cells["made_with"],
+            tests=cells["tests"],
+        )
         entries[entry.sha256, entry.made_with] = entry
     return entries
 
@@ -175,8 +214,11 @@ def _judgements(cells: Mapping[str, str]) -> tuple[Judgement, ...]:
     for cell in cells["details"].split("\n"):
         line = cell.removeprefix("'")
         name, _, text = line.partition(": ")
-        for function in [name] if name in remarks else remarks if line else ():
-            remarks[function].append(text if function == name else line)
+        if name in remarks:
+            remarks[name].append(text)
+        elif line:  # of the file, and not of a function
+            for lines in remarks.values():
+                lines.append(line)
     return tuple(
         Judgement(
             name,

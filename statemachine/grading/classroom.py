@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from ..errors import BadInputError, StateMachineError
 from ..models import AnyPath, check_is_file
@@ -19,7 +20,6 @@ from . import score
 from .class_table import NOTHING, WATCHED, ClassEntry, read, rows_of
 from .exercise import TIME_LIMIT, ExerciseJudge
 from .faults.run import examine
-from .inside.calls import reason
 from .links import leads_out, refusal_of
 from .recording import (
     code_of,
@@ -58,18 +58,18 @@ class Submission:
 
     @property
     def own(self) -> dict[str, Path]:
-        """The files that belong to it, by their names in its folder; alone in that of a class."""
+        """Files that belong to it, by their names in its folder; alone in that of a class."""
         if self.folder:
             return in_folder(self.folder)
         return {self.path.name: self.path} if self.path else {}
 
     def named(self, name: str) -> Path | None:
-        """The first of its files that is called so."""
+        """Return the first of its files that is called so."""
         return next((file for file in self.own.values() if file.name == name), None)
 
 
 def submissions(paths: Sequence[AnyPath]) -> list[Submission]:
-    """The submissions among files and folders.
+    """Return the submissions among files and folders.
 
     In a folder each Python file is one, and each folder with one Python file that has at least
     one of the functions of the exercise. One student's folder is one submission.
@@ -81,7 +81,7 @@ def submissions(paths: Sequence[AnyPath]) -> list[Submission]:
     for path in map(Path, paths):
         if is_one_students(path):
             name = path.resolve().name if len(paths) == 1 else path.as_posix()
-            by_place[path] = replace(_in_folder_of_one(path)[0], name=name)
+            by_place[path] = replace(_in_folder_of_one(path), name=name)
         elif path.is_dir():
             before = "" if len(paths) == 1 else f"{path.as_posix()}/"
             for entry in sorted(path.iterdir()):
@@ -103,93 +103,111 @@ def submissions(paths: Sequence[AnyPath]) -> list[Submission]:
 
 
 def not_looked_at(paths: Sequence[AnyPath]) -> list[str]:
-    """Names of the files in class folders that nobody hands in."""
-    folders = [path for path in map(Path, paths) if path.is_dir() and not is_one_students(path)]
-    return [
-        entry.name
-        for folder in folders
-        for entry in sorted(folder.iterdir())
-        if entry.is_file() and not _skipped(entry) and entry.suffix.lower() not in (".py", *_UNREAD)
-    ]
+    """Return the names of the files in class folders that nobody hands in."""
+    names: list[str] = []
+    for folder in map(Path, paths):
+        if not folder.is_dir() or is_one_students(folder):
+            continue
+        for entry in sorted(folder.iterdir()):
+            is_handed_in = entry.suffix.lower() in (".py", *_UNREAD)
+            if entry.is_file() and not _skipped(entry) and not is_handed_in:
+                names.append(entry.name)
+    return names
 
 
 def is_one_students(folder: Path) -> bool:
-    """Whether a folder is what one student works in, and not that of a class.
+    """Return whether a folder is what one student works in, and not that of a class.
 
     It holds one of the exercise's files under its own name, and nobody else's.
     """
     if not any((folder / name).is_file() for name in _NAMES):
         return False
-    return not any(
-        has_functions(file)
-        for entry in folder.iterdir()
-        if not _skipped(entry) and entry.name not in _NAMES
-        for file in (entry.rglob("*.py") if entry.is_dir() else [entry])
-        if not leads_out(file, folder)
-    )
+    for entry in folder.iterdir():
+        if _skipped(entry) or entry.name in _NAMES:
+            continue
+        for file in entry.rglob("*.py") if entry.is_dir() else [entry]:
+            if not leads_out(file, folder) and has_functions(file):
+                return False
+    return True
 
 
 def _skipped(entry: Path) -> bool:
-    """What systems leave in folders."""
+    """Return whether an entry of a folder is what systems leave there."""
     return entry.name.startswith(".") or entry.name in ("__pycache__", "__MACOSX")
 
 
 def submission_in(folder: Path) -> Path:
-    """The one file in a student's folder that has functions of the exercise.
+    """Return the one file in a student's folder that has functions of the exercise.
 
     Where there are several it is the one that is called `step_loop.py`.
 
     Raises:
         BadInputError: There is none, or more than one.
     """
-    (submission,) = _in_folder_of_one(folder)
+    submission = _in_folder_of_one(folder)
     if submission.path is None:
         raise BadInputError(submission.refusal)
     return submission.path
 
 
 def _in_entry(entry: Path) -> list[Submission]:
-    """What an entry of a class's folder is; one of no interest is none."""
-    if entry.is_symlink():  # out of what this student handed in, wherever it leads
-        to_nothing = not entry.exists() and not entry.is_dir()
-        refusal = "a link to nothing" if to_nothing else refusal_of(entry, entry.name)
-        is_python = entry.suffix.lower() == ".py" and entry.name != "conftest.py"
-        of_interest = is_python or entry.suffix.lower() in _UNREAD or entry.is_dir()
-        return [Submission(entry.name, None, refusal)] * of_interest
-    return _in_folder_of_one(entry)
+    """Return the submission that an entry of a class's folder is; of no interest, none."""
+    if entry.is_symlink():
+        return _in_link(entry)
+    if entry.is_dir():
+        return [_in_folder_of_one(entry)]
+    return _in_file(entry)
 
 
-def _in_folder_of_one(entry: Path) -> list[Submission]:
-    """The same of one that is no link."""
-    if not entry.is_dir():
-        refusal = reason(
-            (entry.is_file(), _UNREAD.get(entry.suffix.lower(), "")),
-            (True, "a pipe or a device, and no file"),
-        )
-        is_module = entry.is_file() and entry.suffix.lower() == ".py"
-        python = is_module and entry.name != "conftest.py"  # that is pytest's, beside an exercise
-        return [Submission(entry.name, entry if python else None, refusal)] * bool(
-            python or refusal
-        )
-    if refusal := refused_links(entry):
-        return [Submission(entry.name, None, refusal)]
-    files = [file for file in sorted(entry.rglob("*.py")) if has_functions(file)]
-    files = [file for file in files if file.name == _NAMES[0]] or files
+def _in_link(link: Path) -> list[Submission]:
+    """Return a link as a submission: out of what this student handed in, wherever it leads."""
+    if not (_is_python(link) or link.suffix.lower() in _UNREAD or link.is_dir()):
+        return []
+    if not link.exists() and not link.is_dir():
+        return [Submission(link.name, None, "a link to nothing")]
+    return [Submission(link.name, None, refusal_of(link, link.name))]
+
+
+def _in_file(entry: Path) -> list[Submission]:
+    """Return what is neither a link nor a folder as a submission; of no interest, none."""
+    if not entry.is_file():
+        return [Submission(entry.name, None, "a pipe or a device, and no file")]
+    if _is_python(entry):
+        return [Submission(entry.name, entry)]
+    if entry.suffix.lower() in _UNREAD:
+        return [Submission(entry.name, None, _UNREAD[entry.suffix.lower()])]
+    return []
+
+
+def _is_python(file: Path) -> bool:
+    """Return whether a file is a module, and not pytest's own beside an exercise."""
+    return file.suffix.lower() == ".py" and file.name != "conftest.py"
+
+
+def _in_folder_of_one(folder: Path) -> Submission:
+    """Return a student's folder as a submission."""
+    if refusal := refused_links(folder):
+        return Submission(folder.name, None, refusal)
+    files = [file for file in sorted(folder.rglob("*.py")) if has_functions(file)]
+    called_right = [file for file in files if file.name == _NAMES[0]]
+    if called_right:
+        files = called_right
     if len(files) == 1:
-        return [Submission(entry.name, files[0], folder=entry)]
-    text = "no Python file in it has one of the functions"
-    if notebooks := sorted(entry.rglob("*.ipynb")):
-        text += f". {notebooks[0].name} is {_UNREAD['.ipynb']}"
-    if (tests := entry / _NAMES[1]).is_file():
-        text += f". Did you mean statemachine check --faults {tests.as_posix()}?"
+        return Submission(folder.name, files[0], folder=folder)
     if files:
-        names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
+        names = ", ".join(file.relative_to(folder).as_posix() for file in files[:3])
         text = f"{len(files)} files in it have the functions: {names}"
-    return [Submission(entry.name, None, text, entry)]
+        return Submission(folder.name, None, text, folder)
+    text = "no Python file in it has one of the functions"
+    if notebooks := sorted(folder.rglob("*.ipynb")):
+        text += f". {notebooks[0].name} is {_UNREAD['.ipynb']}"
+    if (tests := folder / _NAMES[1]).is_file():
+        text += f". Did you mean statemachine check --faults {tests.as_posix()}?"
+    return Submission(folder.name, None, text, folder)
 
 
 def enrolled(submitted: Sequence[Submission], roster: Path) -> list[Submission]:
-    """The submissions of the students on a roster, and after them those of nobody on it.
+    """Return the submissions of the students on a roster, and after them those of nobody on it.
 
     Args:
         submitted: All submissions. Each is the student's whose row has its name or the words of its
@@ -203,30 +221,46 @@ def enrolled(submitted: Sequence[Submission], roster: Path) -> list[Submission]:
     try:
         text = roster.read_text(encoding="utf-8-sig")
         rows = csv.reader(text.splitlines(), delimiter=max(",;\t", key=text.count))
-        cells = [list(filter(None, map(str.strip, row))) for row in rows]
+        cells = [_filled_cells(row) for row in rows]
     except (OSError, UnicodeError, csv.Error) as error:
         raise BadInputError(f"the roster {roster.name} cannot be read: {error}") from None
-    left, done = list(submitted), []
-    for row in filter(None, cells):
-        if row is cells[0] and _HEADINGS & set(map(str.casefold, row)):
+    left = list(submitted)
+    of_students: list[Submission] = []
+    for row in cells:
+        is_head = row is cells[0] and _HEADINGS & set(map(str.casefold, row))
+        if not row or is_head:
             continue
-        theirs = [
-            submission
-            for submission in left
-            if {submission.name, Path(submission.name).stem} & set(row)
-        ]
-        keys = [words for cell in row if len(cell) > 2 and (words := _words(cell))]
-        theirs = theirs or [
-            submission for submission in left if any(key <= _words(submission.name) for key in keys)
-        ]
+        theirs = _of_student(row, left)
         if len(theirs) == 1:
             left.remove(theirs[0])
-            done.append(replace(theirs[0], student=row[0]))
+            of_students.append(replace(theirs[0], student=row[0]))
         else:
             names = ", ".join(submission.name for submission in theirs)
             refusal = f"{len(theirs)} may be theirs: {names}" if theirs else NOTHING
-            done.append(Submission(row[0], None, refusal, student=row[0]))
-    return done + left
+            of_students.append(Submission(row[0], None, refusal, student=row[0]))
+    return of_students + left
+
+
+def _of_student(row: Sequence[str], submitted: Sequence[Submission]) -> list[Submission]:
+    """Return the submissions that may be of a student, by the cells of a row of a roster."""
+    exact: list[Submission] = []
+    for submission in submitted:
+        if submission.name in row or Path(submission.name).stem in row:
+            exact.append(submission)
+    if exact:
+        return exact
+    keys = [_words(cell) for cell in row if len(cell) > 2]
+    similar: list[Submission] = []
+    for submission in submitted:
+        words = _words(submission.name)
+        if any(key and key <= words for key in keys):
+            similar.append(submission)
+    return similar
+
+
+def _filled_cells(row: Sequence[str]) -> list[str]:
+    """Return the cells that are not empty, without blanks around them."""
+    return [cell.strip() for cell in row if cell.strip()]
 
 
 def _words(name: str) -> frozenset[str]:
@@ -275,12 +309,12 @@ def judge_all(
             entry = ClassEntry(submission.name, content, (), submission.refusal, made_with)
             known = before.get((content, made_with), entry)
             file = submission.named(_PREDICTIONS)
-            same_as, alike = compared[submission.name]
+            similarity = compared[submission.name]
             entry = replace(
                 known if known.judged else entry,
                 name=submission.name,
-                same_as=same_as,
-                alike=alike,
+                same_as=similarity.same_as,
+                alike=similarity.alike,
                 student=submission.student,
                 predictions=score(file) if file else "",
             )
@@ -289,7 +323,7 @@ def judge_all(
             work[submission.name] = partial(_entry, judge, submission, entry, tests)
 
         def kept(judged: Mapping[str, ClassEntry]) -> list[ClassEntry]:
-            """The entries so far in their order, of which the table is made."""
+            """Write the table of the entries so far; return these in their order."""
             in_order = [judged[name] for name in work if name in judged]
             if table is not None:
                 replace_csv(table, rows_of(in_order))
@@ -310,12 +344,11 @@ def judge_all(
 def _entry(
     judge: ExerciseJudge, submission: Submission, entry: ClassEntry, tests: bool
 ) -> ClassEntry:
-    """The entry with what is not known yet."""
+    """Return the entry with what is not known yet."""
     if submission.path is not None and not entry.judged:
         try:
-            entry = replace(
-                entry, functions=judge.judge(submission.path, own=submission.own).functions
-            )
+            grade = judge.judge(submission.path, own=submission.own)
+            entry = replace(entry, functions=grade.functions)
         except BadInputError as error:
             entry = replace(entry, refusal=str(error))
     file = submission.named(_NAMES[1])
@@ -325,26 +358,45 @@ def _entry(
 
 
 def _caught(file: Path, backend: str, own: Mapping[str, Path]) -> str:
-    """How many faults a student's tests catch, and which they do not."""
+    """Return how many faults a student's tests catch, and which they do not."""
     try:
         examination = examine(file, backend, own=own)
     except StateMachineError as error:
         return str(error)
     if examination.failures:
         return f"{examination.failures[0].test} fails on the arm without a fault"
-    missed = ", ".join(fault.name for fault in examination.missed)
-    return f"{examination.caught} of {len(examination.trials)}" + f"; not {missed}" * bool(missed)
+    text = f"{examination.caught} of {len(examination.trials)}"
+    if examination.missed:
+        text += f"; not {', '.join(fault.name for fault in examination.missed)}"
+    return text
 
 
-def _compared(submitted: Sequence[Submission]) -> dict[str, tuple[str, str]]:
-    """For each submission the first whose code is the same, and the one that is most like it."""
+class _Similarity(NamedTuple):
+    """Likeness of a submission to others.
+
+    Attributes:
+        same_as: The first submission whose code is the same; "" for none.
+        alike: The submission that is most like it, and how much, in words; "" for none.
+    """
+
+    same_as: str
+    alike: str
+
+
+def _compared(submitted: Sequence[Submission]) -> dict[str, _Similarity]:
+    """Return for each submission how it is like the others."""
     shapes = {submission.name: shape_of(submission.path) for submission in submitted}
     first: dict[str, str] = {}
-    compared = {}
+    compared: dict[str, _Similarity] = {}
     for submission in submitted:
         own, shape = submission.name, shapes[submission.name]
-        same = first.setdefault(code_of(submission.path), own) if shape else own
-        others = [(likeness(shape, shapes[name]), name) for name in shapes if name != own]
-        part, name = max(others, key=lambda other: other[0], default=(0.0, ""))
-        compared[own] = "" if same == own else same, f"{part:.0%} {name}" if part else ""
+        same_as = first.setdefault(code_of(submission.path), own) if shape else own
+        part, most_alike = 0.0, ""
+        for name, other in shapes.items():
+            if name != own and (share := likeness(shape, other)) > part:
+                part, most_alike = share, name
+        compared[own] = _Similarity(
+            same_as="" if same_as == own else same_as,
+            alike=f"{part:.0%} {most_alike}" if part else "",
+        )
     return compared

@@ -13,29 +13,30 @@ import shutil
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Generic, Self, TypeVar
 
 from .. import __version__, errors
 from ..backends import backend_engine
-from ..errors import BadInputError, EngineError, refuse
+from ..errors import BadInputError, EngineError
 from ..installed import DEFAULT, engine_version
 from ..models import AnyPath, what_is_there
-from ..page import Figures
+from ..page import only_on_pages
 from ..processes import sandbox
 from ..processes.parallel import in_parallel, unwinding
 from ..release_names import is_release
 from ..runs.drive import Progress, silent
-from .inside.worlds import ExerciseWorld, Scenes, worlds_of
+from .inside.worlds import AnyWorld, Scenes, worlds_of
 from .judges import JUDGES, Judgement, judge_of, judged
 from .links import refusal_of
 from .recording import (
     LARGEST,
     FunctionRecording,
+    Limits,
     copied_to,
     digest,
     has_solutions,
@@ -44,6 +45,8 @@ from .recording import (
     record,
     refused_links,
 )
+
+S = TypeVar("S")  # what is right on a world
 
 LOOK = "please look at this"
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
@@ -57,43 +60,45 @@ _HINTS = {
 }
 
 
-def grade_of(
-    file: str,
-    sha256: str,
-    backend: str,
-    versions: dict[str, str],
-    functions: tuple[Judgement, ...],
-    cpu_limit: float = TIME_LIMIT,
-    wall_limit: float = WALL_LIMIT,
-) -> Figures:
+@dataclass(frozen=True)
+class Grade:
     """A file, judged.
 
-    Args:
-        file: Its name; sha256: the digest of its content.
-        sha256: See file.
-        backend: The backend that it ran on; versions: of what it ran with.
-        versions: See backend.
+    Attributes:
+        file: Its name.
+        sha256: The digest of its content.
+        backend: The backend that it ran on.
+        versions: Of what it ran with.
         functions: One after the other, in the exercise's order.
-        cpu_limit: What each function might compute [s]; wall_limit: and take on the clock [s].
-        wall_limit: See cpu_limit.
-
-    Returns:
-        The same; right: how many functions do what they should; passed: whether all do;
-        _watched: whether what the student's code reads is only watched.
+        cpu_limit: What each function might compute [s].
+        wall_limit: What each might take on the clock [s].
+        is_watched: Whether what the student's code reads is only watched, not prevented.
     """
-    right = sum(judgement.passed for judgement in functions)
-    return Figures(
-        file=file,
-        sha256=sha256,
-        backend=backend,
-        versions=versions,
-        functions=functions,
-        cpu_limit=cpu_limit,
-        wall_limit=wall_limit,
-        right=right,
-        passed=right == len(functions),
-        _watched=not sandbox.shut_in(),
-    )
+
+    file: str
+    sha256: str
+    backend: str
+    versions: dict[str, str]
+    functions: tuple[Judgement, ...]
+    cpu_limit: float = TIME_LIMIT
+    wall_limit: float = WALL_LIMIT
+    is_watched: bool = field(default=False, metadata={"json": False})
+
+    @property
+    @only_on_pages
+    def unwritten(self) -> int:
+        """How many functions are not written yet."""
+        return sum(not judgement.written for judgement in self.functions)
+
+    @property
+    def right(self) -> int:
+        """How many functions do what they should."""
+        return sum(judgement.passed for judgement in self.functions)
+
+    @property
+    def passed(self) -> bool:
+        """Whether all functions do what they should."""
+        return self.right == len(self.functions)
 
 
 def run(
@@ -103,7 +108,7 @@ def run(
     progress: Progress = silent,
     wall_limit: float = WALL_LIMIT,
     folder: Path | None = None,
-) -> Figures:
+) -> Grade:
     """Judge each function of a student's file.
 
     Args:
@@ -127,6 +132,20 @@ def run(
         return judge.judge(file, progress, None if folder is None else in_folder(folder))
 
 
+def check_settings(backend: str, time_limit: float) -> None:
+    """Check what files are judged with.
+
+    Raises:
+        BadInputError: The time limit is out of range, or the backend is a release.
+    """
+    if not 0 < time_limit <= 3600:
+        raise BadInputError(
+            f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
+        )
+    if is_release(backend):
+        raise BadInputError("exercises are judged on engines that are installed")
+
+
 class ExerciseJudge(ExitStack):
     """Judges files on one backend. What is right is worked out once, for all of them.
 
@@ -144,22 +163,16 @@ class ExerciseJudge(ExitStack):
     ) -> None:
         """Arguments as `run` has them."""
         super().__init__()
-        refuse(
-            (
-                not 0 < time_limit <= 3600,
-                f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}",
-            ),
-            (is_release(backend), "exercises are judged on engines that are installed"),
-        )
+        check_settings(backend, time_limit)
         engine = backend_engine(backend)
         self.backend = backend
         self.versions = {"statemachine": __version__, "python": sys.version.split()[0]}
         if engine:
             self.versions[engine] = engine_version(engine)
-        self.limits = Figures(cpu=time_limit, wall=max(wall_limit, _TIMES * time_limit))
+        self.limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
         self.stop = threading.Event()
         self._lock = threading.Lock()
-        self._key: dict[str, tuple[list[ExerciseWorld], list[Any]]] = {}
+        self._keys: dict[str, AnswerKey[Any]] = {}
 
     def __enter__(self) -> Self:
         self.enter_context(unwinding())
@@ -175,7 +188,7 @@ class ExerciseJudge(ExitStack):
         file: AnyPath,
         progress: Progress = silent,
         own: Mapping[str, Path] | None = None,
-    ) -> Figures:
+    ) -> Grade:
         """Judge each function of a student's file.
 
         Args:
@@ -192,9 +205,9 @@ class ExerciseJudge(ExitStack):
         path = _python_file(Path(file))
         folder = Path(tempfile.mkdtemp(dir=self._folder))
         copy = _copied(path, own or named_by(path), folder / "own")
-        judgements = self._all(copy, folder, progress)
+        judgements = self._judge_functions(copy, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)
-        return grade_of(
+        return Grade(
             path.name,
             digest({path.name: path}),
             self.backend,
@@ -202,17 +215,24 @@ class ExerciseJudge(ExitStack):
             judgements,
             self.limits.cpu,
             self.limits.wall,
+            is_watched=not sandbox.shut_in(),
         )
 
-    def _all(self, copy: _Copy, folder: Path, progress: Progress) -> tuple[Judgement, ...]:
-        """All functions at once, so that the slowest decides how long it takes."""
+    def _judge_functions(
+        self, copy: _Copy, folder: Path, progress: Progress
+    ) -> tuple[Judgement, ...]:
+        """Judge all functions at once, so that the slowest decides how long it takes."""
         stop = threading.Event()
-        work: dict[str, Callable[[], Any]] = {
-            name: partial(
-                record, copy.path, copy.folder, name, self.backend, self.limits, folder / name, stop
+        recordings: dict[str, FunctionRecording] = {}
+
+        def record_function(name: str) -> None:
+            recordings[name] = record(
+                copy.path, copy.folder, name, self.backend, self.limits, folder / name, stop
             )
-            for name in JUDGES
-        }
+
+        work: dict[str, Callable[[], None]] = {}
+        for name in JUDGES:
+            work[name] = partial(record_function, name)
         # Meanwhile what is right is worked out here, where no code of the student's runs.
         work[""] = self._work_out
 
@@ -221,19 +241,22 @@ class ExerciseJudge(ExitStack):
                 stop.set()
             progress(1 - left / len(work))
 
-        recordings = in_parallel(work, len(work), stop.set, waiting)
+        in_parallel(work, len(work), stop.set, waiting)
         return tuple(self._judgement(copy, name, recordings[name]) for name in JUDGES)
 
     def _work_out(self) -> None:
-        """For each function what it is called on, and what is right there; once."""
+        """Work out, once, what each function is called on and what is right there."""
         with self._lock:
-            if not self._key:
+            if not self._keys:
                 scenes = Scenes(self.backend, Path(tempfile.mkdtemp(dir=self._folder)))
-                worlds = {name: worlds_of(name, scenes) for name in JUDGES}
-                self._key = {n: (w, [*map(judge_of(n).right, w)]) for n, w in worlds.items()}
+                keys: dict[str, AnswerKey[Any]] = {}
+                for name in JUDGES:
+                    worlds = worlds_of(name, scenes)
+                    keys[name] = AnswerKey(worlds, [judge_of(name).right(each) for each in worlds])
+                self._keys = keys
 
     def _judgement(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
-        """The verdict on a function; what somebody should look at, last."""
+        """Return the judgement on a function; what somebody should look at, last."""
         if recording.refusal:
             kind, text = recording.refusal
             raise getattr(errors, kind, EngineError)(text)
@@ -248,34 +271,52 @@ class ExerciseJudge(ExitStack):
         if recording.forbidden:
             judgement = Judgement(name, True, False, tuple(recording.forbidden))
         else:
+            key = self._keys[name]
             try:
-                judgement = judged(name, *self._key[name], recording.answers)
+                judgement = judged(name, key.worlds, key.solutions, recording.answers)
             except Exception as error:  # what was recorded may have been made up
                 recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        judgement = judgement or _without_answers(copy, name, recording)
+        if judgement is None:
+            judgement = _without_answers(copy, name, recording)
         looks = tuple(f"{LOOK}: it reads {other}" for other in others)
         return replace(judgement, remarks=judgement.remarks + looks)
 
 
+@dataclass(frozen=True)
+class AnswerKey(Generic[S]):
+    """What a function is called on, and what is right there.
+
+    Attributes:
+        worlds: The course's own first.
+        solutions: What is right on each, as the function's judge has it.
+    """
+
+    worlds: Sequence[AnyWorld]
+    solutions: Sequence[S]
+
+
 def _without_answers(copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
-    """The verdict where there are fewer answers than worlds, by how the process ended."""
-    outcome = recording.outcome
-    known = recording.broken or (recording.began and outcome.end != "clock")
+    """Return the judgement where there are fewer answers than worlds, by how the process ended."""
     if recording.broken:
         text = f"what its process recorded is not a record of a run ({recording.broken})"
-    elif not recording.began:
+        return Judgement(name, True, False, (text,))
+    outcome = recording.outcome
+    if not recording.began:
         text = (
             f"nothing could be judged: the judge itself {outcome.how}. Your code was "
             "not run: this machine may be busy, or out of memory; try again"
         )
-    else:
-        # The innermost line of the student's file comes first in what is noted last.
-        last = recording.trace.rpartition("Timeout (")[2]
-        lines = re.findall(rf'File "{re.escape(str(copy.path))}", line (\d+)', last)
-        where = f"line {lines[0]}: " if lines else ""
-        what = "" if known else "nothing could be judged: "
-        text = f"{where}{what}it {outcome.how}{_HINTS.get(outcome.end, '')}"
-    return Judgement(name, True, False, (text,), judged=bool(known))
+        return Judgement(name, True, False, (text,), judged=False)
+    text = f"it {outcome.how}{_HINTS.get(outcome.end, '')}"
+    is_judged = outcome.end != "clock"
+    if not is_judged:
+        text = f"nothing could be judged: {text}"
+    # The innermost line of the student's file comes first in what is noted last.
+    last = recording.trace.rpartition("Timeout (")[2]
+    lines = re.findall(rf'File "{re.escape(str(copy.path))}", line (\d+)', last)
+    if lines:
+        text = f"line {lines[0]}: {text}"
+    return Judgement(name, True, False, (text,), judged=is_judged)
 
 
 def _python_file(path: Path) -> Path:
@@ -284,43 +325,46 @@ def _python_file(path: Path) -> Path:
         kind = what_is_there(path)
     except (OSError, ValueError, RuntimeError) as error:
         raise BadInputError(f"no file can have this name: {error}") from None
-    refuse(
-        (kind == "a folder", f"{path.name} is a folder: name the student's file in it"),
-        (kind == "nothing", f"there is no file {path.name}"),
-        (kind != "a file", f"{path.name} is {kind}, not a file"),
-        (path.suffix != ".py", f"{path.name} is not a Python file: its name does not end in .py"),
-    )
+    if kind == "a folder":
+        raise BadInputError(f"{path.name} is a folder: name the student's file in it")
+    if kind == "nothing":
+        raise BadInputError(f"there is no file {path.name}")
+    if kind != "a file":
+        raise BadInputError(f"{path.name} is {kind}, not a file")
+    if path.suffix != ".py":
+        raise BadInputError(f"{path.name} is not a Python file: its name does not end in .py")
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST + 1)
     except OSError as error:
         raise BadInputError(f"{path.name} cannot be read: {error.strerror}") from None
-    tests = re.search(rb"^def test_", content, re.M) and not re.search(rb"demo_\w+", content)
-    refuse(
-        (
-            len(content) > LARGEST or b"\0" in content,
-            f"{path.name} is not a Python file, or far too large for one",
-        ),
-        (
-            tests,
+    if len(content) > LARGEST or b"\0" in content:
+        raise BadInputError(f"{path.name} is not a Python file, or far too large for one")
+    if re.search(rb"^def test_", content, re.M) and not re.search(rb"demo_\w+", content):
+        raise BadInputError(
             f"{path.name} holds tests and none of the functions: did you mean "
-            f"statemachine check --faults {path}?",
-        ),
-    )
+            f"statemachine check --faults {path}?"
+        )
     return path
 
 
 @dataclass(frozen=True)
 class _Copy:
-    """A student's file alone with what belongs to it: `path` in `folder`; it was in `before`."""
+    """A student's file alone with what belongs to it.
+
+    Attributes:
+        path: The file.
+        folder: The new folder of all files.
+        before: The folder that they were in.
+    """
 
     path: Path
     folder: Path
     before: Path
 
     def others(self, reads: Iterable[str]) -> dict[str, bool]:
-        """Files that are not its own, by name; whether it may not be judged for that."""
-        others = {}
+        """Return files that are not its own, by name; whether it may not be judged for that."""
+        others: dict[str, bool] = {}
         for path in map(Path, reads):
             beside = path.is_relative_to(self.folder)
             file = self.before / path.relative_to(self.folder) if beside else path

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
-from ..page import Figures
 from ..processes import ALONE, sandbox
 from ..processes.places import python_path
 from .inside.answers import Answer, decode
@@ -41,6 +40,19 @@ _KEPT = (
     "SYSTEMROOT", "LANG", "LC_ALL",
     "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONHOME", "CONDA_PREFIX",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a function may take, from when its worlds are ready.
+
+    Attributes:
+        cpu: What it may compute [s].
+        wall: What it may take on the clock [s].
+    """
+
+    cpu: float
+    wall: float
 
 
 @dataclass
@@ -73,7 +85,7 @@ def record(
     own: Path,
     name: str,
     backend: str,
-    limits: Figures,
+    limits: Limits,
     folder: Path,
     stop: threading.Event,
 ) -> FunctionRecording:
@@ -84,8 +96,7 @@ def record(
         own: The folder of all files that belong to it.
         name: Of the function.
         backend: Of the backend.
-        limits: What it may compute (cpu), and take on the clock (wall), from when the worlds are
-            ready [s].
+        limits: What it may take.
         folder: A new one for what it writes.
         stop: Ends it.
     """
@@ -105,11 +116,16 @@ def record(
         "alone": not sandbox.shut_in(),
     }
     job.write_text(json.dumps(facts), encoding="utf-8")
+    command = [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)]
+
+    def has_begun() -> bool:
+        return bool(content(answers, 1))
+
     outcome = sandbox.run(
-        [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
+        command,
         cpu=limits.cpu,
         wall=limits.wall,
-        started=lambda: bool(content(answers, 1)),
+        started=has_begun,
         start=START,
         start_cpu=START,
         cwd=scratch,
@@ -125,8 +141,9 @@ def record(
             _add(recording, line, nonce)
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         recording.broken = f"{type(error).__name__}: {error}"[:_TEXT_MOST]
-    if outcome.started and not (recording.began or recording.refusal):
-        recording.broken = recording.broken or "it is gone"
+    is_empty = not (recording.began or recording.refusal)
+    if outcome.started and is_empty and not recording.broken:
+        recording.broken = "it is gone"
     return recording
 
 
@@ -176,7 +193,7 @@ def _text(value: Any) -> str:
 
 
 def content(file: Path, most: int) -> bytes:
-    """The first bytes of a file; of what is not a plain file (a link, a pipe), none."""
+    """Return the first bytes of a file; of what is not a plain file (a link, a pipe), none."""
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
     try:
         with open(os.open(file, flags | getattr(os, "O_BINARY", 0)), "rb") as opened:
@@ -197,18 +214,18 @@ _RUN = 4  # kinds of syntax in a row that are compared
 
 
 def has_functions(file: Path) -> bool:
-    """Whether a file defines a function of the exercise, or is compiled from one that does."""
+    """Return whether a file defines a function of the exercise, or is compiled from such a one."""
     pattern = _COMPILED if file.suffix == ".pyc" else _DEFINES
     return pattern.search(start_of(file)) is not None
 
 
 def has_solutions(file: Path) -> bool:
-    """Whether any of the functions in a file may be written."""
+    """Return whether any of the functions in a file may be written."""
     return has_functions(file) and start_of(file).count(b"NotImplementedError(") < len(JUDGES)
 
 
 def start_of(file: Path) -> bytes:
-    """As much of a file as is looked at; a pipe would wait for somebody to write."""
+    """Return as much of a file as is looked at; a pipe would wait for somebody to write."""
     return content(Path(os.path.realpath(file)), LARGEST + 1)
 
 
@@ -241,8 +258,11 @@ def _walked(folder: Path, folders_too: bool = False) -> Iterator[Path]:
             folders[:] = []
             continue
         folders[:] = [name for name in folders if not name.startswith((".", "__pycache__"))]
-        kept = [name for name in names if not name.startswith(".")]
-        yield from (Path(place, name) for name in kept + (folders if folders_too else []))
+        visible = [name for name in names if not name.startswith(".")]
+        if folders_too:
+            visible += folders
+        for name in visible:
+            yield Path(place, name)
 
 
 def named_by(file: Path, somebody_elses: Callable[[Path], bool] | None = None) -> dict[str, Path]:
@@ -298,7 +318,7 @@ def copied_to(folder: Path, file: Path, own: Mapping[str, Path]) -> Path:
 
 
 def digest(files: Mapping[str, Path]) -> str:
-    """Of names and contents; "" where there is none, or one is too large to be judged."""
+    """Return a digest of names and contents; "" for no file, or where one is too large."""
     sha = hashlib.sha256()
     for name, file in files.items():
         text, start = os.fsencode(name), start_of(file)
@@ -309,13 +329,13 @@ def digest(files: Mapping[str, Path]) -> str:
 
 
 def code_of(path: Path | None) -> str:
-    """A digest of what a file does, without its comments, docstrings and layout; or ""."""
+    """Return a digest of a file's code, without comments, docstrings and layout; or ""."""
     tree = _tree(path)
     return hashlib.sha256(ast.dump(tree).encode(errors="replace")).hexdigest() if tree.body else ""
 
 
 def shape_of(path: Path | None) -> Counter[tuple[str, ...]]:
-    """The kinds of syntax in a file's functions, in short runs, whatever is named how.
+    """Return the kinds of syntax in a file's functions, in short runs, whatever is named how.
 
     Of those that are judged and are written, and of what they call in the file.
     """
@@ -327,29 +347,30 @@ def shape_of(path: Path | None) -> Counter[tuple[str, ...]]:
     }
     names = [name for name in JUDGES if name in defined]
     for name in names:  # which grows meanwhile
-        called = (inner.id for inner in ast.walk(defined[name]) if isinstance(inner, ast.Name))
-        names += [
-            inner for inner in dict.fromkeys(called) if inner in defined and inner not in names
-        ]
+        for inner in ast.walk(defined[name]):
+            if isinstance(inner, ast.Name) and inner.id in defined and inner.id not in names:
+                names.append(inner.id)
     text = "".join(ast.dump(defined[name]) for name in names)
     kinds = re.findall(r"\b[A-Z]\w+(?=\()", text)
     return Counter(zip(*(kinds[k:] for k in range(_RUN)), strict=False))
 
 
 def likeness(left: Counter[tuple[str, ...]], right: Counter[tuple[str, ...]]) -> float:
-    """The part of both that both have: 1 for the same, 0 where there is nothing to compare."""
-    return (left & right).total() / ((left | right).total() or 1)
+    """Return the part of both that both have: 1 for the same, 0 where there is nothing."""
+    total = (left | right).total()
+    return (left & right).total() / total if total else 0.0
 
 
 def _tree(path: Path | None) -> ast.Module:
-    """A file's syntax without docstrings; empty where there is none, or it is too large."""
+    """Return a file's syntax without docstrings; empty for none, or where it is too large."""
     text = start_of(path) if path is not None else b""
     try:
         tree = ast.parse(text if len(text) <= LARGEST else b"")
         for node in ast.walk(tree):
-            if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)):
-                documented = ast.get_docstring(node, clean=False) is not None
-                node.body = (node.body[1:] or [ast.Pass()]) if documented else node.body
+            if not isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)):
+                continue
+            if ast.get_docstring(node, clean=False) is not None:
+                node.body = node.body[1:] or [ast.Pass()]
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return ast.Module([], [])
     return tree

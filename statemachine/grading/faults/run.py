@@ -13,10 +13,12 @@ import re
 import sys
 import tempfile
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from ...backends import backend_names
 from ...engines import rooms_with
@@ -30,7 +32,6 @@ from ...errors import (
 )
 from ...installed import DEFAULT, engine_version, require
 from ...models import AnyPath
-from ...page import Figures
 from ...processes import checked_jobs, sandbox
 from ...processes.parallel import in_parallel, unwinding
 from ...runs.drive import Progress, silent
@@ -52,48 +53,96 @@ _ERRORS = (r"^E   (\S.*)", r"^E +(\S.*)", r"^ +\| (\w+Group: .*)", r"^(\S.*)")
 _CHAINED = re.compile(r"^(?:The above exception was|During handling of the above) .*", re.MULTILINE)
 
 
-def trial_of(fault: Fault, caught_by: tuple[Figures, ...]) -> Figures:
-    """A fault, the tests that caught it with what each said, and whether any did."""
-    return Figures(fault=fault, caught_by=caught_by, caught=bool(caught_by))
+@dataclass(frozen=True)
+class FailedTest:
+    """Test that failed.
+
+    Attributes:
+        test: Its name.
+        why: What it said, in a line.
+    """
+
+    test: str
+    why: str
 
 
-def examination_of(
-    file: str,
-    backend: str,
-    engine_version: str,
-    tests: tuple[str, ...],
-    failures: tuple[Figures, ...],
-    trials: tuple[Figures, ...],
-) -> Figures:
+@dataclass(frozen=True)
+class FaultTrial:
+    """Tests against an arm with one fault.
+
+    Attributes:
+        fault: What is wrong with the arm.
+        caught_by: The tests that failed on it.
+    """
+
+    fault: Fault
+    caught_by: tuple[FailedTest, ...]
+
+    @property
+    def caught(self) -> bool:
+        """Whether any test caught the fault."""
+        return bool(self.caught_by)
+
+
+@dataclass(frozen=True)
+class Examination:
     """What a test file is worth.
 
-    Args:
+    Attributes:
         file: Its name.
         backend: What it ran on.
         engine_version: Of its engine.
         tests: Those that are not skipped.
-        failures: Those that failed on the healthy arm, each test and in a line why; then there are
-            no trials.
+        failures: Those that failed on the healthy arm; then there are no trials.
         trials: One for each fault.
-
-    Returns:
-        The same; caught: how many faults were caught; missed: those that no test caught; idle:
-        tests that caught none; holds: whether the tests pass on the healthy arm and catch all.
     """
-    missed = tuple(trial.fault for trial in trials if not trial.caught)
-    busy = {failure.test for trial in trials for failure in trial.caught_by}
-    return Figures(
-        file=file,
-        backend=backend,
-        engine_version=engine_version,
-        tests=tests,
-        failures=failures,
-        trials=trials,
-        caught=len(trials) - len(missed),
-        missed=missed,
-        idle=tuple(test for test in tests if test not in busy),
-        holds=not failures and not missed,
-    )
+
+    file: str
+    backend: str
+    engine_version: str
+    tests: tuple[str, ...]
+    failures: tuple[FailedTest, ...]
+    trials: tuple[FaultTrial, ...]
+
+    @property
+    def caught(self) -> int:
+        """How many faults were caught."""
+        return len(self.trials) - len(self.missed)
+
+    @property
+    def missed(self) -> tuple[Fault, ...]:
+        """Faults that no test caught."""
+        return tuple(trial.fault for trial in self.trials if not trial.caught)
+
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Tests that caught no fault."""
+        busy: set[str] = set()
+        for trial in self.trials:
+            busy.update(failure.test for failure in trial.caught_by)
+        return tuple(test for test in self.tests if test not in busy)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the tests pass on the healthy arm and catch all faults."""
+        return not self.failures and not self.missed
+
+
+@dataclass(frozen=True)
+class PytestRun:
+    """What one run of pytest came to.
+
+    Attributes:
+        outcome: How its process ended.
+        tests: Those that were not skipped.
+        skipped: How many were.
+        failures: Those that failed; of a file that cannot be imported the name is `IMPORT`.
+    """
+
+    outcome: sandbox.ProcessOutcome
+    tests: tuple[str, ...]
+    skipped: int
+    failures: tuple[FailedTest, ...]
 
 
 def examine(
@@ -104,7 +153,7 @@ def examine(
     clock: float = _CLOCK,
     progress: Progress = silent,
     own: Mapping[str, Path] | None = None,
-) -> Figures:
+) -> Examination:
     """Run a student's tests on the healthy arm and on one with each of the faults.
 
     Args:
@@ -116,9 +165,6 @@ def examine(
         progress: Told the fraction that is done.
         own: All files that belong to it, by their names in its folder; without, what it names
             beside it. No other file is there for the tests.
-
-    Returns:
-        As `examination_of`.
 
     Raises:
         ModelFileError: There is no such file.
@@ -132,7 +178,7 @@ def examine(
         check_name("fault", name, FAULTS)
     faults = [FAULTS[name] for name in dict.fromkeys(only or FAULTS)]
     version = _ready(backend)
-    records: dict[str, Figures] = {}
+    trials: list[FaultTrial] = []
     with ExitStack() as stack:
         stack.enter_context(unwinding())
         folder = stack.enter_context(
@@ -140,29 +186,43 @@ def examine(
         )
         copied = copied_to(Path(folder).resolve(), path, own or named_by(path, _has_tests))
         healthy = _run(copied, backend, None, seconds, clock)
-        if broken := healthy.failures.get(IMPORT):
-            raise BadInputError(f"{path.name} cannot be imported: {broken}")
+        for failure in healthy.failures:
+            if failure.test == IMPORT and failure.why:
+                raise BadInputError(f"{path.name} cannot be imported: {failure.why}")
         if not healthy.tests:
             why = "each was skipped" if healthy.skipped else "a test is a function test_…"
             raise BadInputError(f"there are no tests in {path.name}: {why}")
         if not healthy.failures:
-            took = healthy.outcome
-            patience = _TIMES * took.cpu + _AND, _TIMES * took.wall + _CLOCK_AND
-            stop, total = threading.Event(), len(faults) + 1
-            records = in_parallel(
-                {f.name: partial(_run, copied, backend, f.name, *patience, stop) for f in faults},
-                checked_jobs(None),
-                stop.set,
-                lambda left: progress((total - left) / total),
-            )
-    return examination_of(
-        file=path.name,
-        backend=backend,
-        engine_version=version,
-        tests=healthy.tests,
-        failures=_failures_of(healthy),
-        trials=tuple(trial_of(f, _failures_of(records[f.name])) for f in faults if records),
+            trials = _try_faults(faults, copied, backend, healthy.outcome, progress)
+    return Examination(path.name, backend, version, healthy.tests, healthy.failures, tuple(trials))
+
+
+def _try_faults(
+    faults: Sequence[Fault],
+    path: Path,
+    backend: str,
+    healthy: sandbox.ProcessOutcome,
+    progress: Progress,
+) -> list[FaultTrial]:
+    """Run tests on an arm with each of the faults, several at once.
+
+    Args:
+        faults: One after the other.
+        path: The test file.
+        backend: What the arm is loaded on.
+        healthy: How the run on the healthy arm ended, by which it is limited how long these take.
+        progress: Told the fraction that is done, the run on the healthy arm included.
+    """
+    seconds = _TIMES * healthy.cpu + _AND
+    clock = _TIMES * healthy.wall + _CLOCK_AND
+    stop, total = threading.Event(), len(faults) + 1
+    work: dict[str, Callable[[], PytestRun]] = {}
+    for fault in faults:
+        work[fault.name] = partial(_run, path, backend, fault.name, seconds, clock, stop)
+    runs = in_parallel(
+        work, checked_jobs(None), stop.set, lambda left: progress((total - left) / total)
     )
+    return [FaultTrial(fault, runs[fault.name].failures) for fault in faults]
 
 
 def _test_file(file: AnyPath) -> Path:
@@ -182,7 +242,7 @@ def _has_tests(file: Path) -> bool:
 
 
 def _ready(backend: str) -> str:
-    """The version of the backend's engine; raises where the tests could not even begin."""
+    """Return the version of the backend's engine; raise where the tests could not even begin."""
     known = rooms_with("backend")
     if backend not in backend_names():
         raise unknown_name("backend", backend, known)
@@ -199,10 +259,6 @@ def _ready(backend: str) -> str:
     return engine_version(backend)
 
 
-def _failures_of(record: Figures) -> tuple[Figures, ...]:
-    return tuple(Figures(test=test, why=why) for test, why in record.failures.items())
-
-
 def _run(
     path: Path,
     backend: str,
@@ -210,30 +266,26 @@ def _run(
     seconds: float,
     clock: float,
     stop: threading.Event | None = None,
-) -> Figures:
-    """What one run of pytest came to.
+) -> PytestRun:
+    """Run pytest once.
 
-    Returns:
-        outcome: How it ended.
-        tests: Those that were not skipped; skipped: how many were.
-        failures: By test what was said.
+    Args:
+        path: The test file.
+        backend: What the arm is loaded on.
+        fault: Name of the arm's fault; None for the healthy arm.
+        seconds: What the tests may compute [s].
+        clock: What they may take on the clock, from when the arm is ready [s].
+        stop: Ends it.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         here = Path(folder)
         settings, record = here / "pytest.ini", here / "record"
         settings.write_text("[pytest]\n", encoding="utf-8")
         record.touch()
-        # -P: what lies beside the file must not pass for a module of pytest's.
-        command = [
-            *(sys.executable, "-P", "-m", "pytest", "-c", str(settings), "--rootdir", folder),
-            *("--noconftest", "--tb=short", "--no-summary", "-q", "-p", "no:cacheprovider"),
-            *("-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)),
-            *([] if sandbox.shut_in() else ["--watched"]),
-            os.path.join(os.curdir, path.name),  # brackets in a whole path confuse pytest
-        ]
-        env = _environment(backend) | (
-            {FAULT: fault} if fault else {}
-        )  # where no test looks for it
+        env = _environment(backend)
+        if fault:
+            env[FAULT] = fault  # where no test looks for it
+        command = _command(path.name, backend, folder, str(settings), str(record))
         outcome = sandbox.run(
             command,
             cpu=seconds,
@@ -248,11 +300,32 @@ def _run(
         return _read(record, outcome, path.name)
 
 
+def _command(file: str, backend: str, folder: str, settings: str, record: str) -> list[str]:
+    """Return the command that runs pytest.
+
+    Args:
+        file: Name of the test file, in the folder that it runs in.
+        backend: What the arm is loaded on.
+        folder: That of `settings` and `record`.
+        settings: The file that pytest reads.
+        record: The file that the plugin writes.
+    """
+    # -P: what lies beside the file must not pass for a module of pytest's.
+    command = [sys.executable, "-P", "-m", "pytest", "-c", settings, "--rootdir", folder]
+    command += ["--noconftest", "--tb=short", "--no-summary", "-q", "-p", "no:cacheprovider"]
+    command += ["-p", f"{__package__}.plugin", "--engine", backend, "--record", record]
+    if not sandbox.shut_in():
+        command.append("--watched")
+    command.append(os.path.join(os.curdir, file))  # brackets in a whole path confuse pytest
+    return command
+
+
 def _environment(backend: str) -> dict[str, str]:
     """Return that of a student's process, with this package to be found, for one pytest alone."""
     env = environment(backend)
-    home = str(Path(__file__).resolve().parents[3])
-    paths = [home, *filter(None, [env.get("PYTHONPATH")])]
+    paths = [str(Path(__file__).resolve().parents[3])]
+    if env.get("PYTHONPATH"):
+        paths.append(env["PYTHONPATH"])
     return {
         **env,
         "PYTHONPATH": os.pathsep.join(paths),
@@ -260,14 +333,32 @@ def _environment(backend: str) -> dict[str, str]:
     }
 
 
-def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> Figures:
-    if not outcome.started:  # of which no test can be the reason
-        raise EngineError(f"pytest stopped before the tests: it {_end(outcome)}")
+@dataclass
+class _PytestRecord:
+    """What the plugin wrote of a run of pytest; see `plugin.PytestRecorder`.
+
+    Attributes:
+        file: Name of the test file.
+        tests: All tests; None before pytest has collected them.
+        running: The test that began last; "" before the first.
+        ended: Tests that came to their end.
+        skipped: Tests that were skipped.
+        failures: What each test said that failed.
+    """
+
+    file: str
     tests: list[str] | None = None
-    running, ended = "", set[str]()
-    skipped: set[str] = set()
-    failures: dict[str, str] = {}
-    for line in content(record, _RECORD_MOST).splitlines():
+    running: str = ""
+    ended: set[str] = field(default_factory=set)
+    skipped: set[str] = field(default_factory=set)
+    failures: dict[str, str] = field(default_factory=dict)
+
+    def add(self, line: bytes) -> None:
+        """Take a line.
+
+        Raises:
+            BadInputError: It is not one of the plugin's.
+        """
         try:
             facts = json.loads(line)
         except (ValueError, RecursionError):
@@ -276,44 +367,84 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome, file: str) -> Figures:
             case {"ready": True}:
                 pass
             case {"tests": [*names]} if all(isinstance(name, str) for name in names):
-                tests = names
+                self.tests = names
             case {"begins": str(name)}:
-                running = name
-            case {"test": str(name), "when": str(when), "outcome": outcome_of, "text": str(text)}:
-                ended |= {name} if when == "teardown" else set()
-                if outcome_of == "failed":
-                    failures.setdefault(name, _said(text, file))  # the test before its teardown
-                elif outcome_of == "skipped":
-                    skipped.add(name)
+                self.running = name
+            case {"test": str(name), "when": str(when), "outcome": outcome, "text": str(text)}:
+                self._add_report(name, when, outcome, text)
             case _:
                 raise BadInputError("the tests wrote into the record of what they do")
-    if tests is None:
-        failures.setdefault(IMPORT, f"it {_end(outcome)}")
-    elif IMPORT not in failures and (rest := [test for test in tests if test not in ended]):
-        # The one that was running ended them all.
-        failures.setdefault(running if running in rest else rest[0], _end(outcome))
-    counted = tuple(test for test in tests or () if test not in skipped)
-    return Figures(outcome=outcome, tests=counted, skipped=len(skipped), failures=failures)
+
+    def _add_report(self, name: str, when: str, outcome: Any, text: str) -> None:
+        """Take one of pytest's reports of a test."""
+        if when == "teardown":
+            self.ended.add(name)
+        if outcome == "failed":
+            # The test before its teardown.
+            self.failures.setdefault(name, _error_in(text, self.file))
+        elif outcome == "skipped":
+            self.skipped.add(name)
+
+    def add_end(self, end: str) -> None:
+        """Take how the process ended: a test that did not come to its end failed by that."""
+        if self.tests is None:
+            self.failures.setdefault(IMPORT, f"it {end}")
+        elif IMPORT not in self.failures:
+            not_ended = [test for test in self.tests if test not in self.ended]
+            if not_ended:
+                # The one that was running ended them all.
+                test = self.running if self.running in not_ended else not_ended[0]
+                self.failures.setdefault(test, end)
 
 
-def _said(text: str, file: str) -> str:
-    """The error in one of pytest's reports, in one line, with the last line of the file there."""
+def _read(file: Path, outcome: sandbox.ProcessOutcome, tests: str) -> PytestRun:
+    """Read what a run of pytest came to.
+
+    Args:
+        file: The plugin's record.
+        outcome: How the process ended.
+        tests: Name of the test file.
+    """
+    if not outcome.started:  # of which no test can be the reason
+        raise EngineError(f"pytest stopped before the tests: it {_end(outcome)}")
+    record = _PytestRecord(tests)
+    for line in content(file, _RECORD_MOST).splitlines():
+        record.add(line)
+    record.add_end(_end(outcome))
+    counted = tuple(test for test in record.tests or () if test not in record.skipped)
+    failures = tuple(FailedTest(test, why) for test, why in record.failures.items())
+    return PytestRun(outcome, counted, len(record.skipped), failures)
+
+
+def _error_in(text: str, file: str) -> str:
+    """Return the error in one of pytest's reports, in one line, with the last line of the file."""
     last = _CHAINED.split(text)[-1]
-    lines = re.findall(rf'{re.escape(file)}(?::|"?, line )(\d+)', last)
-    errors = [match for pattern in _ERRORS for match in re.findall(pattern, last, re.MULTILINE)]
-    words = re.sub(r"^(?:AssertionError: |Failed: |(?:\w+\.)+(?=\w+:))", "", [*errors, ""][0])
+    words = ""
+    for pattern in _ERRORS:
+        match = re.search(pattern, last, re.MULTILINE)
+        if match:
+            words = match[1]
+            break
+    words = re.sub(r"^(?:AssertionError: |Failed: |(?:\w+\.)+(?=\w+:))", "", words)
     if re.fullmatch(r"fixture '.*' not found", words):
         words += "; this command gives model, data and backend"
-    return (f"line {lines[-1]}: " if lines else "") + words[:_LONGEST]
+    words = words[:_LONGEST]
+    lines = re.findall(rf'{re.escape(file)}(?::|"?, line )(\d+)', last)
+    return f"line {lines[-1]}: {words}" if lines else words
 
 
 def _end(outcome: sandbox.ProcessOutcome) -> str:
-    """How a run ended that did not come to its end, and the last line of an error, if any.
+    """Return how a run ended that did not come to its end, with the last line of an error, if any.
 
     pytest's own among them.
     """
     lines = [line.strip() for line in outcome.stderr.splitlines() if line.strip()]
     lines += [line for line in outcome.stdout.splitlines() if line.startswith(_PYTEST_FAILS)]
-    said = [line for line in lines if "rror" in line.removeprefix(_PYTEST_FAILS)] or lines
-    words = f": {said[-1].removeprefix(_PYTEST_FAILS).strip()[:_LONGEST]}" if said else ""
-    return outcome.how + words
+    errors = [line for line in lines if "rror" in line.removeprefix(_PYTEST_FAILS)]
+    if errors:
+        last = errors[-1]
+    elif lines:
+        last = lines[-1]
+    else:
+        return outcome.how
+    return f"{outcome.how}: {last.removeprefix(_PYTEST_FAILS).strip()[:_LONGEST]}"

@@ -15,7 +15,6 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from ...errors import refuse
 from ...interface import DERIVED, INPUTS
 from .watch import EngineRun, Inputs, StudentWatch, inputs_of
 
@@ -23,6 +22,9 @@ _MOST = 10_000  # values that a list or a generator may have
 _DEEPEST = 8  # lists within lists, in a record
 _LONGEST = 200  # characters of a text
 _SHOWN = 40  # characters of a value
+
+
+Changes = dict[str, tuple[list[float], list[float]]]  # by name: before, after
 
 
 @dataclass(frozen=True)
@@ -54,34 +56,41 @@ class Answer:
     runs: tuple[EngineRun, ...] = ()
     forwards: tuple[Inputs, ...] = ()
     ends: tuple[Inputs, ...] = ()
-    changed: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
+    changed: Changes = field(default_factory=dict)
 
 
-_RECORDS: dict[str, Any] = {kind.__name__: kind for kind in (Answer, EngineRun, Inputs, OtherValue)}
+_Record = type[Answer] | type[EngineRun] | type[Inputs] | type[OtherValue]
+_RECORDS: dict[str, _Record] = {
+    "Answer": Answer,
+    "EngineRun": EngineRun,
+    "Inputs": Inputs,
+    "OtherValue": OtherValue,
+}
 
 
-def answer_of(result: Any, watch: StudentWatch, changed: dict[str, Any]) -> Answer:
-    """The answer that a result and what was seen amount to.
+def answer_of(result: Any, watch: StudentWatch, changed: Changes) -> Answer:
+    """Return the answer that a result and what was seen amount to.
 
     What is worked out only when somebody asks (a generator) is asked for here.
     """
     if isinstance(result, Iterator):
         result = tuple(islice(result, _MOST))
-    every = islice(result, _MOST) if isinstance(result, (tuple, list)) or _rows(result) else ()
-    items = [list(islice(part, _MOST)) if isinstance(part, Iterator) else part for part in every]
+    items: list[Any] = []
+    if isinstance(result, (tuple, list)) or _rows(result):
+        for part in islice(result, _MOST):
+            items.append(list(islice(part, _MOST)) if isinstance(part, Iterator) else part)
     if type(result) in (tuple, list):
         result = type(result)(items)
-    items = items[:100]
-    first = [next(j for j in range(k + 1) if _same(items[j], items[k])) for k in range(len(items))]
-    return Answer(
-        result,
-        tuple(first),
-        tuple(_live(item, watch.datas) for item in items),
-        tuple(watch.runs),
-        tuple(watch.forwards),
-        tuple(inputs_of(k, data) for k, data in enumerate(watch.datas)),
-        changed,
-    )
+    parts = items[:100]
+    memory = tuple(_first_with_memory_of(k, parts) for k in range(len(parts)))
+    live = tuple(_live(part, watch.datas) for part in parts)
+    ends = tuple(inputs_of(k, data) for k, data in enumerate(watch.datas))
+    return Answer(result, memory, live, tuple(watch.runs), tuple(watch.forwards), ends, changed)
+
+
+def _first_with_memory_of(k: int, parts: Sequence[Any]) -> int:
+    """Return the number of the first part that has the memory of part k."""
+    return next(j for j in range(k + 1) if _same(parts[j], parts[k]))
 
 
 def _rows(value: Any) -> bool:
@@ -94,7 +103,9 @@ def _same(left: Any, right: Any) -> bool:
 
 
 def _live(value: Any, datas: Sequence[Any]) -> str:
-    for data in datas if isinstance(value, np.ndarray) else ():
+    if not isinstance(value, np.ndarray):
+        return ""
+    for data in datas:
         for name in (*INPUTS, *DERIVED):
             try:
                 array = getattr(data, name)
@@ -106,7 +117,7 @@ def _live(value: Any, datas: Sequence[Any]) -> str:
 
 
 def kind(value: Any) -> str:
-    """What a value is, in words."""
+    """Return what a value is, in words."""
     if isinstance(value, OtherValue):
         return value.text
     if _rows(value):
@@ -119,7 +130,7 @@ def kind(value: Any) -> str:
 
 
 def encode(value: Any, depth: int = 0) -> Any:
-    """An answer, or a part of one, as what JSON can hold; see `Answer.result`."""
+    """Return an answer, or a part of one, as what JSON can hold; see `Answer.result`."""
     if isinstance(value, (np.bool_, np.integer, np.float64)):
         value = value.item()
     if value is None or type(value) in (bool, float):
@@ -128,29 +139,46 @@ def encode(value: Any, depth: int = 0) -> Any:
         return value
     if type(value) is str:
         return value[:_LONGEST]
+    record = None
     if isinstance(value, (np.ndarray, np.generic)) or hasattr(value, "__array__"):
-        array = np.array(value, subok=False)
-        if array.dtype.kind in "biuf" and array.size <= 100 * _MOST and array.dtype.itemsize <= 8:
-            data = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
-            return {"array": [array.dtype.str, list(array.shape), data]}
+        record = _encoded_array(value)
     elif depth < _DEEPEST:
-        if type(value) in _RECORDS.values():
-            parts = {name: encode(item, depth + 1) for name, item in vars(value).items()}
-            return {type(value).__name__: parts}
-        if isinstance(value, slice):
-            ends = (value.start, value.stop, value.step)
-            return {"slice": [encode(part, depth + 1) for part in ends]}
-        if isinstance(value, dict) and len(value) <= _MOST:
-            named = [(k[:_LONGEST] if type(k) is str else kind(k), v) for k, v in value.items()]
-            return {"dict": [[name, encode(item, depth + 1)] for name, item in named]}
-        if isinstance(value, (tuple, list)) and len(value) <= _MOST:
-            items = [encode(item, depth + 1) for item in islice(value, _MOST)]
-            return {"tuple": items} if isinstance(value, tuple) else items
-    return {"OtherValue": {"text": kind(value)}}
+        record = _encoded_parts(value, depth + 1)
+    if record is None:
+        return {"OtherValue": {"text": kind(value)}}
+    return record
+
+
+def _encoded_array(value: Any) -> Any:
+    """Return an array of numbers as what JSON can hold; None for any other."""
+    array = np.array(value, subok=False)
+    if array.dtype.kind not in "biuf" or array.size > 100 * _MOST or array.dtype.itemsize > 8:
+        return None
+    data = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+    return {"array": [array.dtype.str, list(array.shape), data]}
+
+
+def _encoded_parts(value: Any, depth: int) -> Any:
+    """Return what has parts as what JSON can hold; None for what is not known."""
+    if type(value) in _RECORDS.values():
+        parts = {name: encode(item, depth) for name, item in vars(value).items()}
+        return {type(value).__name__: parts}
+    if isinstance(value, slice):
+        return {"slice": [encode(part, depth) for part in (value.start, value.stop, value.step)]}
+    if isinstance(value, dict) and len(value) <= _MOST:
+        pairs: list[Any] = []
+        for key, item in value.items():
+            name = key[:_LONGEST] if type(key) is str else kind(key)
+            pairs.append([name, encode(item, depth)])
+        return {"dict": pairs}
+    if isinstance(value, (tuple, list)) and len(value) <= _MOST:
+        items = [encode(item, depth) for item in islice(value, _MOST)]
+        return {"tuple": items} if isinstance(value, tuple) else items
+    return None
 
 
 def decode(record: Any) -> Answer:
-    """The answer that `encode` was given.
+    """Return the answer that `encode` was given.
 
     Raises:
         ValueError: It was given none.
@@ -187,7 +215,7 @@ def _decoded(record: Any) -> Any:
 
 
 def _is(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type; of arrays there are rows of floats only."""
+    """Return whether a value is of a type; of arrays there are rows of floats only."""
     origin = get_origin(hint)
     if hint is Any:
         return True
@@ -202,12 +230,8 @@ def _array(dtype: str, shape: list[int], data: str) -> Any:
     kind = np.dtype(dtype)
     content = base64.b64decode(data, validate=True)
     negative, size = any(length < 0 for length in shape), math.prod(shape) * kind.itemsize
-    refuse(
-        (
-            kind.kind not in "biuf" or kind.itemsize > 8 or kind.shape,
-            "an array of no numbers",
-        ),
-        (negative or len(shape) > 16 or size != len(content), "an array of another size"),
-        error=ValueError,
-    )
+    if kind.kind not in "biuf" or kind.itemsize > 8 or kind.shape:
+        raise ValueError("an array of no numbers")
+    if negative or len(shape) > 16 or size != len(content):
+        raise ValueError("an array of another size")
     return np.frombuffer(content, kind).reshape(shape).astype(kind.newbyteorder("="))

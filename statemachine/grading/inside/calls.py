@@ -10,24 +10,14 @@ from typing import Any
 import numpy as np
 
 from ...engines import room
-from ...errors import UnsupportedError, refuse
+from ...errors import UnsupportedError
 from ...runs.controllers import line_of, load_module, misfit, said
 from .answers import answer_of, encode
 from .watch import engine_watched, watching
-from .worlds import ExerciseWorld
+from .worlds import AnyWorld
 
 Function = Callable[..., Any]
 _MODULE = "the_students_file"
-
-
-def reason(*rows: tuple[object, str]) -> str:
-    """The text of the first row that holds; "" if none does."""
-    return "".join(first_of(*rows))
-
-
-def first_of(*rows: tuple[object, str]) -> list[str]:
-    """The text of the first row that holds, alone in a list; an empty list if none does."""
-    return [text for holds, text in rows if holds][:1]
 
 
 class FaultError(Exception):
@@ -43,7 +33,7 @@ class FaultError(Exception):
 
 
 def load_file(path: Path) -> dict[str, Any]:
-    """The names that a student's file defines.
+    """Return the names that a student's file defines.
 
     Raises:
         FaultError: It does not compile, or ends with an error.
@@ -65,27 +55,28 @@ def load_file(path: Path) -> dict[str, Any]:
 
 
 def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function:
-    """A function of the file that takes a model and these arguments.
+    """Return a function of the file that takes a model and these arguments.
 
     Raises:
         FaultError: There is none, or it takes others.
     """
     function: Any = names.get(name)
-    refuse(
-        (function is None, f"the file has no function {name}"),
-        (not callable(function), f"{name} is not a function: {type(function).__name__}"),
-        error=FaultError,
-    )
+    if function is None:
+        raise FaultError(f"the file has no function {name}")
+    if not callable(function):
+        raise FaultError(f"{name} is not a function: {type(function).__name__}")
     takes, why = misfit(function, None, *arguments)
-    called = f"it is called with a model and {len(arguments)} more, and takes {takes}: {why}"
-    refuse((takes, called), error=FaultError)
+    if takes:
+        raise FaultError(
+            f"it is called with a model and {len(arguments)} more, and takes {takes}: {why}"
+        )
     return function
 
 
 def answers_of_file(
-    path: Path, name: str, worlds: Sequence[ExerciseWorld]
+    path: Path, name: str, worlds: Sequence[AnyWorld]
 ) -> Iterator[Any | FaultError]:
-    """What comes of a function of a file, which is loaded here, on world after world.
+    """Yield what comes of a function of a file, which is loaded here, on world after world.
 
     Args:
         path: The student's file, absolute.
@@ -99,8 +90,8 @@ def answers_of_file(
         yield fault
 
 
-def answers_of(function: Function, worlds: Sequence[ExerciseWorld]) -> Iterator[Any | FaultError]:
-    """What comes of a function on world after world, until it fails on one; as `encode` has it."""
+def answers_of(function: Function, worlds: Sequence[AnyWorld]) -> Iterator[Any | FaultError]:
+    """Yield what comes of a function on each world, as `encode` has it, until it fails on one."""
     try:
         for world in worlds:
             yield call(function, world)
@@ -108,21 +99,21 @@ def answers_of(function: Function, worlds: Sequence[ExerciseWorld]) -> Iterator[
         yield fault
 
 
-def call(function: Function, world: ExerciseWorld) -> Any:
-    """What came of a function on a world, as `answers.encode` has it.
+def call(function: Function, world: AnyWorld) -> Any:
+    """Return what came of a function on a world, as `answers.encode` has it.
 
     Raises:
         FaultError: It raised, tried to end the program, is not written, or returned nothing.
     """
     file = Path(getattr(getattr(function, "__code__", None), "co_filename", ""))
-    given = [
+    arguments = [
         np.array(value) if isinstance(value, np.ndarray) else value for value in world.arguments
     ]
     settings = room(world.model.backend).settings  # what of the engine's own model is reached
     before = settings(world.model.raw)
     try:
         with watching(world.model, world.nudge) as watch:
-            result = function(world.model, *given)
+            result = function(world.model, *arguments)
             now = settings(world.model.raw)
             changed = {name: (old, now[name]) for name, old in before.items() if old != now[name]}
             answer = encode(answer_of(result, watch, changed))
@@ -136,8 +127,13 @@ def call(function: Function, world: ExerciseWorld) -> Any:
 
 
 def _remark(error: BaseException, file: Path) -> str:
-    """An error in one line, with the line that it came from, in the file or one beside it."""
+    """Return an error in one line, with the line of the file, or of one beside it, it came from."""
     place, line, code = line_of(error, file)
-    beside = f"{place.name}, " if line and place != file else ""
-    where = f"{beside}line {line}: " if line else ""
-    return f"{where}{said(error)}" + (f" (in `{code}`)" if code else "")
+    text = said(error)
+    if line:
+        text = f"line {line}: {text}"
+        if place != file:
+            text = f"{place.name}, {text}"
+    if code:
+        text += f" (in `{code}`)"
+    return text

@@ -17,7 +17,7 @@ import sysconfig
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import FrameType, SimpleNamespace
+from types import FrameType, ModuleType
 from typing import Any, Literal
 
 from ...models import models_dir
@@ -78,7 +78,9 @@ def _own_copy(module: Any) -> Any:
         return module
     copied = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(copied)
-    vars(copied)["os"] = SimpleNamespace(**vars(os))
+    own_os = ModuleType(os.__name__)
+    vars(own_os).update(vars(os))
+    vars(copied)["os"] = own_os
     return copied
 
 
@@ -125,10 +127,10 @@ class Guard:
         self._package = str(_PACKAGE) + os.sep
         self._inside = str(Path(__file__).parent) + os.sep
         self._ours = (self._package, str(Path(__file__).parents[2]) + os.sep)
-        inside = ("inside", "faults") if faults else ("inside",)
-        self._rooms = tuple(
-            str(_PACKAGE / room) for room in (*ROOMS, *(f"grading/{name}" for name in inside))
-        )
+        rooms = [*ROOMS, "grading/inside"]
+        if faults:
+            rooms.append("grading/faults")
+        self._rooms = tuple(str(_PACKAGE / room) for room in rooms)
         self._checks_imports = not faults
         self._reported: set[tuple[str, str]] = set()
         self._refuse_programs()

@@ -20,7 +20,6 @@ from ...engines import room
 from ...errors import ClosedDataError
 from ...installed import require
 from ...interface import INPUTS, Array, Data, Model
-from ...page import Figures
 
 _MOST = 1000  # runs, forwards and Data that are noted
 
@@ -59,6 +58,21 @@ class EngineRun:
     ctrl_changed: int | None = None
 
 
+@dataclass(frozen=True)
+class Nudge:
+    """Push to the state at the end of a run, by the smallest amount there is.
+
+    Attributes:
+        place: Entry of qpos that becomes the next double.
+        towards: In which direction, infinite [rad or m].
+        after: How many steps a run must have for it.
+    """
+
+    place: int
+    towards: float
+    after: int
+
+
 def inputs_of(number: int, data: Any) -> Inputs:
     """What they are now of a Data, or of the engine's own, of this number."""
     qpos, qvel, ctrl = (np.array(getattr(data, name)) for name in INPUTS)
@@ -66,6 +80,13 @@ def inputs_of(number: int, data: Any) -> Inputs:
     with suppress(ClosedDataError):  # of which the inputs alone are told
         time = float(data.time)
     return Inputs(number, qpos, qvel, ctrl, time)
+
+
+def _is_same_state(one: Inputs, two: Inputs) -> bool:
+    """Return whether time, qpos and qvel are equal."""
+    return bool(
+        one.time == two.time and (one.qpos == two.qpos).all() and (one.qvel == two.qvel).all()
+    )
 
 
 class StudentWatch:
@@ -77,15 +98,14 @@ class StudentWatch:
         datas: Every Data that was used, or the engine's own, in order.
     """
 
-    def __init__(self, model: Model, nudge: Figures | None) -> None:
+    def __init__(self, model: Model, nudge: Nudge | None) -> None:
         """Watch what is done with `model`; every run but the first is pushed by `nudge`.
 
         So that an engine that repeats itself to the bit does not.
 
         Args:
             model: What the function got.
-            nudge: Its `place`, an entry of qpos, becomes the next double `towards` something
-                `after` so many steps, or more.
+            nudge: Of every run but the first; None for none.
         """
         self.runs: list[EngineRun] = []
         self.forwards: list[Inputs] = []
@@ -118,11 +138,7 @@ class StudentWatch:
         """Let `advance` move `data`, and note where from and where to."""
         now = inputs_of(self.meet(data), data)
         run = self._current.get(now.data)
-        if run is None or not (
-            now.time == run.end.time
-            and (now.qpos == run.end.qpos).all()
-            and (now.qvel == run.end.qvel).all()
-        ):  # somebody touched the state
+        if run is None or not _is_same_state(now, run.end):  # somebody touched the state
             run = EngineRun(self._origin_of(model) == self._origin, now, now)
             if len(self.runs) < _MOST:
                 self.runs.append(run)
@@ -148,8 +164,8 @@ _watch: StudentWatch | None = None
 
 
 @contextmanager
-def watching(model: Model, nudge: Figures | None = None) -> Iterator[StudentWatch]:
-    """What happens meanwhile, where `engine_watched` holds."""
+def watching(model: Model, nudge: Nudge | None = None) -> Iterator[StudentWatch]:
+    """Note what happens meanwhile, where `engine_watched` holds."""
     global _watch  # noqa: PLW0603  (the engine's functions are the process's too)
     _watch = StudentWatch(model, nudge)
     try:

@@ -9,17 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Generic, NamedTuple, TypeVar
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ...backends import load
 from ...errors import UnsupportedError
-from ...interface import Model
+from ...interface import Array, Model
 from ...models import resolve
-from ...page import Figures
 from ...witness.mjcf_text import parse, with_includes
+from .watch import Nudge
 
 ELSEWHERE = "on a scene with a crate before the arm"
 _CRATE = """
@@ -28,9 +28,24 @@ _CRATE = """
   <geom name="crate" type="box" size="0.05 0.05 0.05" mass="0.3" contype="2" conaffinity="1"/>
 </body>
 """
-# Bodies that come last, with their qpos and qvel: a ball joint, and a slide that nothing drives
-# or limits.
-_BALL = (
+
+
+class _Body(NamedTuple):
+    """Body that is added to a scene.
+
+    Attributes:
+        mjcf: The element.
+        qpos: Its part of a keyframe's.
+        qvel: Its part of a keyframe's.
+    """
+
+    mjcf: str
+    qpos: str
+    qvel: str
+
+
+# They come last: a ball joint, and a slide that nothing drives or limits.
+_BALL = _Body(
     """
 <body name="globe" pos="-0.4 -0.3 0.3">
   <joint name="globe" type="ball"/>
@@ -40,7 +55,7 @@ _BALL = (
     " 1 0 0 0",
     " 0 0 0",
 )
-_DRAWER = (
+_DRAWER = _Body(
     """
 <body name="drawer" pos="-0.5 0 0.3">
   <joint name="drawer" type="slide" axis="1 0 0"/>
@@ -55,21 +70,30 @@ _TIME = "2.5"  # [s] of the first keyframe there
 _TIP = "0.03 0.01 -0.08"  # [m] of the fingertip in the gripper's frame there
 
 
+A = TypeVar("A", bound=tuple[Array | int, ...])  # what a function gets beside the model
+
+
 @dataclass(frozen=True)
-class ExerciseWorld:
+class ExerciseWorld(Generic[A]):
     """One call of a student's function.
 
     Attributes:
         where: What sets it apart; nothing on the course's own model.
         model: What the function gets.
         arguments: What it gets beside it.
-        nudge: See `watch.StudentWatch`.
+        nudge: See `watch.StudentWatch`; None for none.
     """
 
     where: str
     model: Model
-    arguments: tuple[Any, ...] = ()
-    nudge: Figures | None = None
+    arguments: A
+    nudge: Nudge | None = None
+
+
+FallWorld = ExerciseWorld[tuple[int]]  # seconds
+NoArgumentsWorld = ExerciseWorld[tuple[()]]
+ReplayWorld = ExerciseWorld[tuple[Array, int]]  # ctrl (nu,) and number of steps
+AnyWorld = FallWorld | NoArgumentsWorld | ReplayWorld
 
 
 class Scenes:
@@ -111,18 +135,18 @@ def _bare(root: ElementTree.Element) -> None:
                 parent.remove(child)
 
 
-def _crowd(root: ElementTree.Element, last: Sequence[tuple[str, str, str]]) -> None:
+def _crowd(root: ElementTree.Element, last: Sequence[_Body]) -> None:
     """Put a crate first and other bodies last."""
     for body in root.findall("worldbody")[:1]:
         body.insert(0, ElementTree.fromstring(_CRATE))
     for body in root.findall("worldbody")[-1:]:
-        body.extend(ElementTree.fromstring(text) for text, _, _ in last)
+        body.extend(ElementTree.fromstring(more.mjcf) for more in last)
     for site in root.iter("site"):
         if site.get("name") == "gripperframe":
             site.set("pos", _TIP)
     for number, key in enumerate(root.iter("key")):
-        key.set("qpos", f"{_CRATE_QPOS} {key.get('qpos')}" + "".join(q for _, q, _ in last))
-        key.set("qvel", f"{_CRATE_QVEL} {key.get('qvel')}" + "".join(v for _, _, v in last))
+        key.set("qpos", f"{_CRATE_QPOS} {key.get('qpos')}" + "".join(body.qpos for body in last))
+        key.set("qvel", f"{_CRATE_QVEL} {key.get('qvel')}" + "".join(body.qvel for body in last))
         if number == 0:
             key.set("time", _TIME)
 
@@ -142,13 +166,13 @@ def address(model: Model, joint: str = LIFT) -> int:
     return int(model.jnt_qposadr[model.joint_id(joint)])
 
 
-def worlds_of(function: str, scenes: Scenes) -> list[ExerciseWorld]:
+def worlds_of(function: str, scenes: Scenes) -> Sequence[AnyWorld]:
     """Make the worlds that a function of the exercise is called on, the course's own first."""
     return _WORLDS[function](scenes)
 
 
-def _gravity(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; the Moon's gravity at another timestep; a crate before the arm."""
+def _gravity(scenes: Scenes) -> list[FallWorld]:
+    """Make the course's scene; the Moon's gravity at another timestep; a crate before the arm."""
     course = scenes.ordinary(_ARM)
     moon = course.replace(gravity=_MOON, timestep=0.004)
     return [
@@ -158,48 +182,43 @@ def _gravity(scenes: Scenes) -> list[ExerciseWorld]:
     ]
 
 
-def _state(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; a crate before the arm, and a keyframe with another time."""
+def _state(scenes: Scenes) -> list[NoArgumentsWorld]:
+    """Make the course's scene; a crate before the arm, and a keyframe with another time."""
     return [
-        ExerciseWorld("", scenes.ordinary(_ARM_AND_BOX)),
-        ExerciseWorld(ELSEWHERE, scenes.crowded(_ARM_AND_BOX)),
+        ExerciseWorld("", scenes.ordinary(_ARM_AND_BOX), ()),
+        ExerciseWorld(ELSEWHERE, scenes.crowded(_ARM_AND_BOX), ()),
     ]
 
 
-def _forward(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; a crate before the arm, and the fingertip elsewhere."""
+def _forward(scenes: Scenes) -> list[NoArgumentsWorld]:
+    """Make the course's scene; a crate before the arm, and the fingertip elsewhere."""
     return [
-        ExerciseWorld("", scenes.ordinary(_ARM)),
-        ExerciseWorld(ELSEWHERE, scenes.crowded(_ARM)),
+        ExerciseWorld("", scenes.ordinary(_ARM), ()),
+        ExerciseWorld(ELSEWHERE, scenes.crowded(_ARM), ()),
     ]
 
 
-def _replay(scenes: Scenes) -> list[ExerciseWorld]:
-    """The course's scene; fewer steps with a crate before the arm; runs that do end apart."""
+def _replay(scenes: Scenes) -> list[ReplayWorld]:
+    """Make the course's scene; fewer steps with a crate before the arm; runs that do end apart."""
     course = scenes.ordinary(_ARM_AND_BOX)
     crowded = scenes.crowded(_ARM_AND_BOX).replace(timestep=0.004)
     # One bit, in the middle and upwards, at the end and downwards: nearly equal, equal in
     # part, equal in sum and not smaller all pass for equal in one of the two.
-    nudges = (
-        ("a joint", address(course, "elbow_flex"), np.inf),
-        ("the box", course.nq - 1, -np.inf),
-    )
-    return [
+    nudges = {
+        "a joint": Nudge(address(course, "elbow_flex"), np.inf, _STEPS),
+        "the box": Nudge(course.nq - 1, -np.inf, _STEPS),
+    }
+    worlds: list[ReplayWorld] = [
         ExerciseWorld("", course, (np.array(_CTRL), 600)),
         ExerciseWorld(ELSEWHERE, crowded, (np.array(_OTHER_CTRL), 150)),
-        *(
-            ExerciseWorld(
-                f"with {what} of the second run one bit off",
-                course,
-                (np.array(_CTRL), _STEPS),
-                Figures(place=place, towards=towards, after=_STEPS),
-            )
-            for what, place, towards in nudges
-        ),
     ]
+    for what, nudge in nudges.items():
+        where = f"with {what} of the second run one bit off"
+        worlds.append(ExerciseWorld(where, course, (np.array(_CTRL), _STEPS), nudge))
+    return worlds
 
 
-_WORLDS: dict[str, Callable[[Scenes], list[ExerciseWorld]]] = {
+_WORLDS: dict[str, Callable[[Scenes], Sequence[AnyWorld]]] = {
     "demo_gravity": _gravity,
     "demo_state": _state,
     "demo_forward": _forward,

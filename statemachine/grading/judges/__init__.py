@@ -4,9 +4,8 @@ The judges run in the teacher's process only. A student's process gets the world
 is called on (`inside.worlds`), and nothing of what stands here. A judge is a module with
 
 - `right(world)`: what is right on one, worked out by us;
-- `judge(answer, world, right, course)`: what is wrong with what it did there, a line each, or, in
-  one text, what is right; `course` is what is right on the course's own world. It raises FaultError
-  where there is nothing to look at.
+- `judge(answer, world, right, course)`: a `Verdict` on what it did there; `course` is what is right
+  on the course's own world. It raises FaultError where there is nothing to look at.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from ...interface import Array, Model
 from ...measures.text import count
 from ..inside.answers import Answer, kind
 from ..inside.calls import FaultError
-from ..inside.worlds import ExerciseWorld
+from ..inside.worlds import AnyWorld, ExerciseWorld
 
 # By the functions of the student's file, in the order in which they stand there.
 JUDGES = {
@@ -33,9 +32,58 @@ JUDGES = {
 }
 
 
-def judge_of(function: str) -> Any:
-    """The judge of a function of `JUDGES`."""
-    return importlib.import_module(JUDGES[function], __name__)
+@dataclass(frozen=True)
+class Verdict:
+    """What a judge says of an answer on one world.
+
+    Attributes:
+        passed: Whether all is right.
+        remarks: What is wrong, a line each; or what was verified, in one line.
+    """
+
+    passed: bool
+    remarks: tuple[str, ...]
+
+
+def verified(remark: str) -> Verdict:
+    """Return the verdict on an answer that is right."""
+    return Verdict(True, (remark,))
+
+
+def wrong(*remarks: str) -> Verdict:
+    """Return the verdict on an answer with these faults."""
+    return Verdict(False, remarks)
+
+
+W_contra = TypeVar("W_contra", bound=ExerciseWorld[Any], contravariant=True)  # a function's world
+S = TypeVar("S")  # what is right there
+
+
+class Judge(Protocol[W_contra, S]):
+    """Judge of a function: a module of this folder."""
+
+    def right(self, world: W_contra) -> S:
+        """Work out what is right on a world."""
+        ...
+
+    def judge(self, answer: Answer, world: W_contra, right: S, course: S) -> Verdict:
+        """Judge an answer.
+
+        Args:
+            answer: Of the function.
+            world: What it was called on.
+            right: What is right there.
+            course: What is right on the course's own world.
+
+        Raises:
+            FaultError: There is nothing to look at.
+        """
+        ...
+
+
+def judge_of(function: str) -> Judge[Any, Any]:
+    """Return the judge of a function of `JUDGES`."""
+    return cast("Judge[Any, Any]", importlib.import_module(JUDGES[function], __name__))
 
 
 @dataclass(frozen=True)
@@ -59,15 +107,15 @@ class Judgement:
 
 def judged(
     function: str,
-    worlds: Sequence[ExerciseWorld],
+    worlds: Sequence[AnyWorld],
     rights: Sequence[Any],
     answers: Iterable[Answer | FaultError],
 ) -> Judgement | None:
-    """The judgement on what came of a function, world after world, until one shows a fault.
+    """Return the judgement on what came of a function, world after world, until one shows a fault.
 
     None if there are fewer answers than worlds, and no fault.
     """
-    passed: list[str] = []  # one text a world
+    passed: list[Verdict] = []  # one a world
     for world, right, answer in zip(worlds, rights, answers, strict=False):
         try:
             if isinstance(answer, FaultError):
@@ -75,17 +123,19 @@ def judged(
             with np.errstate(all="ignore"):
                 verdict = judge_of(function).judge(answer, world, right, rights[0])
         except FaultError as fault:
-            verdict = [str(fault)]
             if not fault.written:
-                return Judgement(function, False, False, tuple(verdict))
-        if not isinstance(verdict, str):
+                return Judgement(function, False, False, (str(fault),))
+            verdict = wrong(str(fault))
+        if not verdict.passed:
             where = f"{world.where}: " if world.where else ""
-            return Judgement(function, True, False, tuple(where + text for text in verdict))
+            remarks = tuple(where + text for text in verdict.remarks)
+            return Judgement(function, True, False, remarks)
         passed.append(verdict)
     if len(passed) < len(worlds):
         return None
+    (remark,) = passed[0].remarks
     also = f"; right on {count(len(worlds) - 1, 'other model')}, too"
-    return Judgement(function, True, True, (passed[0] + also,))
+    return Judgement(function, True, True, (remark + also,))
 
 
 T = TypeVar("T")
@@ -93,20 +143,21 @@ TIP = "gripperframe"
 
 
 def parts(value: Any, number: int, what: str) -> list[Any]:
-    """A returned value as so many parts.
+    """Return a returned value as so many parts.
 
     Raises:
         FaultError: It has another number of them, or none.
     """
-    several = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.shape)
-    items = list(value) if several else []
-    if not several or len(items) != number:
+    items: list[Any] | None = None
+    if isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.shape):
+        items = list(value)
+    if items is None or len(items) != number:
         raise FaultError(f"it returns {kind(value)}, where {what} should be")
     return items
 
 
 def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
-    """A returned value as an array of a shape.
+    """Return a returned value as an array of a shape.
 
     Raises:
         FaultError: It is not one.
@@ -123,15 +174,20 @@ def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
 
 
 def short_float(value: Any) -> str:
-    """The name of the floating-point type in a value that has fewer digits than a float."""
+    """Return the floating-point type in a value that has fewer digits than a float, or ""."""
     if isinstance(value, (tuple, list)):
-        return next(filter(None, map(short_float, value)), "")
+        for item in value:
+            if name := short_float(item):
+                return name
+        return ""
     dtype = getattr(value, "dtype", None)
-    return str(dtype) if dtype is not None and dtype.kind == "f" and dtype.itemsize < 8 else ""
+    if dtype is not None and dtype.kind == "f" and dtype.itemsize < 8:
+        return str(dtype)
+    return ""
 
 
 def grain(values: Array) -> float:
-    """Half of the last decimal, if all values are rounded to two to eight; otherwise 0."""
+    """Return half of the last decimal, if all values are rounded to two to eight; otherwise 0."""
     with np.errstate(all="ignore"):
         for decimals in range(2, 9):
             if near(values, np.round(values, decimals), 1e-14 * (1 + abs(values).max())):
@@ -140,26 +196,26 @@ def grain(values: Array) -> float:
 
 
 def near(left: Array, right: Array, tolerance: float) -> bool:
-    """Whether no number is farther apart; NaN is far from everything."""
+    """Return whether no number is farther apart; NaN is far from everything."""
     return left.shape == right.shape and bool((abs(left - right) <= tolerance).all())
 
 
 def same_bits(left: Array, right: Array) -> bool:
-    """Whether all numbers are equal."""
+    """Return whether all numbers are equal."""
     return left.shape == right.shape and bool((left == right).all())
 
 
 def owner(model: Model, place: int) -> str:
-    """The joint that a place in qpos belongs to."""
+    """Return the joint that a place in qpos belongs to."""
     return model.joint_names[int(np.searchsorted(model.jnt_qposadr, place, "right")) - 1]
 
 
 def listed(values: Array, digits: int = 4) -> str:
-    """Numbers in brackets."""
+    """Return numbers in brackets."""
     return "[" + " ".join(f"{v + 0.0:.{digits}g}" for v in values.tolist()) + "]"
 
 
 def told_apart(left: T, right: T, text: Callable[[T, int], str]) -> str:
-    """'x where y' with as many digits as it takes to tell them apart, four at least."""
+    """Return 'x where y' with as many digits as it takes to tell them apart, four at least."""
     digits = next((d for d in range(4, 17) if text(left, d) != text(right, d)), 17)
     return f"{text(left, digits)} where {text(right, digits)}"
