@@ -195,12 +195,8 @@ def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
         (("damping==1",), "damping must be real numbers; got '=1'"),
         (("damping=",), "damping has an empty value"),
         (("integrator=Euler4",), "no integrator named"),
-        (("model=so101,so102",), "one model is named"),
-        (("model=",), "model has an empty value"),
+        ({"vary": ("model=",), "model": None}, "model has an empty value"),
         (("damping=0:1:20000", "frictionloss=0:1:20000"), "more than a sweep can hold"),
-        ({"what": "holt"}, "Did you mean 'hold'"),
-        ({"every": 5}, "--every is of a FUNCTION"),
-        ({"seeds": 0}, "--seeds must be at least 1"),
         ({"samples": 8}, "none is varied"),
         ({"backends": ("mujocco",)}, "Did you mean 'mujoco'"),
         ({"spread": "1"}, "an uncertainty reads like"),
@@ -215,8 +211,32 @@ def test_what_is_refused_before_anything_runs(
 ) -> None:
     monkeypatch.chdir(Path(policy).parent)
     given = asked if isinstance(asked, dict) else {"vary": asked}
-    sweep = dataclasses.replace(small("hold"), **given)
-    refused((StateMachineError, re.escape(says), lambda: prepared(sweep)))
+    sweep = small("hold")
+    refused(
+        (
+            StateMachineError,
+            re.escape(says),
+            lambda: prepared(dataclasses.replace(sweep, **given)),
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        ({"what": "holt"}, "Did you mean 'hold'"),
+        ({"every": 5}, "--every is of a FUNCTION"),
+        ({"keyframe": "home"}, "--keyframe is of a FUNCTION"),
+        ({"seeds": 0}, "--seeds must be at least 1"),
+        ({"samples": -1}, "--samples must be at least 0"),
+        ({"moments": 0}, "--moments must be at least 1"),
+        ({"timeout": 0.0}, "--timeout must be above 0 s"),
+        ({"vary": ("model=so101,so102",)}, "one model is named"),
+    ],
+)
+def test_a_request_checks_itself(asked: Any, says: str) -> None:
+    with pytest.raises(StateMachineError, match=re.escape(says)):
+        dataclasses.replace(small("hold"), **asked)
 
 
 def test_many_cells_are_told_beforehand() -> None:

@@ -22,6 +22,7 @@ from ..page import only_on_pages
 from .design import Value
 from .folder import design_of, read_manifest
 from .main_effects import main_effects
+from .manifest import SweepManifest
 from .quantities import CellValues, cell_values, default_quantity, parse_quantity
 from .rows import read_cells
 
@@ -159,7 +160,7 @@ def effects(
         MissingEngineError: A package is missing.
     """
     manifest = read_manifest(folder)
-    design, seeds = design_of(manifest), int(manifest["design"]["seeds"])
+    design, seeds = design_of(manifest), manifest["design"]["seeds"]
     asked_for = (backends,) if isinstance(backends, str) else backends
     sides = _backends(manifest["design"]["backends"], asked_for)
     table = read_cells(folder)
@@ -177,18 +178,17 @@ def effects(
         MainEffect(label, shares.shares[label], shares.errors[label]) for label in shares.shares
     ]
     found.sort(key=_share_or_less, reverse=True)
+    units = {vary.label: vary.unit_on() for vary in design.factors}
+    largest = _largest(cells.values, [point.values for point in points])
     return SweepEffects(
         what=manifest["request"]["what"],
         folder=str(folder),
-        versions={
-            name: manifest["versions"].get(name.removesuffix(":engine"), "")
-            for name in ("statemachine", *sides)
-        },
+        versions=_versions(manifest, sides),
         backends=sides,
         quantity=str(asked),
         unit=asked.unit,
         parameters=tuple(shares.shares),
-        units={vary.label: vary.unit_on() for vary in design.factors if vary.unit_on()},
+        units={label: unit for label, unit in units.items() if unit},
         scaled=tuple(vary.label for vary in design.factors if vary.times),
         seeds=seeds,
         samples=design.samples if design.sampled else 0,
@@ -196,13 +196,21 @@ def effects(
         why_none=shares.why_none,
         mean=shares.mean,
         deviation=shares.deviation,
-        largest=_largest(cells.values, [point.values for point in points]),
+        largest=largest,
         settings=shares.settings,
         left_out=len(points) - shares.settings,
         left_out_values=shares.left_out,
         failed=cells.failed,
         missing=cells.missing,
     )
+
+
+def _versions(manifest: SweepManifest, backends: Sequence[str]) -> dict[str, str]:
+    """Return the versions of this library and of engines that a dataset was made with."""
+    versions = {"statemachine": manifest["versions"].get("statemachine", "")}
+    for backend in backends:
+        versions[backend] = manifest["versions"].get(backend.removesuffix(":engine"), "")
+    return versions
 
 
 def _why_nothing(cells: CellValues) -> str:

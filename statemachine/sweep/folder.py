@@ -9,21 +9,19 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from ..errors import BadInputError, refuse, shown
+from ..errors import BadInputError, shown
 from ..measures.text import listed
 from ..models import check_is_file
 from ..runs.whole import replace_bytes
 from .design import Design, Vary
-from .request import MANIFEST_VERSION
+from .manifest import MANIFEST_VERSION, SweepManifest
 
 MANIFEST = "sweep.json"
 _LOCK = ".lock"
 _DIGEST = "sha256"  # the key of the digest of all other bytes of the file
 _UNKNOWN_DIGEST = "0" * (2 * hashlib.sha256().digest_size)  # what stands there while it is computed
-# What a dataset is of, whatever its design: another of these is another sweep.
-_SAME = ("request", "files", "versions")
 
 
 @contextmanager
@@ -43,7 +41,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def _taken(handle: int) -> bool:
-    """Whether the lock could be had; a filesystem without locks gives it to everyone."""
+    """Tell whether the lock could be had; a filesystem without locks gives it to everyone."""
     try:
         if os.name == "nt":
             import msvcrt
@@ -75,7 +73,7 @@ def check_folder(folder: Path) -> None:
         )
 
 
-def read_manifest(folder: str | Path) -> dict[str, Any]:
+def read_manifest(folder: str | Path) -> SweepManifest:
     """Read what `sweep.json` says of a sweep.
 
     The file carries a digest of its own bytes, which is verified before anything in it is used.
@@ -102,10 +100,11 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
     if _DIGEST not in manifest:
         raise _damaged(path)
     del manifest[_DIGEST]
-    return manifest
+    # The digest says that `write_manifest` wrote it, and the schema what it wrote.
+    return cast("SweepManifest", manifest)
 
 
-def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+def write_manifest(folder: Path, manifest: SweepManifest) -> None:
     """Write `sweep.json`, with a digest of all its other bytes: whole or not at all.
 
     Args:
@@ -145,21 +144,29 @@ def _damaged(path: Path) -> BadInputError:
     )
 
 
-def design_of(manifest: Mapping[str, Any]) -> Design:
-    """The design that a manifest tells, with the points of its dataset."""
+def design_of(manifest: SweepManifest) -> Design:
+    """Return the design that a manifest tells, with the points of its dataset."""
+    factors: list[Vary] = []
+    for factor in manifest["factors"]:
+        bounds = None
+        if factor["bounds"] is not None:
+            low, high = factor["bounds"]
+            bounds = low, high
+        factors.append(
+            Vary(
+                name=factor["name"],
+                place=factor["place"],
+                kind=factor["kind"],
+                values=tuple(factor["values"]),
+                bounds=bounds,
+                times=factor["times"],
+            )
+        )
     design = manifest["design"]
-    factors: list[dict[str, Any]] = [
-        {
-            name: tuple(value) if isinstance(value := factor[name], list) else value
-            for name in Vary.__dataclass_fields__
-        }
-        for factor in manifest["factors"]
-    ]
-    varied = tuple(Vary(**factor) for factor in factors)
-    return Design(varied, design["samples"], design["design_seed"])
+    return Design(tuple(factors), design["samples"], design["design_seed"])
 
 
-def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> None:
+def settle_manifest(folder: Path, manifest: SweepManifest, extend: bool) -> None:
     """Write what is asked for, or check that it is what the folder is of.
 
     Args:
@@ -170,49 +177,61 @@ def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> 
     Raises:
         BadInputError: The folder is of another request; it says what differs.
     """
-    path = folder / MANIFEST
-    wanted = json.loads(json.dumps(manifest))
-    if path.exists():
+    wanted: SweepManifest = json.loads(json.dumps(manifest))  # lists, as they are read
+    if (folder / MANIFEST).exists():
         there = read_manifest(folder)
-        others = [text for name in _SAME for text in _differences(there, wanted, name, extend)]
-        design = _differences(there, wanted, "design")
-        old, new = ([vary["label"] for vary in m["factors"]] for m in (there, wanted))
-        refuse(
-            (
-                others,
-                f"{folder} is of another sweep: {listed(others)}. Name another folder with --out",
-            ),
-            (
-                design and not extend,
-                f"{folder} is of another design: {listed(design)}. Name another folder with "
-                "--out, or let this one grow with --extend",
-            ),
-            (
-                sorted(old) != sorted(new),
-                f"{folder} varies {listed(old) or 'nothing'}, and a sweep grows in values, "
-                "seeds and backends alone: name another folder with --out",
-            ),
-        )
-        if not design:
+        others: list[str] = []
+        for old, new in (
+            (there["request"], wanted["request"]),
+            (there["files"], wanted["files"]),
+            (there["versions"], wanted["versions"]),
+        ):
+            others += _differences(old, new, grows=extend)
+        if others:
+            raise BadInputError(
+                f"{folder} is of another sweep: {listed(others)}. Name another folder with --out"
+            )
+        changes = _differences(there["design"], wanted["design"])
+        if changes and not extend:
+            raise BadInputError(
+                f"{folder} is of another design: {listed(changes)}. Name another folder with "
+                "--out, or let this one grow with --extend"
+            )
+        varied = [factor["label"] for factor in there["factors"]]
+        if sorted(varied) != sorted(factor["label"] for factor in wanted["factors"]):
+            raise BadInputError(
+                f"{folder} varies {listed(varied) or 'nothing'}, and a sweep grows in values, "
+                "seeds and backends alone: name another folder with --out"
+            )
+        if not changes:
             return
     write_manifest(folder, wanted)
 
 
 def _differences(
-    there: Mapping[str, Any], wanted: Mapping[str, Any], part: str, grows: bool = False
+    there: Mapping[str, object], wanted: Mapping[str, object], grows: bool = False
 ) -> list[str]:
-    """What differs in a part of two manifests, as "seconds 2 there, 4 here"."""
-    old, new = there[part], wanted[part]
-    names = [name for name in {**old, **new} if not grows or (name in old and name in new)]
+    """Return what differs in a part of two manifests, as "seconds 2 there, 4 here".
+
+    Args:
+        there: The part of the dataset.
+        wanted: The part of the request.
+        grows: Whether only what both have counts.
+    """
+    names = list(dict.fromkeys((*there, *wanted)))
+    if grows:
+        names = [name for name in names if name in there and name in wanted]
     return [
-        f"{name} {_word(old.get(name))} there, {_word(new.get(name))} here"
+        f"{name} {_word(there.get(name))} there, {_word(wanted.get(name))} here"
         for name in names
-        if old.get(name) != new.get(name)
+        if there.get(name) != wanted.get(name)
     ]
 
 
-def _word(value: Any) -> str:
-    """A list by its words, a digest by its first digits."""
-    words = value if isinstance(value, list) else [] if value is None else [value]
-    text = " ".join(map(str, words))
-    return (text[:12] if re.fullmatch(r"[0-9a-f]{32,}", text) else text) or "none"
+def _word(value: object) -> str:
+    """Return a list by its words, and a digest by its first digits."""
+    if value is None:
+        return "none"
+    words = value if isinstance(value, list) else [value]
+    text = " ".join(map(str, words)) or "none"
+    return text[:12] if re.fullmatch(r"[0-9a-f]{32,}", text) else text

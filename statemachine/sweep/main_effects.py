@@ -81,8 +81,7 @@ def main_effects(design: Design, values: Array, rounding: float = 0.0) -> MainEf
     """
     balanced = _balanced(design, values)
     centre = _median(balanced.cube)
-    labels = [vary.label for vary in design.factors]
-    shares = errors = np.full(len(labels), np.nan)
+    shares = errors = np.full(len(design.factors), np.nan)
     why_none = _why_none(design, centre, rounding)
     if not why_none:
         shares = _first_order(balanced, centre, balanced.sampled)
@@ -92,8 +91,8 @@ def main_effects(design: Design, values: Array, rounding: float = 0.0) -> MainEf
         if drawn:
             errors = np.where(np.isnan(shares), np.nan, np.std(drawn, axis=0))
     return MainEffects(
-        shares=dict(zip(labels, _numbers_or_none(shares), strict=True)),
-        errors=dict(zip(labels, _numbers_or_none(errors), strict=True)),
+        shares=_by_label(design, shares),
+        errors=_by_label(design, errors),
         why_none=why_none,
         mean=float(centre.mean()),
         deviation=float(centre.std()),
@@ -113,9 +112,12 @@ def _why_none(design: Design, centre: Array, rounding: float) -> str:
     return ""
 
 
-def _numbers_or_none(figures: Array) -> list[float | None]:
-    """Return figures as numbers, and None for NaN."""
-    return [None if np.isnan(figure) else figure for figure in figures.tolist()]
+def _by_label(design: Design, figures: Array) -> dict[str, float | None]:
+    """Return figures (k,) of the k factors by their labels; None for NaN."""
+    numbers: dict[str, float | None] = {}
+    for vary, figure in zip(design.factors, figures.tolist(), strict=True):
+        numbers[vary.label] = None if np.isnan(figure) else figure
+    return numbers
 
 
 @dataclass(frozen=True, eq=False)

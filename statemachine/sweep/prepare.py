@@ -8,7 +8,6 @@ import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from .. import __version__
 from ..backends import backend_names, parse_backend
 from ..backends.starts import overlap_warning, places_in
 from ..compare.perturbed import EXACT, parse_uncertainty
-from ..errors import MissingEngineError, StateMachineError, refuse
+from ..errors import BadInputError, MissingEngineError, StateMachineError
 from ..installed import require_extra
 from ..interface import Model, make_data
 from ..interface.options import checked_options
@@ -25,13 +24,14 @@ from ..runs.controllers import is_function, parameters_of
 from ..runs.drive import check_length, cost_of_a_second, steps_in
 from ..runs.header import model_digest
 from ..runs.scenarios import Scenario, scenario
-from .design import MODEL, Design, Vary, parse_vary, require_qmc, with_kinds
-from .request import PreparedSweep, Sweep, beyond_ranges, options_at, start_at
+from .design import MODEL, Design, Value, Vary, parse_vary, require_qmc, with_kinds
+from .request import OptionValue, PreparedSweep, Sweep, beyond_ranges, options_at, start_at
 from .rows import require_parquet
 from .worker import digest_of, load_of
 
 MODEL_OF_A_FUNCTION = "so101/scene"
 _MANY, _MOST = 10_000, 10**8  # cells that are told beforehand, and that the driver can remember
+_SWITCHES = ("contacts", "actuation", "limits")
 _LOOKED_AT = 1000  # values of a factor; of more, the ends
 
 
@@ -49,93 +49,85 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     require_parquet()
     require_extra("joblib", "a sweep", "joblib", "sweep")
     typed = parse_vary(sweep.vary)
-    least = {"seeds": 1, "samples": 0, "design-seed": 0, "every": 1, "moments": 1}
-    values = {flag: getattr(sweep, flag.replace("-", "_")) for flag in least}
-    refuse(
-        *(
-            (values[flag] < smallest, f"--{flag} must be at least {smallest}; got {values[flag]}")
-            for flag, smallest in least.items()
-        ),
-        (
-            not 0 < sweep.timeout <= 86400 * 7,
-            f"--timeout must be above 0 s; got {sweep.timeout:g}",
-        ),
-    )
     function = is_function(sweep.what)
     usual = MODEL_OF_A_FUNCTION if function else scenario(sweep.what).model
     varied = [str(value) for vary in typed if vary.label == MODEL for value in vary.values]
-    of_a_function = f"is of a FUNCTION; {sweep.what} is an experiment"
-    refuse(
-        (not function and sweep.every != 1, f"--every {of_a_function}"),
-        (not function and sweep.keyframe is not None, f"--keyframe {of_a_function}"),
-        (
-            varied and sweep.model is not None,
-            "one model is named, and --vary model=… says several: leave one out",
-        ),
-    )
     sweep = dataclasses.replace(
         sweep,
         what=os.path.abspath(sweep.what) if function else sweep.what,
         menagerie=sweep.menagerie and os.path.abspath(sweep.menagerie),
     )
-    names = varied or [sweep.model or usual]
+    names = varied if varied else [sweep.model or usual]
     files = {name: model_digest(resolve(name, sweep.menagerie)) for name in names}
     places = {name: os.path.abspath(name) if Path(name).is_file() else name for name in names}
     parameters = parameters_of(sweep.what) if function else ()
-    # What an experiment switches off is nothing to refuse; a switch that is varied may be off.
-    given = {} if function else dict(scenario(sweep.what).options)
-    switches = ("contacts", "actuation", "limits")
-    given |= {v.label: False for v in typed if v.label in switches and False in v.values}
-    models, backends, said = _loaded(sweep, [*places.values()], given)
+    models, backends, said = _loaded(sweep, [*places.values()], _switched_off(sweep, typed))
     options = dict.fromkeys(name for model in models for name in model.capabilities.options)
     factors = with_kinds(typed, options, [name for name in parameters if name != "seed"])
     design = Design(factors, sweep.samples, sweep.design_seed)
     cells = design.size * sweep.seeds * len(backends)
-    no_power = sweep.samples & (sweep.samples - 1)
-    refuse(
-        (
-            cells > _MOST,
+    if cells > _MOST:
+        raise BadInputError(
             f"{cells:.3g} cells are more than a sweep can hold, which is {_MOST:,}: vary less, or "
-            "divide it into several",
-        ),
-    )
+            "divide it into several"
+        )
     if design.sampled:
         require_qmc()
-    if no_power:
+    if sweep.samples & (sweep.samples - 1):
         said.append(f"{sweep.samples} samples are not a power of two: a Sobol sequence wants one")
     if cells > _MANY:
         said.append(f"{cells:,} cells")
     for vary in factors:
         said += _check_values(vary, models)
-    chosen = {"seed": 0} if "seed" in parameters else {}
-    chosen |= {v.name: v.extremes[0] for v in factors if v.kind == "parameter"}
+    chosen: dict[str, Value] = {"seed": 0} if "seed" in parameters else {}
+    chosen |= {vary.name: vary.extremes[0] for vary in factors if vary.kind == "parameter"}
     asked = sweep.scenario(chosen)
     _refused(models, lambda model: _check_run(asked, factors, model))
     said += _overlaps_at_start(asked, models)
+    spread = EXACT if sweep.spread == "0" else parse_uncertainty(sweep.spread.split(","))
     return PreparedSweep(
-        sweep,
-        design,
-        backends,
-        {
-            "statemachine": __version__,
-            **{model.backend: model.engine_version for model in models},
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-        },
-        files,
-        places,
-        digest_of(sweep.what) if function else "",
-        parameters,
-        EXACT if sweep.spread == "0" else parse_uncertainty(sweep.spread.split(",")),
-        {model.backend: _cost(model, asked.seconds) for model in models},
-        tuple(said),
+        sweep=sweep,
+        design=design,
+        backends=backends,
+        versions=_versions(models),
+        files=files,
+        places=places,
+        function=digest_of(sweep.what) if function else "",
+        parameters=parameters,
+        spread=spread,
+        cost={model.backend: _cost(model, asked.seconds) for model in models},
+        said=tuple(said),
     )
 
 
+def _switched_off(sweep: Sweep, factors: Sequence[Vary]) -> dict[str, OptionValue]:
+    """Return the options with which models are loaded to be checked.
+
+    What an experiment switches off is nothing to refuse; a switch that is varied may be off.
+    """
+    options: dict[str, OptionValue] = {}
+    if not is_function(sweep.what):
+        options |= scenario(sweep.what).options
+    for vary in factors:
+        if vary.label in _SWITCHES and False in vary.values:
+            options[vary.label] = False
+    return options
+
+
+def _versions(models: Sequence[Model]) -> dict[str, str]:
+    """Return the versions of this library, of the models' engines and of packages."""
+    versions = {"statemachine": __version__}
+    for model in models:
+        versions[model.backend] = model.engine_version
+    versions["numpy"] = np.__version__
+    versions["python"] = platform.python_version()
+    return versions
+
+
 def _loaded(
-    sweep: Sweep, places: Sequence[str], options: Mapping[str, Any]
+    sweep: Sweep, places: Sequence[str], options: Mapping[str, OptionValue]
 ) -> tuple[list[Model], tuple[str, ...], list[str]]:
-    """Every variant on every backend, the backends that are here, and what a reader should know.
+    """Return every variant on every backend, the backends that are here, and lines for the reader.
 
     A backend that refuses a model stays: its cells are rows that say so.
     """
@@ -203,9 +195,14 @@ def _check_run(scenario: Scenario, factors: Sequence[Vary], model: Model) -> Non
     if keyframe is not None:
         model.key_id(keyframe)
     steps_in(model, scenario.seconds)
-    timesteps = [(v, value) for v in factors if v.label == "timestep" for value in v.extremes]
-    variants = [model.replace(**options_at(model, [pair])) for pair in timesteps]
-    for variant in variants or [model]:
+    variants: list[Model] = []
+    for vary in factors:
+        if vary.label == "timestep":
+            settings = [[(vary, value)] for value in vary.extremes]
+            variants += [model.replace(**options_at(model, setting)) for setting in settings]
+    if not variants:
+        variants = [model]
+    for variant in variants:
         check_length(variant, scenario.seconds)
 
 

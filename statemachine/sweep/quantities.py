@@ -21,8 +21,12 @@ from .rows import COLUMNS, DONE, require_parquet
 _NAME = re.compile(r"(\w+)(?:\[([0-9]+)\])?")
 _NUMBERS = ("int64", "double", "list<double>", "list<list<double>>")
 _NO_RESULT = ("seed", "sample_time")  # columns of numbers that say what was asked for
-_KINDS = {name: kind for name, kind, *_ in COLUMNS if kind in _NUMBERS and name not in _NO_RESULT}
-_UNITS = {name: unit for name, _, unit, _ in COLUMNS}
+_KINDS = {
+    column.name: column.type
+    for column in COLUMNS
+    if column.type in _NUMBERS and column.name not in _NO_RESULT
+}
+_UNITS = {column.name: column.unit for column in COLUMNS}
 _MOMENTS = ("sample_qpos", "sample_tip")
 _PLACES = ("tip", "sample_tip")  # their three numbers are one length
 _TOUCH = "first_touch"

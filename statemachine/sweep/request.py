@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -18,19 +17,24 @@ from ..runs.controllers import function_scenario, is_function
 from ..runs.robot import scalar_joint
 from ..runs.scenarios import Scenario, scenario
 from ..typed_numbers import is_count
-from .design import Design, Value, Vary, digest
+from .design import MODEL, Design, Kind, Value, Vary, digest
+from .manifest import (
+    MANIFEST_VERSION,
+    ColumnMeaning,
+    RecordedDesign,
+    RecordedFactor,
+    RecordedRequest,
+    SweepManifest,
+    SweepProvenance,
+)
 from .rows import columns_of
 
-MANIFEST_VERSION = 4
-# What a dataset is of, beside the experiment: cells of other values are of another sweep.
-REQUEST = ("model", "seconds", "every", "keyframe", "spread", "moments")
-# What it may grow by.
-DESIGN = ("vary", "seeds", "samples", "design_seed")
+_LONGEST = 7 * 86400.0  # that a cell may take [s]
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """What a sweep is asked for; nothing is loaded before it is `prepared`.
+    """The request of a sweep; nothing is loaded before it is `prepared`.
 
     Attributes:
         what: An experiment, or FILE.py:FUNCTION, called as function(model, data, …).
@@ -47,7 +51,11 @@ class Sweep:
         keyframe: Where a function starts.
         spread: How far a seed puts the start away, as "1deg,1mm"; "0" for not at all.
         moments: How many moments of each run are kept.
-        timeout: What a cell may take on the clock [s].
+        timeout: What a cell may take on the clock [s], at most a week.
+
+    Raises:
+        BadInputError: A number is out of its range, or the request contradicts itself.
+        UnknownNameError: There is no such experiment.
     """
 
     what: str
@@ -65,8 +73,29 @@ class Sweep:
     moments: int = 20
     timeout: float = 600.0
 
-    def scenario(self, parameters: Mapping[str, Any]) -> Scenario:
-        """What is done, and for how long, with some values of the function's parameters.
+    def __post_init__(self) -> None:
+        _check_at_least(1, "seeds", self.seeds)
+        _check_at_least(0, "samples", self.samples)
+        _check_at_least(0, "design-seed", self.design_seed)
+        _check_at_least(1, "every", self.every)
+        _check_at_least(1, "moments", self.moments)
+        if not 0 < self.timeout <= _LONGEST:
+            raise BadInputError(f"--timeout must be above 0 s; got {self.timeout:g}")
+        if not is_function(self.what):
+            scenario(self.what)  # raises an error where there is none of this name
+            of_a_function = f"is of a FUNCTION; {self.what} is an experiment"
+            if self.every != 1:
+                raise BadInputError(f"--every {of_a_function}")
+            if self.keyframe is not None:
+                raise BadInputError(f"--keyframe {of_a_function}")
+        varies_model = any(word.partition("=")[0].strip() == MODEL for word in self.vary)
+        if varies_model and self.model is not None:
+            raise BadInputError(
+                "one model is named, and --vary model=… says several: leave one out"
+            )
+
+    def scenario(self, parameters: Mapping[str, Value]) -> Scenario:
+        """Return what is done, and for how long, with values of the function's parameters.
 
         Raises:
             BadInputError: The user's file fails.
@@ -78,19 +107,35 @@ class Sweep:
         return asked if self.seconds is None else dataclasses.replace(asked, seconds=self.seconds)
 
     def typed(self, out: str) -> str:
-        """The command that runs it."""
-        given: list[tuple[str, object, object]] = []
+        """Return the command that runs it.
+
+        Args:
+            out: The folder of the dataset.
+        """
+        options: list[tuple[str, object, object]] = []
         for option in dataclasses.fields(self)[1:]:
             flag = f"--{option.name.replace('_', '-').replace('backends', 'backend')}"
             value = getattr(self, option.name)
-            values = value if option.name in ("vary", "backends") else [value]
-            given += [(flag, word, option.default) for word in values if value != option.default]
-        return command(["statemachine", "sweep", self.what], *given, ("--out", out, None))
+            words = value if option.name in ("vary", "backends") else [value]
+            for word in words:
+                if word != option.default:
+                    options.append((flag, word, option.default))
+        return command(["statemachine", "sweep", self.what], *options, ("--out", out, None))
+
+
+def _check_at_least(smallest: int, flag: str, value: int) -> None:
+    """Check that a number is not too small.
+
+    Raises:
+        BadInputError: It is.
+    """
+    if value < smallest:
+        raise BadInputError(f"--{flag} must be at least {smallest}; got {value}")
 
 
 @dataclass(frozen=True)
 class SweepCell:
-    """What is run once.
+    """One run of a sweep.
 
     Attributes:
         id: A digest of point, seed and backend.
@@ -138,8 +183,8 @@ class PreparedSweep:
     cost: Mapping[str, float] = field(default_factory=dict)
     said: tuple[str, ...] = ()
 
-    def settings(self, cell: SweepCell, kind: str) -> list[tuple[Vary, Any]]:
-        """The factors of a kind and their values in a cell."""
+    def settings(self, cell: SweepCell, kind: Kind) -> list[tuple[Vary, Value]]:
+        """Return the factors of a kind and their values in a cell."""
         pairs = zip(self.design.factors, cell.values, strict=True)
         return [(vary, value) for vary, value in pairs if vary.kind == kind]
 
@@ -147,71 +192,108 @@ class PreparedSweep:
         return self.design.size * self.sweep.seeds * len(self.backends)
 
     def cells(self, backend: str) -> Iterator[SweepCell]:
-        """Every cell on a backend, seed by seed, point by point."""
+        """Yield every cell on a backend, seed by seed, point by point."""
         for point in self.design.points():
             for seed in range(self.sweep.seeds):
                 cell = digest([point.id, seed, backend])
                 yield SweepCell(cell, point.id, point.values, seed, backend)
 
-    def provenance(self) -> dict[str, Any]:
-        """What was asked for, as plain values, for the metadata of each file."""
+    def provenance(self) -> SweepProvenance:
+        """Return what was asked for, as plain values, for the metadata of each file."""
         asked = self.sweep
-        request = {name: getattr(asked, name) for name in REQUEST}
-        design = {name: getattr(asked, name) for name in DESIGN}
+        request: RecordedRequest = {
+            "what": asked.what,
+            "function": self.function,
+            "model": asked.model,
+            "seconds": asked.seconds,
+            "every": asked.every,
+            "keyframe": asked.keyframe,
+            "spread": asked.spread,
+            "moments": asked.moments,
+        }
+        design: RecordedDesign = {
+            "vary": asked.vary,
+            "seeds": asked.seeds,
+            "samples": asked.samples,
+            "design_seed": asked.design_seed,
+            "backends": self.backends,
+        }
         return {
             "schema": MANIFEST_VERSION,
             "command": asked.typed("DIR"),
-            "request": {"what": asked.what, "function": self.function, **request},
+            "request": request,
             "files": dict(self.files),
             "versions": dict(self.versions),
-            "design": {**design, "backends": list(self.backends)},
+            "design": design,
         }
 
-    def manifest(self) -> dict[str, Any]:
-        """The same for sweep.json, with the values of what is varied: they may be many."""
-        factors = [
-            {**dataclasses.asdict(vary), "label": vary.label} for vary in self.design.factors
-        ]
+    def manifest(self) -> SweepManifest:
+        """Return the same for sweep.json, with the values of what is varied: they may be many."""
+        columns: dict[str, ColumnMeaning] = {}
+        for column in columns_of(self.design.factors):
+            columns[column.name] = {"unit": column.unit, "meaning": column.meaning}
         return {
             **self.provenance(),
-            "factors": factors,
+            "factors": [_recorded(vary) for vary in self.design.factors],
             "points": self.design.size,
             "cells": len(self),
-            "columns": {
-                name: {"unit": unit, "meaning": meaning}
-                for name, _, unit, meaning in columns_of(self.design.factors)
-            },
+            "columns": columns,
         }
+
+
+def _recorded(vary: Vary) -> RecordedFactor:
+    """Return a factor as plain values."""
+    return {
+        "name": vary.name,
+        "place": vary.place,
+        "kind": vary.kind,
+        "values": vary.values,
+        "bounds": vary.bounds,
+        "times": vary.times,
+        "label": vary.label,
+    }
 
 
 _AXES = ("x", "y", "z")
 _STREAM = 1  # of a seed: not that of the commands which an experiment draws
 
 
-def options_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> dict[str, Any]:
-    """What `model.replace` is given for the values of factors.
+OptionValue = bool | int | float | str | Array
+
+
+def options_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> dict[str, OptionValue]:
+    """Return the options that `model.replace` is given for the values of factors.
 
     Raises:
         BadInputError: The model has no such value of its own.
         UnknownNameError: The model has no such joint, body, geom or actuator.
     """
-    options: dict[str, Any] = {}
+    options: dict[str, OptionValue] = {}
     for vary, value in settings:
         if not (vary.place or vary.times):
-            count = vary.name == "substeps" and isinstance(value, float) and value.is_integer()
-            options[vary.name] = int(value) if count else value
+            is_a_count = vary.name == "substeps" and isinstance(value, float) and value.is_integer()
+            options[vary.name] = int(value) if is_a_count else value
             continue
         own, place = _own(model, vary)
         if place is None:
+            assert isinstance(value, float), "what is times the model's own is a number"
             options[vary.name] = own * value
             continue
-        changed = options.setdefault(vary.name, own.copy())
+        assert isinstance(own, np.ndarray), "what has a place has several numbers"
+        changed = options.get(vary.name)
+        if not isinstance(changed, np.ndarray):
+            changed = own.copy()
+            options[vary.name] = changed
         changed[place] = own[place] * value if vary.times else value
     return options
 
 
-def _own(model: Model, vary: Vary) -> tuple[Any, int | None]:
-    """The model's own value of an option, and which of its numbers is meant; None for all."""
+def _own(model: Model, vary: Vary) -> tuple[Array | float, int | None]:
+    """Return the model's own value of an option, and which of its numbers is meant; None for all.
+
+    Raises:
+        BadInputError: The model has no value of its own.
+    """
     for owner in ("", "dof", "body", "geom", "actuator"):
         own = getattr(model, f"{owner}_{vary.name}" if owner else vary.name, None)
         if isinstance(own, np.ndarray):
@@ -220,14 +302,14 @@ def _own(model: Model, vary: Vary) -> tuple[Any, int | None]:
             return values, _place(model, vary, owner, len(values)) if vary.place else None
         if isinstance(own, (int, float)) and not (isinstance(own, bool) or vary.place):
             return float(own), None
-    raise BadInputError(
-        f"{vary.label} cannot be varied like this: a model has no {vary.name} of its own"
-        + (" for each of its parts" if vary.place else "")
-    )
+    missing = f"{vary.label} cannot be varied like this: a model has no {vary.name} of its own"
+    if vary.place:
+        missing += " for each of its parts"
+    raise BadInputError(missing)
 
 
 def _place(model: Model, vary: Vary, owner: str, length: int) -> int:
-    """Which number of an array is meant: by joint, body, …, axis or its own number."""
+    """Return which number of an array is meant: by joint, body, …, axis or its own number."""
     if is_count(vary.place):
         if int(vary.place) >= length:
             raise BadInputError(f"{vary.label} is beyond the {length} that {model.path.name} has")
@@ -241,7 +323,7 @@ def _place(model: Model, vary: Vary, owner: str, length: int) -> int:
 
 
 def start_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> tuple[dict[int, float], ...]:
-    """What of qpos and of qvel is overwritten at the start: values by their places.
+    """Return what of qpos and of qvel is overwritten at the start: values by their places.
 
     Raises:
         BadInputError: A joint is neither a hinge nor a slide, or a number is beyond the array.
@@ -259,7 +341,7 @@ def start_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> tuple[dict
 
 
 def beyond_ranges(model: Model, vary: Vary) -> list[str]:
-    """A line for a start that is beyond the range of its joint; legal, and usually a mistake."""
+    """Return a line for a start beyond the range of its joint; it is legal, and often a mistake."""
     if vary.name != "qpos":
         return []
     (place,) = start_at(model, [(vary, vary.extremes[0])])[0]
@@ -277,7 +359,7 @@ def beyond_ranges(model: Model, vary: Vary) -> list[str]:
 
 
 def drawn_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> Array:
-    """A start (nq,) near another one, drawn from a seed; that of seed 0 is the same.
+    """Return a start (nq,) near another one, drawn from a seed; that of seed 0 is the same.
 
     Each coordinate moves by at most the spread, every value as likely as any other: a hinge and
     a rotation by its angle, a slide and the position of a free body by its length. A joint stays

@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import quote, unquote
 
 from ..errors import BadInputError
@@ -23,53 +23,69 @@ CELLS = "cells"  # the folder of the dataset, in that of the sweep
 KEY = b"statemachine.sweep"  # of the provenance, in the metadata of each file
 _DIGEST = b"statemachine.sha256"  # beside it, of all other bytes of the file
 _DIGITS = hashlib.sha256().digest_size * 2
-# The columns beside those of the factors: name, type, unit, what it is. docs/sweeps.md shows it.
+
+
+class Column(NamedTuple):
+    """A column of a dataset.
+
+    Attributes:
+        name: Of the column.
+        type: Arrow's, as "list<double>".
+        unit: SI; "" for none.
+        meaning: What it says.
+    """
+
+    name: str
+    type: str
+    unit: str
+    meaning: str
+
+
+# The columns beside those of the factors. docs/sweeps.md shows them.
 COLUMNS = (
-    ("cell", "string", "", "digest of point, seed and backend: what names a row"),
-    ("point", "string", "", "digest of the varied values: the same for every seed and backend"),
-    ("seed", "int64", "", "what was drawn from"),
-    ("status", "string", "", "done or failed"),
-    (
-        *("error_class", "string", ""),
-        "of a failed cell, such as DivergedError or TimedOutError",
+    Column("cell", "string", "", "digest of point, seed and backend: what names a row"),
+    Column(
+        "point", "string", "", "digest of the varied values: the same for every seed and backend"
     ),
-    ("error", "string", "", "of a failed cell: what happened, in one line"),
-    (
-        *("wall_seconds", "double", "s"),
-        "by the clock, loading included; all else can be repeated",
+    Column("seed", "int64", "", "what was drawn from"),
+    Column("status", "string", "", "done or failed"),
+    Column("error_class", "string", "", "of a failed cell, such as DivergedError or TimedOutError"),
+    Column("error", "string", "", "of a failed cell: what happened, in one line"),
+    Column(
+        "wall_seconds", "double", "s", "by the clock, loading included; all else can be repeated"
     ),
-    ("steps", "int64", "", "timesteps that were taken"),
-    ("time", "double", "s", "simulated time at the end"),
-    ("qpos", "list<double>", "rad or m", "(nq,) at the end"),
-    ("qvel", "list<double>", "rad/s or m/s", "(nv,) at the end"),
-    (
+    Column("steps", "int64", "", "timesteps that were taken"),
+    Column("time", "double", "s", "simulated time at the end"),
+    Column("qpos", "list<double>", "rad or m", "(nq,) at the end"),
+    Column("qvel", "list<double>", "rad/s or m/s", "(nv,) at the end"),
+    Column(
         "tip",
         "list<double>",
         "m",
         "(3,) the usual site at the end, in world axes; none without a site",
     ),
-    ("max_qvel", "double", "rad/s or m/s", "the largest size of a velocity in any step"),
-    ("energy_start", "double", "J", "kinetic and potential energy at the start"),
-    ("energy", "double", "J", "the same at the end"),
-    ("first_touch", "double", "s", "when the first step began in contact; none if none did"),
-    ("touch", "string", "", "which bodies touched then"),
-    ("sample_time", "list<double>", "s", "(n,) moments that are kept"),
-    ("sample_qpos", "list<list<double>>", "rad or m", "(n, nq) at these moments"),
-    ("sample_tip", "list<list<double>>", "m", "(n, 3) at these moments"),
-    ("engine_version", "string", "", "version of the engine"),
-    ("library_version", "string", "", "version of this library"),
+    Column("max_qvel", "double", "rad/s or m/s", "the largest size of a velocity in any step"),
+    Column("energy_start", "double", "J", "kinetic and potential energy at the start"),
+    Column("energy", "double", "J", "the same at the end"),
+    Column("first_touch", "double", "s", "when the first step began in contact; none if none did"),
+    Column("touch", "string", "", "which bodies touched then"),
+    Column("sample_time", "list<double>", "s", "(n,) moments that are kept"),
+    Column("sample_qpos", "list<list<double>>", "rad or m", "(n, nq) at these moments"),
+    Column("sample_tip", "list<list<double>>", "m", "(n, 3) at these moments"),
+    Column("engine_version", "string", "", "version of the engine"),
+    Column("library_version", "string", "", "version of this library"),
 )
 _SOON, _LATE, _SHARE = 5.0, 60.0, 0.02  # seconds between two files, and of the time so far
 _MOST = 20_000  # rows of a file
 
 
 def known(figure: Any) -> float | None:
-    """A figure; None where it is not a finite number."""
+    """Return a figure; None where it is not a finite number."""
     return float(figure) if math.isfinite(figure) else None
 
 
 def require_parquet() -> tuple[Any, Any]:
-    """The packages pyarrow and pyarrow.parquet.
+    """Import the packages pyarrow and pyarrow.parquet.
 
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
@@ -79,8 +95,8 @@ def require_parquet() -> tuple[Any, Any]:
     return arrow, parquet
 
 
-def schema_of(factors: Sequence[Vary], provenance: Mapping[str, Any]) -> Any:
-    """The schema of every file: the columns of the factors behind `seed`."""
+def schema_of(factors: Sequence[Vary], provenance: Mapping[str, object]) -> Any:
+    """Return the schema of every file: the columns of the factors behind `seed`."""
     arrow, _ = require_parquet()
     kinds = {
         "bool": arrow.bool_(),
@@ -91,16 +107,20 @@ def schema_of(factors: Sequence[Vary], provenance: Mapping[str, Any]) -> Any:
         "list<list<double>>": arrow.list_(arrow.list_(arrow.float64())),
     }
     fields = [
-        arrow.field(name, kinds[kind], metadata={"unit": unit, "meaning": meaning})
-        for name, kind, unit, meaning in columns_of(factors)
+        arrow.field(
+            column.name,
+            kinds[column.type],
+            metadata={"unit": column.unit, "meaning": column.meaning},
+        )
+        for column in columns_of(factors)
     ]
     text = json.dumps(provenance, sort_keys=True)
     return arrow.schema(fields, metadata={KEY: text.encode()})
 
 
-def columns_of(factors: Sequence[Vary]) -> list[tuple[str, str, str, str]]:
-    """Every column, as in `COLUMNS`."""
-    varied = [(vary.column, vary.type, vary.unit_on(), vary.meaning) for vary in factors]
+def columns_of(factors: Sequence[Vary]) -> list[Column]:
+    """Return every column: those of `COLUMNS`, and those of the factors."""
+    varied = [Column(vary.column, vary.type, vary.unit_on(), vary.meaning) for vary in factors]
     return [*COLUMNS[:3], *varied, *COLUMNS[3:]]
 
 
@@ -108,7 +128,7 @@ class RowWriter:
     """Collects rows and writes them as files of many, each whole or not at all."""
 
     def __init__(
-        self, folder: Path, factors: Sequence[Vary], provenance: Mapping[str, Any]
+        self, folder: Path, factors: Sequence[Vary], provenance: Mapping[str, object]
     ) -> None:
         self._folder = folder / CELLS
         self._schema = schema_of(factors, provenance)
@@ -175,7 +195,7 @@ def remove_failed(folder: Path) -> None:
 
 
 def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
-    """A file of the dataset as a Table.
+    """Read a file of the dataset as a Table.
 
     Raises:
         BadInputError: It is damaged, or this library did not write it.
@@ -208,14 +228,14 @@ def _write(part: Path, table: Any) -> None:
 
 
 def _sealed(content: bytes) -> bytes:
-    """A file with the digest of all its other bytes in the place that its footer has for it."""
+    """Return a file with the digest of all its other bytes where its footer has a place for it."""
     start = content.rfind(_DIGEST) + len(_DIGEST) + 2  # behind the key a type and a length
     before, after = content[:start], content[start + _DIGITS :]
     return before + hashlib.sha256(before + after).hexdigest().encode() + after
 
 
 def read_cells(folder: str | Path) -> Any:
-    """The dataset of a sweep as a pyarrow Table, in the order of the cells' ids.
+    """Read the dataset of a sweep as a pyarrow Table, in the order of the cells' ids.
 
     The column `backend`, which the folders' names tell, is the last.
 

@@ -35,8 +35,16 @@ from ..runs.drive import check_length, drive, steps_in
 from ..runs.header import model_digest
 from ..runs.recorder import energies
 from ..runs.scenarios import Scenario
-from .design import digest
-from .request import PreparedSweep, Sweep, SweepCell, drawn_start, options_at, start_at
+from .design import Value, digest
+from .request import (
+    OptionValue,
+    PreparedSweep,
+    Sweep,
+    SweepCell,
+    drawn_start,
+    options_at,
+    start_at,
+)
 from .rows import DONE, FAILED, known
 
 T = TypeVar("T")
@@ -72,21 +80,22 @@ def _settle() -> None:
 
 
 def row_of(ready: PreparedSweep, cell: SweepCell, error: BaseException | None = None) -> Row:
-    """What every row of a cell has, and of one that failed what happened."""
-    failed = {} if error is None else {
-        "error_class": type(error).__name__,
-        "error": one_line(error) or type(error).__name__,
-    }  # fmt: skip
-    return {
+    """Return what every row of a cell has, and of one that failed what happened."""
+    row: Row = {
         "cell": cell.id,
         "point": cell.point,
         "seed": cell.seed,
         "backend": cell.backend,
-        "status": FAILED if failed else DONE,
+        "status": DONE if error is None else FAILED,
         "library_version": __version__,
-        **{vary.column: v for vary, v in zip(ready.design.factors, cell.values, strict=True)},
-        **failed,
     }
+    for vary, value in zip(ready.design.factors, cell.values, strict=True):
+        row[vary.column] = value
+    if error is not None:
+        kind = type(error).__name__
+        row["error_class"] = kind
+        row["error"] = one_line(error) or kind
+    return row
 
 
 def _row(ready: PreparedSweep, cell: SweepCell, own: bool) -> Row:
@@ -142,8 +151,8 @@ def _timed_out(seconds: float) -> TimedOutError:
 
 def _model(
     ready: PreparedSweep, cell: SweepCell, row: Row
-) -> tuple[Model, dict[str, Any], Scenario]:
-    """The Model of a cell, the options that it was made with, and what is done on it.
+) -> tuple[Model, dict[str, OptionValue], Scenario]:
+    """Return the Model of a cell, the options that it was made with, and what is done on it.
 
     Raises:
         BadInputError: The model or the function is another one than that of the sweep.
@@ -151,14 +160,14 @@ def _model(
     sweep, wrong = ready.sweep, "is not the file of the sweep: it changed, or is another here"
     if not _is_same(ready):
         raise BadInputError(f"{function_file(sweep.what).name} {wrong}")
-    chosen: dict[str, Any] = {"seed": cell.seed} if "seed" in ready.parameters else {}
+    chosen: dict[str, Value] = {"seed": cell.seed} if "seed" in ready.parameters else {}
     chosen |= {vary.name: value for vary, value in ready.settings(cell, "parameter")}
     scenario = sweep.scenario(chosen)
-    name = next((value for _, value in ready.settings(cell, "model")), next(iter(ready.files)))
+    name = _model_name(ready, cell)
     varied = ready.settings(cell, "option")
     # A switch may be what lets an engine take the file at all: `load` is told.
     switches = {v.name: value for v, value in varied if isinstance(value, bool)}
-    first = {**scenario.options, **switches}
+    first: dict[str, OptionValue] = {**scenario.options, **switches}
     rest = [(v, value) for v, value in varied if not isinstance(value, bool)]
     key = repr((name, ready.files[name], cell.backend, first, sweep))
 
@@ -179,8 +188,15 @@ def _model(
     return model, {**first, **options}, scenario
 
 
-def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, Any]) -> Model:
-    """A model of a sweep as all of its cells load it."""
+def _model_name(ready: PreparedSweep, cell: SweepCell) -> str:
+    """Return the name of a cell's model: of several that are varied, or the only one."""
+    for _, value in ready.settings(cell, "model"):
+        return str(value)
+    return next(iter(ready.files))
+
+
+def load_of(sweep: Sweep, place: str, backend: str, options: Mapping[str, OptionValue]) -> Model:
+    """Load a model of a sweep as all of its cells do."""
     return parse_backend(backend).load_to_run(place, menagerie=sweep.menagerie, **options)
 
 
@@ -231,7 +247,7 @@ def _run(
     ready: PreparedSweep,
     cell: SweepCell,
     model: Model,
-    options: Mapping[str, Any],
+    options: Mapping[str, OptionValue],
     scenario: Scenario,
     row: Row,
 ) -> None:
