@@ -150,45 +150,43 @@ DEFAULT = "mujoco"  # what runs where nothing else is asked for; it compiles MJC
 WITNESS = "pinocchio"  # what computes places independently
 PAIR = ("mujoco", "pybullet")  # what is compared where nothing else is asked for
 
-ENGINES = {
-    engine.name: engine
-    for engine in (
-        Engine(
-            name="mujoco",
-            module="mujoco",
-            distributions=("mujoco",),
-            wheels=(Wheel("mujoco"),),
-            places="Linux, Windows, and macOS on Apple silicon",
-            probe="MjModel",
-            role="runs every lesson",
+_ENGINES = (
+    Engine(
+        name="mujoco",
+        module="mujoco",
+        distributions=("mujoco",),
+        wheels=(Wheel("mujoco"),),
+        places="Linux, Windows, and macOS on Apple silicon",
+        probe="MjModel",
+        role="runs every lesson",
+    ),
+    Engine(
+        name="pybullet",
+        module="pybullet",
+        distributions=("pybullet", "pybullet-arm64"),
+        wheels=(
+            Wheel("pybullet", "linux", ("x86_64",), (11, 11)),
+            Wheel("pybullet-arm64==3.2.8", "linux", ("x86_64",), (12, 13)),
+            Wheel("pybullet-arm64==3.2.8", "win32", ("amd64", "x86_64"), (11, 13)),
+            Wheel("pybullet-arm64==3.2.8", "darwin", (), (11, 12)),
+            Wheel("pybullet-arm64==3.2.7", "darwin", ("arm64",), (13, 13)),
         ),
-        Engine(
-            name="pybullet",
-            module="pybullet",
-            distributions=("pybullet", "pybullet-arm64"),
-            wheels=(
-                Wheel("pybullet", "linux", ("x86_64",), (11, 11)),
-                Wheel("pybullet-arm64==3.2.8", "linux", ("x86_64",), (12, 13)),
-                Wheel("pybullet-arm64==3.2.8", "win32", ("amd64", "x86_64"), (11, 13)),
-                Wheel("pybullet-arm64==3.2.8", "darwin", (), (11, 12)),
-                Wheel("pybullet-arm64==3.2.7", "darwin", ("arm64",), (13, 13)),
-            ),
-            places="Linux x86-64, Windows x64 and macOS, with CPython 3.11 to 3.13",
-            probe="DIRECT",
-            role="the second engine of every lesson",
-        ),
-        Engine(
-            name="pinocchio",
-            module="pinocchio",
-            distributions=("pin",),
-            wheels=(Wheel("pin", "linux"), Wheel("pin", "darwin")),
-            places="Linux and macOS",
-            probe="buildModelFromMJCF",
-            role="the witness of `statemachine fingertip`",
-            runs=False,
-        ),
-    )
-}
+        places="Linux x86-64, Windows x64 and macOS, with CPython 3.11 to 3.13",
+        probe="DIRECT",
+        role="the second engine of every lesson",
+    ),
+    Engine(
+        name="pinocchio",
+        module="pinocchio",
+        distributions=("pin",),
+        wheels=(Wheel("pin", "linux"), Wheel("pin", "darwin")),
+        places="Linux and macOS",
+        probe="buildModelFromMJCF",
+        role="the witness of `statemachine fingertip`",
+        runs=False,
+    ),
+)
+ENGINES = {engine.name: engine for engine in _ENGINES}
 
 
 def engine_version(name: str) -> str:

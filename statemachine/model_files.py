@@ -27,13 +27,13 @@ _FOLDERS = ("meshdir", "texturedir", "assetdir")  # attributes of <compiler>
 _SUSPECT = re.compile(r"nan|inf|e\+?\d{3}|\d{300}", re.IGNORECASE)
 # Attributes that hold names or text, of any element: "inf" may be a name.
 _TEXTS = {
-    *("name", "class", "childclass", "model", "prefix", "suffix", "type", "key", "keyword"),
-    *("joint", "joint1", "joint2", "jointinparent", "body", "body1", "body2", "geom", "geom1"),
-    *("geom2", "site", "site1", "site2", "refsite", "sidesite", "cranksite", "slidersite"),
-    *("tendon", "tendon1", "tendon2", "actuator", "material", "mesh", "hfield", "texture", "skin"),
-    *("flex", "target", "objname", "refname", "plugin", "instance", "link", "filename", "file"),
-    *(_FOLDERS),
-}
+    "name", "class", "childclass", "model", "prefix", "suffix", "type", "key", "keyword", "joint",
+    "joint1", "joint2", "jointinparent", "body", "body1", "body2", "geom", "geom1", "geom2", "site",
+    "site1", "site2", "refsite", "sidesite", "cranksite", "slidersite", "tendon", "tendon1",
+    "tendon2", "actuator", "material", "mesh", "hfield", "texture", "skin", "flex", "target",
+    "objname", "refname", "plugin", "instance", "link", "filename", "file", "meshdir", "texturedir",
+    "assetdir",
+}  # fmt: skip
 # Elements whose values nothing is computed from but a user's own code.
 _OF_USERS = {"numeric", "text", "tuple", "config"}
 # What may be without an end: a range, and the limits of a joint of a URDF.
@@ -81,18 +81,29 @@ def check_model_file(path: Path) -> None:
         root = _root(file)
         if root is None:
             continue
-        folders = {value for element in root.iter() for value in _folders_of(element)}
-        for element in root.iter():
-            for attribute, value in element.attrib.items():
-                if attribute.startswith(_FILES):
-                    _check_named_file(path, file, element, attribute, value, folders)
-                elif _SUSPECT.search(value):
-                    _check_numbers(file, element, attribute, value)
-            _check_memory(file, element)
+        _check_elements(path, file, root)
         for element in (*root.iter("include"), *root.iterfind("asset/model")):
             part = included_file(element.get("file", ""), path, file)
             if part is not None:
                 waiting.append(part)
+
+
+def _check_elements(main: Path, file: Path, root: Element) -> None:
+    """Raise ModelError if an element of a file asks for what no engine should be given.
+
+    Args:
+        main: The model's file.
+        file: `main`, or one that it includes.
+        root: Of that file.
+    """
+    folders = {value for element in root.iter() for value in _folders_of(element)}
+    for element in root.iter():
+        for attribute, value in element.attrib.items():
+            if attribute.startswith(_FILES):
+                _check_named_file(main, file, element, attribute, value, folders)
+            elif _SUSPECT.search(value):
+                _check_numbers(file, element, attribute, value)
+        _check_memory(file, element)
 
 
 def _root(file: Path) -> Element | None:

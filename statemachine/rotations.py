@@ -28,25 +28,29 @@ def xyzw_from_wxyz(quat: ArrayLike) -> Array:
 
 
 def times(a: ArrayLike, b: ArrayLike) -> Array:
-    """Products (..., 4) of quaternions (..., 4), wxyz: first `b`, then `a`."""
+    """Return the products (..., 4) of quaternions (..., 4), wxyz: first `b`, then `a`."""
     (aw, ax, ay, az), (bw, bx, by, bz) = _parts(a), _parts(b)
-    return _together(
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
+    w = aw * bw - ax * bx - ay * by - az * bz
+    x = aw * bx + ax * bw + ay * bz - az * by
+    y = aw * by - ax * bz + ay * bw + az * bx
+    z = aw * bz + ax * by - ay * bx + az * bw
+    return _together(w, x, y, z)
 
 
 def matrix_from_quat(quat: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4), wxyz."""
+    """Return the rotation matrices (..., 3, 3) of unit quaternions (..., 4), wxyz."""
     w, x, y, z = _parts(quat)
-    entries = _together(
-        *(w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        *(2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
-        *(2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
-    )
-    return entries.reshape(*w.shape, 3, 3)
+    matrix = np.empty((*w.shape, 3, 3))
+    matrix[..., 0, 0] = w * w + x * x - y * y - z * z
+    matrix[..., 0, 1] = 2 * (x * y - w * z)
+    matrix[..., 0, 2] = 2 * (x * z + w * y)
+    matrix[..., 1, 0] = 2 * (x * y + w * z)
+    matrix[..., 1, 1] = w * w - x * x + y * y - z * z
+    matrix[..., 1, 2] = 2 * (y * z - w * x)
+    matrix[..., 2, 0] = 2 * (x * z - w * y)
+    matrix[..., 2, 1] = 2 * (y * z + w * x)
+    matrix[..., 2, 2] = w * w - x * x - y * y + z * z
+    return matrix
 
 
 def _parts(quat: ArrayLike) -> tuple[Array, Array, Array, Array]:
@@ -63,21 +67,17 @@ def _together(*parts: Array) -> Array:
 
 
 def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
-    """Angle [rad] of the rotation that takes matrices `a` (..., 3, 3) to `b`.
+    """Return the angle [rad] of the rotation that takes matrices `a` (..., 3, 3) to `b`.
 
     By atan2 of sine and cosine, so that tiny angles keep their digits; the
     arccosine of the trace alone loses everything below 1e-8.
     """
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     turn = np.swapaxes(a, -1, -2) @ b
-    skew = np.stack(
-        [
-            turn[..., 2, 1] - turn[..., 1, 2],
-            turn[..., 0, 2] - turn[..., 2, 0],
-            turn[..., 1, 0] - turn[..., 0, 1],
-        ],
-        axis=-1,
-    )
+    x = turn[..., 2, 1] - turn[..., 1, 2]
+    y = turn[..., 0, 2] - turn[..., 2, 0]
+    z = turn[..., 1, 0] - turn[..., 0, 1]
+    skew = np.stack([x, y, z], axis=-1)
     sine = np.linalg.norm(skew, axis=-1) / 2
     cosine = (np.trace(turn, axis1=-2, axis2=-1) - 1) / 2
     return np.arctan2(sine, cosine)

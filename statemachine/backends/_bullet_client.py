@@ -106,24 +106,24 @@ Quat = tuple[float, float, float, float]
 
 
 def times(a: Any, b: Any) -> Quat:
-    """Product of two quaternions, (x, y, z, w)."""
+    """Return the product of two quaternions, (x, y, z, w)."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
+    x = aw * bx + ax * bw + ay * bz - az * by
+    y = aw * by - ax * bz + ay * bw + az * bx
+    z = aw * bz + ax * by - ay * bx + az * bw
+    w = aw * bw - ax * bx - ay * by - az * bz
+    return x, y, z, w
 
 
 def turned(quat: Any, vector: Any) -> tuple[float, float, float]:
-    """A vector turned by a unit quaternion (x, y, z, w)."""
+    """Return a vector turned by a unit quaternion (x, y, z, w)."""
     x, y, z, w = quat
     vx, vy, vz = vector
-    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
-    return (
-        vx + w * tx + y * tz - z * ty,
-        vy + w * ty + z * tx - x * tz,
-        vz + w * tz + x * ty - y * tx,
-    )
+    tx = 2 * (y * vz - z * vy)
+    ty = 2 * (z * vx - x * vz)
+    tz = 2 * (x * vy - y * vx)
+    vx = vx + w * tx + y * tz - z * ty
+    vy = vy + w * ty + z * tx - x * tz
+    vz = vz + w * tz + x * ty - y * tx
+    return vx, vy, vz

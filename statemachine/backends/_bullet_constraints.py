@@ -41,6 +41,32 @@ class SoftRow(NamedTuple):
     most: float
 
 
+class SoftRows(NamedTuple):
+    """Several constraints, as arrays with a row for each.
+
+    Attributes:
+        jacobian: J (m, n).
+        softness: R (m,).
+        reference: (m,) what J·a + R·F is to be.
+        least, most: (m,) bounds of F.
+    """
+
+    jacobian: Array
+    softness: Array
+    reference: Array
+    least: Array
+    most: Array
+
+    @classmethod
+    def of(cls, rows: Sequence[SoftRow]) -> SoftRows:
+        """Put m rows, at least one, into arrays."""
+        return cls(*(np.array(column) for column in zip(*rows, strict=True)))
+
+    def followed_by(self, others: SoftRows) -> SoftRows:
+        """Return these constraints, and others after them."""
+        return SoftRows(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
+
+
 # The curve of a constraint's impedance; damping b, stiffness k and inverse weight.
 Soft = tuple[list[float], list[float]]
 

@@ -142,16 +142,17 @@ class Surfaces:
         self.spin, self.roll = (self._turning(wanted, k) for k in (1, 2))
         self.differences = []
         for i, j, (slide, spin, roll) in wanted:
-            kinds = (
-                ("friction", slide, min(self.slide[i] * self.slide[j], _MOST)),
-                ("spinning friction", spin, self._combined(self.spin, i, j)),
-                ("rolling friction", roll, self._combined(self.roll, i, j)),
-            )
-            self.differences += [
-                f"{what} of {self._label(i, j)} is {ours:.3g}, not {theirs:.3g}"
-                for what, theirs, ours in kinds
-                if abs(ours - theirs) > _CLOSE * max(theirs, 1e-6)
-            ]
+            sliding = min(self.slide[i] * self.slide[j], _MOST)
+            spinning, rolling = self._combined(self.spin, i, j), self._combined(self.roll, i, j)
+            self._compare("friction", i, j, sliding, slide)
+            self._compare("spinning friction", i, j, spinning, spin)
+            self._compare("rolling friction", i, j, rolling, roll)
+
+    def _compare(self, what: str, i: int, j: int, ours: float, theirs: float) -> None:
+        """Note a friction of two solids that is not the model's."""
+        if abs(ours - theirs) > _CLOSE * max(theirs, 1e-6):
+            pair = self._label(i, j)
+            self.differences.append(f"{what} of {pair} is {ours:.3g}, not {theirs:.3g}")
 
     def _combined(self, turning: Array, i: int, j: int) -> float:
         """What PyBullet makes of the spinning or rolling friction of two."""

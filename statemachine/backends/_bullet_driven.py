@@ -206,13 +206,13 @@ class Motors:
     def __init__(self, world: World, tree: Tree, raw: mujoco.MjModel) -> None:
         self._world, self.tree = world, tree
         joints = raw.dof_jntid[tree.dofs[tree.base :]].tolist()
-        pairs = [
-            (joints.index(raw.actuator_trnid[a, 0]), int(raw.actuator_ctrladr[a]))
-            for a in np.flatnonzero(in_force(raw))
-            if raw.actuator_trnid[a, 0] in joints
-        ]
-        self._driven = [tree.joints[place] for place, _ in pairs]
-        self._ids = [a for _, a in pairs]
+        self._driven: list[int] = []  # PyBullet's index of each joint that is driven
+        self._ids: list[int] = []  # and the number of ctrl that it takes
+        for a in np.flatnonzero(in_force(raw)).tolist():
+            joint = int(raw.actuator_trnid[a, 0])
+            if joint in joints:
+                self._driven.append(tree.joints[joints.index(joint)])
+                self._ids.append(int(raw.actuator_ctrladr[a]))
 
     def place(self, qpos: Array, qvel: Array, *_: Array) -> None:
         """Start from a state."""

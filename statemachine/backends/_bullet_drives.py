@@ -82,15 +82,11 @@ class Drives:
         self._on_joints = np.abs(self._across) * ~on_tendon[ids, None]
         self._tendons, self._later = tendons, later
         # Of what pulls on a path through space: its column, gear and tendon.
-        self._paths = [
-            (
-                column,
-                float(raw.actuator_gear[raw.actuator_outadr[a], 0]),
-                tendons.ids.index(target[a]),
-            )
-            for column, a in enumerate(ids)
-            if on_tendon[a] and tendons.ids.index(target[a]) in tendons.bent
-        ]
+        self._paths: list[tuple[int, float, int]] = []
+        for column, a in enumerate(ids):
+            if on_tendon[a] and (tendon := tendons.ids.index(target[a])) in tendons.bent:
+                gear = float(raw.actuator_gear[raw.actuator_outadr[a], 0])
+                self._paths.append((column, gear, tendon))
         affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]

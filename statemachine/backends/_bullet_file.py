@@ -8,6 +8,7 @@ PyBullet's own reader of that format has neither actuators nor includes, so a UR
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -77,22 +78,16 @@ class UrdfFile:
                 feature="a tree of so many parts",
                 reason=f"{len(links)} links",
             )
-        floating = tuple(
-            joint.get("name", "") for joint in joints if joint.get("type") == "floating"
-        )
+        floating = _names(joint for joint in joints if joint.get("type") == "floating")
+        mimics = _names(joint for joint in joints if joint.find("mimic") is not None)
         # One that is fixed to the world weighs nothing; so does one of this name, in PyBullet.
         still = {"world"} if floating else {"world", *roots}
+        light = [name for name, link in links.items() if link.find("inertial") is None]
         return cls(
             path=path.absolute(),
             content=content,
-            without_inertial=tuple(
-                name
-                for name, link in links.items()
-                if link.find("inertial") is None and name not in still
-            ),
-            mimics=tuple(
-                joint.get("name", "") for joint in joints if joint.find("mimic") is not None
-            ),
+            without_inertial=tuple(name for name in light if name not in still),
+            mimics=mimics,
             floating=floating,
         )
 
@@ -125,6 +120,11 @@ class UrdfFile:
                 "load it again"
             )
         return load_urdf(client, str(self.path), self.path.name, useFixedBase=fixed)
+
+
+def _names(elements: Iterable[ElementTree.Element]) -> tuple[str, ...]:
+    """Return the names of elements, "" of one without a name."""
+    return tuple(element.get("name", "") for element in elements)
 
 
 def _end(joint: ElementTree.Element, tag: str) -> str:

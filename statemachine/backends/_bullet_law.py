@@ -39,6 +39,7 @@ from . import _dense as dense
 from ._bullet_constraints import (
     Equalities,
     SoftRow,
+    SoftRows,
     Tendons,
     bounds_of,
     curves,
@@ -119,9 +120,15 @@ class Law:
         self._rub_weight = weight + self._rub_r
         self._rubs = rubs = np.flatnonzero(self._frictionloss)
         self._unit = unit = np.eye(len(dofs))
-        # Rows of joints with friction; their references are these times the velocities.
-        columns = unit, self._rub_r, -self._rub_b, self._least_rub, self._frictionloss
-        self._rub_rows = [column[rubs] for column in columns]
+        # Of the joints with friction; their references are minus these times the velocities.
+        self._rub_damping = self._rub_b[rubs]
+        self._rub_rows = SoftRows(
+            jacobian=unit[rubs],
+            softness=self._rub_r[rubs],
+            reference=np.zeros(len(rubs)),
+            least=self._least_rub[rubs],
+            most=self._frictionloss[rubs],
+        )
         self._coupled = bool(self._equalities) or self._tendons.rubs
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
@@ -277,22 +284,20 @@ class Law:
         Each row has a force F between two bounds, and wants J·a + R·F = its reference; a row at a
         bound may miss it to one side. Those of the joints' friction come before the others.
         """
-        rubbing, columns = len(self._rubs), self._rub_rows.copy()
-        columns[2] = columns[2] * speed[self._rubs]
-        if rows := [row for kind in kinds for row in kind]:
-            further = map(np.array, zip(*rows, strict=True))
-            columns = [np.concatenate(pair) for pair in zip(columns, further, strict=True)]
-        jacobian, soft, goal, least, most = columns
+        rows = self._rub_rows._replace(reference=-self._rub_damping * speed[self._rubs])
+        if further := [row for kind in kinds for row in kind]:
+            rows = rows.followed_by(SoftRows.of(further))
+        jacobian, count = rows.jacobian, len(rows.softness)
         response = jacobian.copy()
         for row in response:
             dense.solved(factor, row)
         matrix = dense.product(response, jacobian.T.copy())
-        matrix.flat[:: len(soft) + 1] += soft
-        right = goal - dense.times(jacobian, dense.solved(factor, others.copy()))
-        force = np.zeros(len(soft))
-        force[:rubbing] = friction[self._rubs]
-        force = dense.pivoted(matrix, right, least, most, force)
-        ends = [0, *(np.cumsum([*map(len, kinds)]) + rubbing).tolist()]
+        matrix.flat[:: count + 1] += rows.softness
+        right = rows.reference - dense.times(jacobian, dense.solved(factor, others.copy()))
+        force = np.zeros(count)
+        force[: len(self._rubs)] = friction[self._rubs]
+        force = dense.pivoted(matrix, right, rows.least, rows.most, force)
+        ends = [0, *(np.cumsum([len(kind) for kind in kinds]) + len(self._rubs)).tolist()]
         return [
             dense.times(jacobian[a:b].T.copy(), force[a:b]) if b > a else self._nothing
             for a, b in pairwise(ends)

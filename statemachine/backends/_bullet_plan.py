@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..interface import Array
 from . import _bullet_urdf as urdf
-from ._bullet_contacts import Surfaces
+from ._bullet_contacts import Solid, Surfaces
 from ._bullet_file import MOST_LINKS, UrdfFile
 from .compiled import new_data
 
@@ -149,16 +149,21 @@ class Plan:
             meshes = {geom: int(raw.geom_dataid[geom]) for geom in hulls}
             hulls = {g for g, mesh in meshes.items() if mesh < 0 or raw.mesh_pathadr[mesh] < 0}
         loose = urdf.floats(raw, root) and (kind == "engine" or not self.driven(root))
+        solids, padding, tips = self.surfaces.solids, None, False
+        if kind == "stepped":
+            padding = self.padding
+        else:
+            tips = self.links(root) + sites <= MOST_LINKS
         dialect = urdf.Dialect(
             capsules=True,
             looks=False,
-            solids=kind != "ghost" and bool(self.surfaces.solids),
+            solids=kind != "ghost" and bool(solids),
             dynamics=kind == "engine",
             anchored=bool(root) and not loose,
-            padding=self.padding if kind == "stepped" else None,
-            tips=kind != "stepped" and self.links(root) + sites <= MOST_LINKS,
+            padding=padding,
+            tips=tips,
             hulls=frozenset(hulls),
-            parts={geom: solid.part for solid in self.surfaces.solids for geom in solid.geoms},
+            parts=_parts(solids),
         )
         files = {
             urdf.hull_file(geom): self.hulls[geom].obj(smaller=kind == "stepped")
@@ -166,6 +171,11 @@ class Plan:
             if raw.body_rootid[raw.geom_bodyid[geom]] == root
         }
         return urdf.write(raw, root, dialect, self.names), files
+
+
+def _parts(solids: Sequence[Solid]) -> dict[int, int]:
+    """Return in which link of its body each geom is that touches."""
+    return {geom: solid.part for solid in solids for geom in solid.geoms}
 
 
 def _padding(raw: mujoco.MjModel) -> Array:

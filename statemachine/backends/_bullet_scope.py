@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
@@ -53,18 +56,15 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
     raw = plan.raw
     whole = {"flex": raw.nflex, "plugin": raw.nplugin}
     problems = [(feature, f"the model has {count}") for feature, count in whole.items() if count]
-    if plan.file:  # it reads the file itself, and what it knows nothing of has no effect
-        rows: tuple[tuple[str, str, Any, str], ...] = tuple(_of_joints(raw))
-    else:
+    parts = list(_of_joints(raw))
+    if not plan.file:  # else it reads the file itself, and what it knows nothing of has no effect
         if as_it_comes:
             problems += _of_the_law(raw)
-        rows = *_of_joints(raw), *_of_bodies(plan), *_of_actuators(raw), *_of_ties(raw)
-        rows += tuple(_of_geoms(plan))
-    problems += [
-        (feature, f"{kind} {_name(raw, kind, k)} {says}")
-        for kind, feature, which, says in rows
-        for k in np.flatnonzero(which).tolist()
-    ]
+        for found in (_of_bodies(plan), _of_actuators(raw), _of_ties(raw), _of_geoms(plan)):
+            parts += found
+    for part in parts:
+        for k in np.flatnonzero(part.which).tolist():
+            problems.append((part.feature, f"{part.kind} {_name(raw, part.kind, k)} {part.says}"))
     if not problems:
         return
     feature, reason = problems[0]
@@ -79,11 +79,17 @@ def check(plan: Plan, backend: str, as_it_comes: bool = False) -> None:
 
 
 def _of_the_law(raw: mujoco.MjModel) -> list[tuple[str, str]]:
-    """What the adapter emulates, and the engine as it comes has nothing of."""
-    tendons = raw.tendon_stiffness.any() or raw.tendon_damping.any() or raw.tendon_limited.any()
+    """Return what the adapter emulates, and the engine as it comes has nothing of."""
+    dynamics_of_tendons = (
+        raw.tendon_stiffness,
+        raw.tendon_damping,
+        raw.tendon_limited,
+        raw.tendon_frictionloss,
+        raw.tendon_armature,
+    )
     features = {
         "equality constraint": raw.eq_active0.any(),
-        "tendon": tendons or raw.tendon_frictionloss.any() or raw.tendon_armature.any(),
+        "tendon": any(array.any() for array in dynamics_of_tendons),
         "actuator transmission": raw.actuator_trntype.any(),
         "actuator dynamics": raw.na,
         "gravity compensation": raw.ngravcomp,
@@ -92,37 +98,45 @@ def _of_the_law(raw: mujoco.MjModel) -> list[tuple[str, str]]:
     return [(name, "the engine as it comes has none") for name, has in features.items() if has]
 
 
-# A kind of element, what it may have, which ones have it (a mask), and how that is said.
-Rows = list[tuple[str, str, Any, str]]
+class UnsupportedPart(NamedTuple):
+    """What elements of a model may have, and this backend has no counterpart for.
+
+    Attributes:
+        kind: Of the elements, as "joint".
+        feature: What they may have.
+        which: Which of them have it: a mask of all elements of that kind.
+        says: What a message says of one that has it.
+    """
+
+    kind: str
+    feature: str
+    which: NDArray[np.bool_]
+    says: str
 
 
-def _of_joints(raw: mujoco.MjModel) -> Rows:
+def _of_joints(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
     free = raw.jnt_type == _FREE
     span = raw.jnt_range[:, 1] - raw.jnt_range[:, 0]
-    features = {
-        "compensation of gravity by actuators": raw.jnt_actgravcomp.astype(bool),
-        "ball joint": raw.jnt_type == _BALL,
-        "stiffness of a free joint": free & (raw.jnt_stiffness != 0),
-        "nonlinear spring": raw.jnt_stiffnesspoly.any(axis=1),
-        "nonlinear damping": raw.dof_dampingpoly[raw.jnt_dofadr].any(axis=1),
-        "two limits at once": (raw.jnt_limited > 0) & (span < 2 * raw.jnt_margin),
-    }
-    return [("joint", feature, which, "has it") for feature, which in features.items()]
+    part = partial(UnsupportedPart, "joint", says="has it")
+    yield part("compensation of gravity by actuators", raw.jnt_actgravcomp.astype(bool))
+    yield part("ball joint", raw.jnt_type == _BALL)
+    yield part("stiffness of a free joint", free & (raw.jnt_stiffness != 0))
+    yield part("nonlinear spring", raw.jnt_stiffnesspoly.any(axis=1))
+    yield part("nonlinear damping", raw.dof_dampingpoly[raw.jnt_dofadr].any(axis=1))
+    yield part("two limits at once", (raw.jnt_limited > 0) & (span < 2 * raw.jnt_margin))
 
 
-def _of_bodies(plan: Plan) -> Rows:
+def _of_bodies(plan: Plan) -> Iterator[UnsupportedPart]:
     large = np.zeros(plan.raw.nbody, dtype=bool)
     for root in roots(plan.raw):
         large[root] = plan.links(root) > MOST_LINKS
     much = f"has more than {MOST_LINKS} joints and rigid parts"
     led = (plan.raw.body_mocapid[plan.raw.body_rootid] >= 0) & (plan.raw.body_jntnum > 0)
-    return [
-        ("body", "a tree of so many parts", large, much),
-        ("body", "a joint on a mocap body", led, "has it"),
-    ]
+    yield UnsupportedPart("body", "a tree of so many parts", large, much)
+    yield UnsupportedPart("body", "a joint on a mocap body", led, "has it")
 
 
-def _of_actuators(raw: mujoco.MjModel) -> Rows:
+def _of_actuators(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
     own = (raw.actuator_armature != 0) | (raw.actuator_damping != 0)
     own |= raw.actuator_dampingpoly.any(axis=1)
     used, joints = in_force(raw) & ~_sticks(raw), raw.actuator_trnid[:, 0]
@@ -142,24 +156,18 @@ def _of_actuators(raw: mujoco.MjModel) -> Rows:
     )
     straight = np.where(of_muscles.any(axis=0), of_muscles.all(axis=0), straight)
     stateful = ~np.isin(raw.actuator_dyntype, [int(mujoco.mjtDyn.mjDYN_NONE), *DYNAMICS])
-    name, says = "actuator", "has it: give it to the joint"
-    return [
-        (name, "actuator armature or damping", own, says),
-        (name, "actuator transmission", used & ~(on_joint | on_tendon), "does not drive a joint"),
-        (name, "actuator of a free joint", used & turning, "is one"),
-        (
-            name,
-            "actuator dynamics",
-            used & stateful,
-            "has a state of its own",
-        ),
-        (name, "interpolated latency", used & between, "acts between two commands"),
-        (name, "actuator gain", used & ~straight, "has one that is not constant"),
-    ]
+    elsewhere = used & ~(on_joint | on_tendon)
+    part = partial(UnsupportedPart, "actuator")
+    yield part("actuator armature or damping", own, "has it: give it to the joint")
+    yield part("actuator transmission", elsewhere, "does not drive a joint")
+    yield part("actuator of a free joint", used & turning, "is one")
+    yield part("actuator dynamics", used & stateful, "has a state of its own")
+    yield part("interpolated latency", used & between, "acts between two commands")
+    yield part("actuator gain", used & ~straight, "has one that is not constant")
 
 
-def _of_ties(raw: mujoco.MjModel) -> Rows:
-    """Tendons and equality constraints: what goes through space, and what ties two trees."""
+def _of_ties(raw: mujoco.MjModel) -> Iterator[UnsupportedPart]:
+    """Yield what of tendons goes through space, and what of equalities ties two trees."""
     heavy, several = np.zeros((2, raw.ntendon), dtype=bool)
     for tendon in range(raw.ntendon):
         heavy[tendon] = raw.tendon_armature[tendon] and not len(linear_sum(raw, tendon)[0])
@@ -170,31 +178,29 @@ def _of_ties(raw: mujoco.MjModel) -> Rows:
         bodies = ends_of(raw, eq)
         strange[eq] = not bodies
         apart[eq] = len({int(raw.body_rootid[b]) for b in bodies if raw.body_treeid[b] >= 0}) > 1
-    return [
-        ("tendon", "armature of a spatial tendon", heavy, "has it"),
-        ("tendon", "tendon between trees", several, "is of joints of several trees"),
-        ("tendon", "nonlinear tendon", poly, "has a spring or damper that is not linear"),
-        ("tendon", "force range of a tendon", raw.tendon_actfrclimited.astype(bool), "has one"),
-        ("equality", "equality constraint", strange, "is of a kind that is not known here"),
-        ("equality", "equality between trees", apart, "ties two trees of bodies"),
-    ]
+    ranged = raw.tendon_actfrclimited.astype(bool)
+    tendon, equality = partial(UnsupportedPart, "tendon"), partial(UnsupportedPart, "equality")
+    yield tendon("armature of a spatial tendon", heavy, "has it")
+    yield tendon("tendon between trees", several, "is of joints of several trees")
+    yield tendon("nonlinear tendon", poly, "has a spring or damper that is not linear")
+    yield tendon("force range of a tendon", ranged, "has one")
+    yield equality("equality constraint", strange, "is of a kind that is not known here")
+    yield equality("equality between trees", apart, "ties two trees of bodies")
 
 
-def _of_geoms(plan: Plan) -> Rows:
+def _of_geoms(plan: Plan) -> Iterator[UnsupportedPart]:
     raw, touching = plan.raw, plan.surfaces.touching
     wet = bool(raw.opt.density or raw.opt.viscosity) & (raw.geom_fluid[:, 0] > 0)
     strange = touching & ~np.isin(raw.geom_type, _SOLIDS)
     bodies = raw.geom_bodyid
     moved = (raw.body_treeid[bodies] >= 0) | (raw.body_mocapid[raw.body_rootid[bodies]] >= 0)
     planes = touching & (raw.geom_type == PLANE) & moved
-    rows = [
-        ("geom", "plane on a body", planes, "is on one that moves"),
-        ("geom", "fluid around an ellipsoid", wet, "has it"),
-    ]
+    yield UnsupportedPart("geom", "plane on a body", planes, "is on one that moves")
+    yield UnsupportedPart("geom", "fluid around an ellipsoid", wet, "has it")
     for kind in np.unique(raw.geom_type[strange]).tolist():
         says = f"is a {mujoco.mjtGeom(kind).name[7:].lower()}"
-        rows.append(("geom", "shape of a geom", strange & (raw.geom_type == kind), says))
-    return rows
+        which = strange & (raw.geom_type == kind)
+        yield UnsupportedPart("geom", "shape of a geom", which, says)
 
 
 def ignored(plan: Plan) -> list[str]:
@@ -205,7 +211,6 @@ def ignored(plan: Plan) -> list[str]:
         for name in ("OVERRIDE", "SLEEP", "DIAGEXACT")
     }
     touches = not raw.opt.disableflags & NO_CONTACT
-    slide, _, roll = np.split(raw.pair_friction, [2, 3], axis=1)
     integrator = {
         int(mujoco.mjtIntegrator.mjINT_IMPLICIT): "implicit acts as implicitfast",
         int(mujoco.mjtIntegrator.mjINT_RK4): "RK4 acts as Euler",
@@ -218,18 +223,9 @@ def ignored(plan: Plan) -> list[str]:
         "sleep": enabled["SLEEP"],
         "diagexact": enabled["DIAGEXACT"],
         "springyield of a tendon": raw.tendon_springyield.any(),
-        "adhesion": touches and (raw.geom_adhesion.any() or raw.pair_adhesion.any()),
-        "an actuator of adhesion": touches and (_sticks(raw) & in_force(raw)).any(),
-        "the margin of a pair": touches and raw.pair_margin.any(),
-        "the second friction of a pair": touches and np.ptp(slide, axis=1).any(),
-        "the second rolling friction of a pair": touches and np.ptp(roll, axis=1).any(),
-        "solref, solimp or solreffriction of a pair": touches
-        and (
-            (raw.pair_solref != _SOLREF).any()
-            or (raw.pair_solimp != _SOLIMP).any()
-            or raw.pair_solreffriction.any()
-        ),
     }
+    if touches:
+        settings |= _contact_settings(raw)
     sentences += [f"{what} has no effect" for what, there in settings.items() if there]
     if raw.jnt_springyield.any():
         sentences.append(f"springyield has no effect ({_list(raw, 'joint', raw.jnt_springyield)})")
@@ -249,6 +245,20 @@ def ignored(plan: Plan) -> list[str]:
             sentences.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
         sentences += _bounces(plan)
     return sentences
+
+
+def _contact_settings(raw: mujoco.MjModel) -> dict[str, np.bool_]:
+    """Return settings of contacts that have no counterpart, and whether a model has them."""
+    slide, _, roll = np.split(raw.pair_friction, [2, 3], axis=1)
+    softness = (raw.pair_solref != _SOLREF).any() or (raw.pair_solimp != _SOLIMP).any()
+    softness = softness or raw.pair_solreffriction.any()
+    settings = {"adhesion": raw.geom_adhesion.any() or raw.pair_adhesion.any()}
+    settings["an actuator of adhesion"] = (_sticks(raw) & in_force(raw)).any()
+    settings["the margin of a pair"] = raw.pair_margin.any()
+    settings["the second friction of a pair"] = np.ptp(slide, axis=1).any()
+    settings["the second rolling friction of a pair"] = np.ptp(roll, axis=1).any()
+    settings["solref, solimp or solreffriction of a pair"] = softness
+    return settings
 
 
 def as_targets(plan: Plan) -> list[str]:

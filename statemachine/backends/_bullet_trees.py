@@ -41,11 +41,11 @@ class Tree:
         indices = {info[12].decode(): info[0] for info in infos}
         bodies = urdf.tree(raw, root)
         self.links = {b: indices.get(names.links[b], -1) for b in bodies}
-        self.parts = {
-            (solid.body, solid.part): indices.get(names.part(solid.body, solid.part)[0], -1)
-            for solid in plan.surfaces.solids
-            if solid.part and solid.body in self.links
-        }
+        self.parts: dict[tuple[int, int], int] = {}
+        for solid in plan.surfaces.solids:
+            if solid.part and solid.body in self.links:
+                link, *_ = names.part(solid.body, solid.part)
+                self.parts[solid.body, solid.part] = indices.get(link, -1)
         sites = [
             s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
         ]

@@ -302,18 +302,10 @@ def _joints(
         if joint != joints[-1]:
             child = names.between[joint]
             yield _bare_link(child, *_padding(raw, joint, dialect))
-        slide = raw.jnt_type[joint] == int(JointType.SLIDE)
-        limited = bool(raw.jnt_limited[joint]) and dialect.dynamics
-        kind = "prismatic" if slide else "revolute" if limited else "continuous"
-        # A slide must have a range; PyBullet takes one that is the wrong way round for none.
-        low, high = (
-            raw.jnt_range[joint]
-            if limited
-            else (-UNLIMITED, UNLIMITED)
-            if dialect.dynamics
-            else (1, -1)
-        )
-        bounds = {} if kind == "continuous" else {"lower": low, "upper": high}
+        kind = _kind(raw, joint, dialect)
+        bounds: dict[str, float] = {}
+        if kind != "continuous":
+            bounds["lower"], bounds["upper"] = _bounds(raw, joint, dialect)
         dof = int(raw.jnt_dofadr[joint])
         extra = [
             _element("axis", xyz=raw.jnt_axis[joint]),
@@ -327,6 +319,27 @@ def _joints(
         if joint != joints[-1]:
             parent, turn = child, np.eye(3)
             place = raw.jnt_pos[joint + 1] - raw.jnt_pos[joint]
+
+
+def _is_limited(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> bool:
+    return bool(raw.jnt_limited[joint]) and dialect.dynamics
+
+
+def _kind(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> str:
+    """Return the type of a joint in a URDF."""
+    if raw.jnt_type[joint] == int(JointType.SLIDE):
+        return "prismatic"
+    return "revolute" if _is_limited(raw, joint, dialect) else "continuous"
+
+
+def _bounds(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, float]:
+    """Return the range of a joint that must have one in a URDF, as a slide must."""
+    if _is_limited(raw, joint, dialect):
+        low, high = raw.jnt_range[joint]
+        return low, high
+    if dialect.dynamics:
+        return -UNLIMITED, UNLIMITED
+    return 1, -1  # the wrong way round, which PyBullet takes for none
 
 
 def _at_zero(raw: mujoco.MjModel, joint: int, place: Array, turn: Array) -> tuple[Array, Array]:
@@ -353,14 +366,12 @@ def _joint(
 
 def _effort(raw: mujoco.MjModel, joint: int) -> float:
     """The largest force of the actuators on a joint; UNLIMITED where nothing limits it."""
-    forces = [
-        np.abs(raw.actuator_forcerange[a]).max()
-        for a in range(raw.nactuator)
-        if raw.actuator_trntype[a] == int(mujoco.mjtTrn.mjTRN_JOINT)
-        and raw.actuator_trnid[a, 0] == joint
-        and raw.actuator_forcelimited[a]
-    ]
-    return float(max(forces, default=UNLIMITED))
+    on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    drives = on_joint & (raw.actuator_trnid[:, 0] == joint)
+    limited = drives & raw.actuator_forcelimited.astype(bool)
+    if not limited.any():
+        return UNLIMITED
+    return float(np.abs(raw.actuator_forcerange[limited]).max())
 
 
 def _tip(raw: mujoco.MjModel, site: int, names: Names) -> Iterator[Element]:

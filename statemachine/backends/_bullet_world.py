@@ -79,35 +79,17 @@ class World:
         self._led = b""  # what `lead` was told last
         self._planes: dict[int, int] = {}  # PyBullet's body of each plane
         self._of_file: FileTree | None = None
-        if kind == "engine" and plan.file:
-            self._of_file = FileTree(plan, plan.file.load(self.client), self.client)
-            self.trees.append(self._of_file)
-        else:
-            for root in (0, *urdf.roots(raw)):
-                if plan.driven(root) or kind != "ghost":
-                    self._load(root, kind)
-        self._frames = {  # of free bodies: the inertial frame in the body's own
-            tree.body: pb.getDynamicsInfo(tree.body, -1, self.client)[3:5]
-            for tree in self.trees
-            if tree.free
-        }
-        if self._of_file and self._of_file.carrier >= 0:
-            self._frames[self._of_file.body] = self._base_of_file(self._of_file)
+        self._load_trees(kind)
+        self._frames = self._inertial_frames()
         # The axes of each body in those of its inertia, which armature turns in what is stepped.
         self._inward = raw.body_iquat * INVERSE
-        for body, link, b in self.links() if kind == "stepped" else ():
-            axes = pb.getDynamicsInfo(body, link, self.client)[4]
-            self._inward[b] = wxyz_from_xyzw(np.array(axes)) * INVERSE
+        if kind == "stepped":
+            for body, link, b in self.links():
+                axes = pb.getDynamicsInfo(body, link, self.client)[4]
+                self._inward[b] = wxyz_from_xyzw(np.array(axes)) * INVERSE
         # Of their bases: what of T is constant, see `_base_axes`, and the body's axes in the frame.
-        self._changes: dict[int, tuple[Array, Array]] = {}
+        self._changes = {body: _base_change(*frame) for body, frame in self._frames.items()}
         self._known_base: Any = (None, None, None)
-        for body, (centre, axes) in self._frames.items():
-            inward = matrix_from_quat(wxyz_from_xyzw(np.array(axes))).T.copy()
-            # Times w: w × centre.
-            lever = np.array(np.cross(np.eye(3), centre).T, dtype=np.float64, order="C")
-            change = np.zeros((6, 6))
-            change[:3, 3:], change[3:, 3:] = inward, dense.product(inward, lever)
-            self._changes[body] = change, inward
         # Where a base stands that PyBullet does not move, though it has a free joint.
         self._stands: Array | None = None
         self._last: dict[int, Quat] = dict.fromkeys(self._frames, (0.0, 0.0, 0.0, 1.0))
@@ -116,11 +98,37 @@ class World:
             for tree in self.trees:
                 if tree.driven:
                     zero = [0.0] * len(tree.dofs)
-                    pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] * tree.free
+                    pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] if tree.free else []
                     self.needed(tree, [*pose, *zero[tree.base :]], zero, zero)
-        if kind == "ghost":
+        if kind != "ghost":
+            pb.setTimeStep(raw.opt.timestep, self.client)
+            self._add_contacts(kind)
+
+    def _load_trees(self, kind: Literal["stepped", "ghost", "engine"]) -> None:
+        """Load the robot as its file has it, or what was written of each tree."""
+        plan = self._plan
+        if kind == "engine" and plan.file:
+            self._of_file = FileTree(plan, plan.file.load(self.client), self.client)
+            self.trees.append(self._of_file)
             return
-        pb.setTimeStep(raw.opt.timestep, self.client)
+        for root in (0, *urdf.roots(self._raw)):
+            if plan.driven(root) or kind != "ghost":
+                self._load(root, kind)
+
+    def _inertial_frames(self) -> dict[int, Any]:
+        """Return of each free body the inertial frame in the body's own: place and quaternion."""
+        frames = {
+            tree.body: pb.getDynamicsInfo(tree.body, -1, self.client)[3:5]
+            for tree in self.trees
+            if tree.free
+        }
+        if self._of_file and self._of_file.carrier >= 0:
+            frames[self._of_file.body] = self._base_of_file(self._of_file)
+        return frames
+
+    def _add_contacts(self, kind: Literal["stepped", "engine"]) -> None:
+        """Add planes, and settle what can touch what, and how."""
+        raw, plan = self._raw, self._plan
         self._add_planes()
         self.geoms_of_links = {
             (body, link): (solid.body, solid.geoms) for body, link, solid in self.solids()
@@ -137,10 +145,8 @@ class World:
                 deterministicOverlappingPairs=1, physicsClientId=self.client
             )
             self._take_surfaces()
-        self._homes = [
-            (body, pb.getBasePositionAndOrientation(body, self.client))
-            for body in (*(tree.body for tree in self.trees), *self._planes.values())
-        ]
+        bodies = [tree.body for tree in self.trees] + list(self._planes.values())
+        self._homes = [(b, pb.getBasePositionAndOrientation(b, self.client)) for b in bodies]
 
     @property
     def stands(self) -> bool:
@@ -372,12 +378,10 @@ class World:
             if tree.free:
                 self._put_free(tree, qpos, qvel)
             if tree.joints:
+                positions = qpos[tree.qpos][-len(tree.joints) :, None].tolist()
+                velocities = qvel[tree.qvel][-len(tree.joints) :, None].tolist()
                 pb.resetJointStatesMultiDof(
-                    tree.body,
-                    tree.joints,
-                    [[q] for q in qpos[tree.qpos][-len(tree.joints) :].tolist()],
-                    [[v] for v in qvel[tree.qvel][-len(tree.joints) :].tolist()],
-                    physicsClientId=self.client,
+                    tree.body, tree.joints, positions, velocities, physicsClientId=self.client
                 )
 
     def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
@@ -429,7 +433,9 @@ class World:
             rx, ry, rz = turned(quat, centre)
             wx, wy, wz = spin
             px, py, pz = px - rx, py - ry, pz - rz
-            vx, vy, vz = vx - wy * rz + wz * ry, vy - wz * rx + wx * rz, vz - wx * ry + wy * rx
+            vx = vx - wy * rz + wz * ry
+            vy = vy - wz * rx + wx * rz
+            vz = vz - wx * ry + wy * rx
         x, y, z, w = quat
         spin = turned((-x, -y, -z, w), spin)
         return [px, py, pz, w, x, y, z], [vx, vy, vz, *spin]
@@ -489,16 +495,14 @@ class World:
             spin = np.array(v[3:6])
             swing = np.cross(rate[3:6], centre) + np.cross(spin, np.cross(spin, centre))
             lift = np.add(lift, turned(own, swing.tolist())).tolist()
+        place = [*_ORIGIN, *q[7:]]
+        velocity = [*turned(inward, v[3:6]), 0.0, 0.0, 0.0, *v[6:]]
+        acceleration = [*turned(inward, rate[3:6]), *turned(back, lift), *rate[6:]]
         with HiddenWorld.lock:  # gravity is all trees' of a client
             try:
                 pb.setGravity(*turned(back, self._gravity), self.client)
                 force = pb.calculateInverseDynamics(
-                    tree.body,
-                    [*_ORIGIN, *q[7:]],
-                    [*turned(inward, v[3:6]), 0.0, 0.0, 0.0, *v[6:]],
-                    [*turned(inward, rate[3:6]), *turned(back, lift), *rate[6:]],
-                    0,
-                    self.client,
+                    tree.body, place, velocity, acceleration, 0, self.client
                 )
             finally:
                 pb.setGravity(*self._gravity, self.client)
@@ -612,6 +616,21 @@ class World:
                 forces=force[tree.base :].tolist(),
                 physicsClientId=self.client,
             )
+
+
+def _base_change(centre: Any, axes: Any) -> tuple[Array, Array]:
+    """Return what of T is constant (6, 6), and the body's axes (3, 3) in the inertial frame.
+
+    Args:
+        centre: (3,) where the inertial frame is in the body's own.
+        axes: Its quaternion (x, y, z, w).
+    """
+    inward = matrix_from_quat(wxyz_from_xyzw(np.array(axes))).T.copy()
+    # Times w: w × centre.
+    lever = np.array(np.cross(np.eye(3), centre).T, dtype=np.float64, order="C")
+    change = np.zeros((6, 6))
+    change[:3, 3:], change[3:, 3:] = inward, dense.product(inward, lever)
+    return change, inward
 
 
 ENGINE_TIMESTEP = 1 / 240

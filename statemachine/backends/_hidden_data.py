@@ -369,7 +369,7 @@ class HiddenData(Data):
 
 
 def _nothing(model: Model) -> dict[str, Any]:
-    """What a fresh Data says: zeros, and no contacts."""
+    """Return what a fresh Data says: zeros, and no contacts."""
     shapes = {
         "xpos": (model.nbody, 3),
         "xquat": (model.nbody, 4),
@@ -377,12 +377,11 @@ def _nothing(model: Model) -> dict[str, Any]:
         "site_xmat": (model.nsite, 9),
     }
     values: dict[str, Any] = {name: np.zeros(shapes.get(name, (model.nv,))) for name in DERIVED}
-    values["contacts"] = Contacts(
-        geom=np.zeros((0, 2), dtype=np.int64),
-        dist=np.zeros(0),
-        pos=np.zeros((0, 3)),
-        frame=np.zeros((0, 3, 3)),
-        force=np.zeros((0, 3)),
-        torque=np.zeros((0, 3)),
-    )
+    values["contacts"] = _no_contacts()
     return values
+
+
+def _no_contacts() -> Contacts:
+    geom, vectors = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3))
+    frame = np.zeros((0, 3, 3))
+    return Contacts(geom, np.zeros(0), vectors, frame, force=vectors, torque=vectors)

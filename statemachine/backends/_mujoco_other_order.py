@@ -21,23 +21,22 @@ Pairs = Sequence[tuple[int, int]]  # of ids: in the model that shows, in the oth
 # Arrays of an MjData whose rows are of elements of one kind, besides the inputs.
 _ROWS = {
     "body": (
-        *("xpos", "xquat", "xmat", "xipos", "ximat", "cvel", "cacc", "cinert", "crb"),
-        *("cfrc_int", "cfrc_ext", "subtree_com", "subtree_linvel", "subtree_angmom"),
-        "xfrc_applied",
+        "xpos", "xquat", "xmat", "xipos", "ximat", "cvel", "cacc", "cinert", "crb", "cfrc_int",
+        "cfrc_ext", "subtree_com", "subtree_linvel", "subtree_angmom", "xfrc_applied",
     ),
     "joint": ("xanchor", "xaxis"),
     "geom": ("geom_xpos", "geom_xmat"),
     "site": ("site_xpos", "site_xmat"),
     "dof": (
-        *("qacc", "qacc_smooth", "qacc_warmstart", "cdof", "cdof_dot"),
-        *("qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint", "qfrc_applied"),
-        *("qfrc_spring", "qfrc_damper", "qfrc_gravcomp", "qfrc_fluid", "qfrc_smooth"),
+        "qacc", "qacc_smooth", "qacc_warmstart", "cdof", "cdof_dot", "qfrc_bias", "qfrc_actuator",
+        "qfrc_passive", "qfrc_constraint", "qfrc_applied", "qfrc_spring", "qfrc_damper",
+        "qfrc_gravcomp", "qfrc_fluid", "qfrc_smooth",
     ),
     "sensordata": ("sensordata",),
     "actuator": ("actuator_length", "actuator_velocity", "actuator_force"),
     "tendon": ("ten_length", "ten_velocity"),
     "act": ("act", "act_dot"),
-}
+}  # fmt: skip
 _OF_BODIES, _OF_SITES = ("xpos", "xquat"), ("site_xpos", "site_xmat")
 
 
@@ -143,10 +142,10 @@ class DataInOtherOrder(MujocoData):
         return shown
 
     def _contacts_of(self, contacts: Contacts) -> Contacts:
-        """The contacts of another model; -1 for a geom that has no counterpart."""
+        """Return the contacts of another model; -1 for a geom that has no counterpart."""
         ours, theirs = self._elements["geom"]
         known = dict(zip(theirs.tolist(), ours.tolist(), strict=True))
-        geoms = [[known.get(geom, -1) for geom in pair] for pair in contacts.geom.tolist()]
+        geoms = [known.get(geom, -1) for geom in contacts.geom.ravel().tolist()]
         return Contacts(
             geom=np.array(geoms, dtype=np.int64).reshape(-1, 2),
             dist=contacts.dist,

@@ -180,12 +180,11 @@ class MujocoWorlds(Worlds):
         fatal = worlds[(counts[worlds][:, list(FATAL.values())] > 0).any(axis=1)]
         errors = self._causes(fatal, count)
         # MuJoCo says a thing only the first time after a reset, and so do we.
-        texts = {
-            mujoco.mju_warningText(kind, int(self._warned[world, kind, 0])): None
-            for world in np.setdiff1d(worlds, fatal).tolist()
-            for kind in np.flatnonzero(counts[world] == self._warned[world, :, 1]).tolist()
-            if counts[world, kind]
-        }
+        texts: dict[str, None] = {}
+        for world in np.setdiff1d(worlds, fatal).tolist():
+            first = (counts[world] == self._warned[world, :, 1]) & (counts[world] != 0)
+            for kind in np.flatnonzero(first).tolist():
+                texts[mujoco.mju_warningText(kind, int(self._warned[world, kind, 0]))] = None
         self._told[:] = self._warned
         pass_on(list(texts), stacklevel=7)
         return errors

@@ -107,18 +107,15 @@ class Simulation:
 
 
 def contact_arrays(model, data):
-    """Arrays of the contacts, by name; the forces are along the axes of each."""
+    """Return arrays of the contacts, by name; the forces are along the axes of each."""
     listed, force = data.contact, np.zeros((data.ncon, 6))
     for k in range(data.ncon):
         mujoco.mj_contactForce(model, data, k, force[k])
-    return {
-        "geom": np.array(listed.geom, dtype=np.int64).reshape(-1, 2),
-        "dist": np.array(listed.dist),
-        "pos": np.array(listed.pos).reshape(-1, 3),
-        "frame": np.array(listed.frame).reshape(-1, 3, 3),
-        "force": force[:, :3],
-        "torque": force[:, 3:],
-    }
+    arrays = {"dist": np.array(listed.dist), "force": force[:, :3], "torque": force[:, 3:]}
+    arrays["geom"] = np.array(listed.geom, dtype=np.int64).reshape(-1, 2)
+    arrays["pos"] = np.array(listed.pos).reshape(-1, 3)
+    arrays["frame"] = np.array(listed.frame).reshape(-1, 3, 3)
+    return arrays
 
 
 def constraint_part(model, data, part):
@@ -165,7 +162,8 @@ def edit(model, edits, flags):
         holder, field = held(model, name)
         kinds = KINDS[field[: -len("flags")]].__members__
         merged = {old for old, new in SPLIT.items() if old in kinds and set(new) <= set(wanted)}
-        unknown = [f for f in wanted if f not in kinds and not any(f in SPLIT[o] for o in merged)]
+        parts = {part for old in merged for part in SPLIT[old]}  # which are one flag here
+        unknown = [flag for flag in wanted if flag not in kinds and flag not in parts]
         if unknown:
             raise ValueError("it has no flag " + ", ".join(unknown))
         setattr(holder, field, sum(int(kinds[f]) for f in kinds if f in merged.union(wanted)))

@@ -214,16 +214,22 @@ def _problems(raw: mujoco.MjModel) -> Iterator[str]:
         if not name.startswith("_") and not np.isfinite(value).all():
             yield f"{name} of the options is {value}"
     for name in sorted(dir(raw), key=lambda name: name[-1:] == "0"):  # what follows, last
-        array = getattr(raw, name) if not name.startswith("_") and name not in _FREE_USE else None
-        if not isinstance(array, np.ndarray) or array.dtype.kind != "f":
+        if name.startswith("_") or name in _FREE_USE:
             continue
-        yield from _first(raw, name, np.isnan(array), "is NaN")
-        if "range" not in name:  # only a range may be without an end
-            yield from _first(raw, name, np.isinf(array), "is infinite")
-        if name in _NEVER_NEGATIVE:
-            yield from _first(raw, name, array < 0, "is negative")
-        if name == "jnt_axis" or name.endswith("_quat"):  # of a length that overflowed
-            yield from _first(raw, name, ~array.any(axis=-1), "has no direction")
+        array = getattr(raw, name)
+        if isinstance(array, np.ndarray) and array.dtype.kind == "f":
+            yield from _array_problems(raw, name, array)
+
+
+def _array_problems(raw: mujoco.MjModel, name: str, array: Array) -> Iterator[str]:
+    """Yield what of an array of a compiled model is not a number, or cannot be what it is."""
+    yield from _first(raw, name, np.isnan(array), "is NaN")
+    if "range" not in name:  # only a range may be without an end
+        yield from _first(raw, name, np.isinf(array), "is infinite")
+    if name in _NEVER_NEGATIVE:
+        yield from _first(raw, name, array < 0, "is negative")
+    if name == "jnt_axis" or name.endswith("_quat"):  # of a length that overflowed
+        yield from _first(raw, name, ~array.any(axis=-1), "has no direction")
 
 
 def _doubtful(raw: mujoco.MjModel) -> Iterator[str]:
@@ -314,53 +320,55 @@ _NAMED = {"body": "nbody", "joint": "njnt", "site": "nsite", "geom": "ngeom"}
 
 
 def facts(m: mujoco.MjModel) -> dict[str, Any]:
-    """What `Model.__init__` wants of a compiled model; see there for shapes and units.
+    """Return what `Model.__init__` wants of a compiled model; see there for shapes and units.
 
     A backend adds `backend`, `engine_version`, `path`, `raw`, `capabilities`, `timestep` and
     `substeps`.
     """
+    known: dict[str, Any] = {name: getattr(m, name) for name in _PLAIN}
+    known |= {name: getattr(m, name).astype(np.int64) for name in _WHOLE}
+    known |= {f"{kind}_names": _names(m, kind, getattr(m, count)) for kind, count in _NAMED.items()}
+    known |= _actuator_facts(m)
+    known["_clamps"] = not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
+    known["gravity"] = gravity(m)
+    known["jnt_limited"] = m.jnt_limited.astype(bool)
+    known["keyframes"] = tuple(_keyframe(m, key) for key in range(m.nkey))
+    known["mocap_pos0"] = m.body_pos[m.body_mocapid >= 0]
+    known["mocap_quat0"] = m.body_quat[m.body_mocapid >= 0]
+    return known
+
+
+def _names(m: mujoco.MjModel, kind: str, count: int) -> tuple[str, ...]:
+    """Return the names of all elements of a kind, "" for one without a name."""
+    return tuple(getattr(m, kind)(k).name for k in range(count))
+
+
+def _actuator_facts(m: mujoco.MjModel) -> dict[str, Any]:
+    """Return what a Model tells of its actuators."""
     owner, servo = servos(m)
     on_joint = (m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))[owner]
     gain, bias = m.actuator_gainprm[owner, 0], m.actuator_biasprm[owner]
     fixed = (m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))[owner]
     unbiased = (m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))[owner]
     direct = (m.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_NONE))[owner]
-    return {
-        "gravity": gravity(m),
-        **{name: getattr(m, name) for name in _PLAIN},
-        **{name: getattr(m, name).astype(np.int64) for name in _WHOLE},
-        **{
-            f"{kind}_names": tuple(getattr(m, kind)(k).name for k in range(getattr(m, count)))
-            for kind, count in _NAMED.items()
-        },
-        "actuator_names": tuple(control_names(m)),
-        "jnt_limited": m.jnt_limited.astype(bool),
-        "actuator_jntid": np.where(on_joint, m.actuator_trnid[owner, 0], -1).astype(np.int64),
-        "actuator_ctrlrange": _ranges(m.actuator_ctrlrange, m.actuator_ctrllimited),
-        "_clamps": not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL),
-        "actuator_forcerange": _ranges(
-            m.actuator_forcerange[owner], m.actuator_forcelimited[owner]
-        ),
-        "actuator_kp": np.where(servo, gain, np.nan),
-        "actuator_kv": np.where(servo, -bias[:, 2], np.nan),
-        "actuator_gain": np.where(fixed & unbiased & direct, gain, np.nan),
-        "actuator_delay": delay_steps(m) * m.opt.timestep,
-        "actuator_gear": m.actuator_gear[m.actuator_outadr[owner], 0],
-        "mocap_pos0": m.body_pos[m.body_mocapid >= 0],
-        "mocap_quat0": m.body_quat[m.body_mocapid >= 0],
-        "keyframes": tuple(
-            Keyframe(
-                m.key(i).name,
-                float(m.key_time[i]),
-                m.key_qpos[i],
-                m.key_qvel[i],
-                m.key_ctrl[i],
-                m.key_mpos[i].reshape(-1, 3),
-                m.key_mquat[i].reshape(-1, 4),
-            )
-            for i in range(m.nkey)
-        ),
-    }
+    joints = np.where(on_joint, m.actuator_trnid[owner, 0], -1)
+    force_limited = m.actuator_forcelimited[owner]
+    known: dict[str, Any] = {"actuator_names": tuple(control_names(m))}
+    known["actuator_jntid"] = joints.astype(np.int64)
+    known["actuator_ctrlrange"] = _ranges(m.actuator_ctrlrange, m.actuator_ctrllimited)
+    known["actuator_forcerange"] = _ranges(m.actuator_forcerange[owner], force_limited)
+    known["actuator_kp"] = np.where(servo, gain, np.nan)
+    known["actuator_kv"] = np.where(servo, -bias[:, 2], np.nan)
+    known["actuator_gain"] = np.where(fixed & unbiased & direct, gain, np.nan)
+    known["actuator_delay"] = delay_steps(m) * m.opt.timestep
+    known["actuator_gear"] = m.actuator_gear[m.actuator_outadr[owner], 0]
+    return known
+
+
+def _keyframe(m: mujoco.MjModel, key: int) -> Keyframe:
+    name, time = m.key(key).name, float(m.key_time[key])
+    places, turns = m.key_mpos[key].reshape(-1, 3), m.key_mquat[key].reshape(-1, 4)
+    return Keyframe(name, time, m.key_qpos[key], m.key_qvel[key], m.key_ctrl[key], places, turns)
 
 
 def _ranges(ranges: Array, limited: Any) -> Array:

@@ -95,13 +95,19 @@ def capabilities(raw: mujoco.MjModel) -> Capabilities:
 
 
 _DISABLE = mujoco.mjtDisableBit
+_INTEGRATION = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+def _is_component(bits: int) -> bool:
+    """Tell whether these are the bits of a single component of the integration state."""
+    return bits.bit_count() == 1 and bool(bits & _INTEGRATION)
+
+
 # Every single component of the integration state, in the engine's own order.
 _COMPONENTS = {
     name.removeprefix("mjSTATE_").lower(): bit
     for name, bit in mujoco.mjtState.__members__.items()
-    if name != "mjNSTATE"
-    and int(bit).bit_count() == 1
-    and int(bit) & int(mujoco.mjtState.mjSTATE_INTEGRATION)
+    if name != "mjNSTATE" and _is_component(int(bit))
 }
 
 
@@ -298,9 +304,7 @@ class MujocoData(Data):
     def _get_state(self) -> State:
         fingerprint, layout = self._layout
         vector = np.empty(sum(size for _, size in layout))
-        mujoco.mj_getState(
-            self._home.raw, self.raw, vector, int(mujoco.mjtState.mjSTATE_INTEGRATION)
-        )
+        mujoco.mj_getState(self._home.raw, self.raw, vector, _INTEGRATION)
         check_vector(vector, layout, self._home)
         return State("mujoco", mujoco.__version__, fingerprint, layout, vector.tobytes())
 
@@ -308,9 +312,7 @@ class MujocoData(Data):
         # A reset first: it clears the counters, without which a second divergence
         # would go unreported, and whatever else the last run left behind.
         mujoco.mj_resetData(self._home.raw, self.raw)
-        mujoco.mj_setState(
-            self._home.raw, self.raw, state.vector, int(mujoco.mjtState.mjSTATE_INTEGRATION)
-        )
+        mujoco.mj_setState(self._home.raw, self.raw, state.vector, _INTEGRATION)
         self._alarms.clear()
 
     def _set_time(self, time: float) -> None:

@@ -243,6 +243,17 @@ def _tell(plan: Plan, settings: list[str], stacklevel: int) -> None:
         warnings.warn(f"PyBullet: {differences}", EngineWarning, stacklevel=stacklevel)
 
 
+def _urdf_texts(plan: Plan, kind: str) -> dict[str, str]:
+    """Return the URDFs that PyBullet reads: by the root of each tree, or by the file's own name."""
+    if plan.file is not None:
+        return {plan.file.path.name: plan.file.content.decode(errors="replace")}
+    texts: dict[str, str] = {}
+    for root in (0, *urdf.roots(plan.raw)):
+        name = plan.raw.body(root).name or f"body {root}"
+        texts[name], _ = plan.described(root, kind)
+    return texts
+
+
 class PybulletModel(HiddenModel):
     """The description that every Data's world is made from.
 
@@ -272,23 +283,20 @@ class PybulletModel(HiddenModel):
         as_it_comes, raw = defaults == "engine", plan.raw
         bound = fastest(raw) if max_qvel is None else max_qvel
         kind: Literal["stepped", "engine"] = "engine" if as_it_comes else "stepped"
-        about = facts(raw)
+        capabilities = _capabilities(as_it_comes, bound, softness(plan))
+        known = facts(raw)
+        known["timestep"], known["substeps"] = float(raw.opt.timestep) * substeps, substeps
+        if as_it_comes:
+            known["_clamps"] = False
         super().__init__(
             partial(DrivenWorld, plan, kind, acts),
             backend="pybullet",
             engine_version=engine_version("pybullet"),
             path=path,
-            raw={
-                raw.body(b).name or f"body {b}": plan.described(b, kind)[0]
-                for b in (0, *urdf.roots(raw))
-            }
-            if plan.file is None
-            else {plan.file.path.name: plan.file.content.decode(errors="replace")},
-            capabilities=_capabilities(as_it_comes, bound, softness(plan)),
+            raw=_urdf_texts(plan, kind),
+            capabilities=capabilities,
             max_qvel=bound,
-            timestep=float(raw.opt.timestep) * substeps,
-            substeps=substeps,
-            **{**about, **({"_clamps": False} if as_it_comes else {})},
+            **known,
             plan=plan,
             defaults=defaults,
             acts=acts,

@@ -194,14 +194,11 @@ def _loaded(
         **digest: Of what was read in the file before.
     """
     spec = spec_with_packages(model.path)
-    return server.load(
-        spec.to_xml() if spec else "",
-        str(model.path.absolute()),
-        {name: value for name, value in edits.items() if name not in _FLAGS},
-        fields=[*_SAME, *_fields(model.raw)],
-        **digest,
-        flags={name: value for name, value in edits.items() if name in _FLAGS},
-    )
+    text, file = spec.to_xml() if spec else "", str(model.path.absolute())
+    numbers = {name: value for name, value in edits.items() if name not in _FLAGS}
+    flags = {name: value for name, value in edits.items() if name in _FLAGS}
+    fields = [*_SAME, *_fields(model.raw)]
+    return server.load(text, file, numbers, fields=fields, flags=flags, **digest)
 
 
 def _fields(raw: mujoco.MjModel, without: tuple[str, ...] = _UNSENT) -> Iterator[str]:
@@ -237,6 +234,15 @@ def _edits(reading: EngineReading, raw: mujoco.MjModel) -> dict[str, Any]:
     return edits
 
 
+def _taken_over(model: MujocoModel) -> dict[str, Any]:
+    """Return the facts that a Model of another engine has of the installed release's Model."""
+    known = facts(model.raw)
+    known["raw"], known["path"] = model.raw, model.path
+    known["timestep"], known["substeps"] = model.timestep, model.substeps
+    known["max_qvel"] = fastest(model.raw)
+    return known
+
+
 class ServedModel(HiddenModel):
     """What an engine in a Python of its own makes of a file, with what was edited in it."""
 
@@ -251,6 +257,7 @@ class ServedModel(HiddenModel):
         inner: MujocoModel | None = None,
     ) -> None:
         inner = reading.model if inner is None else inner
+        record = inner.capabilities if capabilities is None else capabilities
         engine = inner.replace(latency=0) if inner.actuator_delay.any() else inner
         opened = partial(_opened, reading, _edits(reading, engine.raw))
         timestep = float(inner.raw.opt.timestep)
@@ -258,16 +265,11 @@ class ServedModel(HiddenModel):
             partial(ServedWorld, reading.engine, opened, inner.raw, timestep),
             backend=reading.engine.name,
             engine_version=reading.version,
-            raw=inner.raw,
-            path=inner.path,
-            capabilities=capabilities or inner.capabilities,
-            timestep=inner.timestep,
-            substeps=inner.substeps,
-            max_qvel=fastest(inner.raw),
+            capabilities=record,
             _reading=reading,
             _inner=inner,
             _own=capabilities,
-            **facts(inner.raw),
+            **_taken_over(inner),
         )
 
     @property

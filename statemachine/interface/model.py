@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadInputError, ReadOnlyError, no_attribute, unknown_name
+from ..release_names import engine_of
 from .checks import TINY, index_of, unsupported, whole_number
 from .records import Array, Capabilities, Ints, JointType, Keyframe, Sizes, StateLayout, read_only
 
@@ -133,10 +134,11 @@ class Model(ABC):
         Model.__init__(self, **facts)  # a pickle forgets which arrays are read-only
 
     def __repr__(self) -> str:
+        version = self.engine_version.partition(" ")[0]
+        sizes = f"nq={self.nq} nv={self.nv} nu={self.nu}"
         return (
-            f"<Model {self.path.stem} on {self.backend.partition('==')[0]} "
-            f"{self.engine_version.partition(' ')[0]}: "
-            f"nq={self.nq} nv={self.nv} nu={self.nu}, {self.timestep:g} s a step>"
+            f"<Model {self.path.stem} on {engine_of(self.backend)} {version}: "
+            f"{sizes}, {self.timestep:g} s a step>"
         )
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import unknown_name
+from ..release_names import engine_of
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -127,22 +128,20 @@ class Capabilities:
     refused: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def __str__(self) -> str:
-        refused = {
-            reason: [name for name, why in self.refused.items() if why == reason]
-            for reason in self.refused.values()
-        }
+        names_by_reason: dict[str, list[str]] = {}
+        for name, reason in self.refused.items():
+            names_by_reason.setdefault(reason, []).append(name)
+        lines = [f"options of replace: {', '.join(self.options)}"]
+        for reason, names in names_by_reason.items():
+            lines.append(f"not {', '.join(names)}: {reason}")
+        lines.append(f"integrators: {', '.join(self.integrators) or 'as in the file'}")
         shared = "share the compiled model" if self.shared_model else "share its description only"
-        held = self.data_per_process
-        return "\n".join(
-            [
-                f"options of replace: {', '.join(self.options)}",
-                *(f"not {', '.join(names)}: {reason}" for reason, names in refused.items()),
-                f"integrators: {', '.join(self.integrators) or 'as in the file'}",
-                f"several Data of a Model {shared}",
-                *([] if held is None else [f"Data that one process can hold: {held}"]),
-                *(f"{name}: {kept.support}; {kept.note}" for name, kept in self.behaviours.items()),
-            ]
-        )
+        lines.append(f"several Data of a Model {shared}")
+        if self.data_per_process is not None:
+            lines.append(f"Data that one process can hold: {self.data_per_process}")
+        for name, behaviour in self.behaviours.items():
+            lines.append(f"{name}: {behaviour.support}; {behaviour.note}")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +224,7 @@ class State:
     def __repr__(self) -> str:
         parts = ", ".join(f"{name} {size}" for name, size in self.layout)
         return (
-            f"<State of {self.backend.partition('==')[0]} {self.engine_version} "
+            f"<State of {engine_of(self.backend)} {self.engine_version} "
             f"at {self.time:g} s: {parts}>"
         )
 

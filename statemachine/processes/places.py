@@ -150,11 +150,11 @@ def python_path(needed: Iterable[str]) -> list[str]:
     listed = [os.path.abspath(path) for path in os.environ.get("PYTHONPATH", "").split(os.pathsep)
               if path]  # fmt: skip
     names = list(needed)
-    return [
-        path
-        for path in dict.fromkeys(listed)
-        if path in packages or any(_is_module(PathFinder.find_spec(name, [path])) for name in names)
-    ]
+
+    def has_module(path: str) -> bool:
+        return any(_is_module(PathFinder.find_spec(name, [path])) for name in names)
+
+    return [path for path in dict.fromkeys(listed) if path in packages or has_module(path)]
 
 
 def _is_module(spec: ModuleSpec | None) -> bool:
