@@ -24,7 +24,6 @@ from statemachine.errors import (
 )
 from statemachine.interface import MOCAP
 from statemachine.lessons.hold import OLDER
-from statemachine.lessons.session import take
 from statemachine.release_names import is_release
 from statemachine.runs import (
     COLUMNS,
