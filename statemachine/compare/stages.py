@@ -69,13 +69,10 @@ class StageReader:
         self._dofs = dofs, _dofs(right, [b for _, b in matched.joints])[0]
         self._upper = np.triu_indices(len(names))
         frames = _frames(matched)
-        self.columns = [
-            StageColumn(KINEMATICS, frames, ["m"] * len(frames)),
-            StageColumn(KINEMATICS, frames, ["rad"] * len(frames)),
-            _mass_column(names, turns),
-            *(_force_column(stage, names, turns) for stage in ARRAYS),
-            _force_column(AFTER, names, turns),
-        ]
+        positions = StageColumn(KINEMATICS, frames, ["m"] * len(frames))
+        rotations = StageColumn(KINEMATICS, frames, ["rad"] * len(frames))
+        self.columns = [positions, rotations, _mass_column(names, turns)]
+        self.columns += [_force_column(stage, names, turns) for stage in (*ARRAYS, AFTER)]
         self._contact_names = _contact_names(matched)
 
     def prime(self, side: int, data: Data, before: dict[str, Array]) -> str:
