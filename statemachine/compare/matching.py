@@ -174,7 +174,7 @@ def match_models(left: Model, right: Model, names: Mapping[str, str] | None = No
         UnknownNameError: A name that was given is not there.
         BadInputError: A backend tells nothing of the bodies of its Model.
     """
-    given = dict(names or {})
+    given = {} if names is None else dict(names)
     robots = [_description(model) for model in (left, right)]
     for side, model in enumerate((left, right)):
         known = robots[side].names | {name for name in model.actuator_names if name}

@@ -170,7 +170,9 @@ def one_step(
         for k, state, before in _states(rerun, running, inputs, every):
             start = inputs["qpos"][k], inputs["qvel"][k]
             set_state(matched.left, left, state)
-            primed = _put(matched, reader, other, state, before) or primed
+            primed_now = _put(matched, reader, other, state, before)
+            if primed_now:
+                primed = primed_now
             try:
                 as_it_runs = reader.step(0, running, *start)
                 put_back = reader.step(0, left, *start)

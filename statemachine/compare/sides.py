@@ -188,9 +188,11 @@ def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side
 def _split_options(word: str) -> tuple[str, list[str]]:
     """A side's word, and the options behind it; a file's name may have spaces."""
     texts: list[str] = []
-    while not Path(word).exists() and (found := _LAST_OPTION.search(word)):
-        texts.insert(0, found[1])
-        word = word[: found.start()]
+    option = _LAST_OPTION.search(word)
+    while option is not None and not Path(word).exists():
+        texts.insert(0, option[1])
+        word = word[: option.start()]
+        option = _LAST_OPTION.search(word)
     return word.strip(), texts
 
 

@@ -418,7 +418,9 @@ def recorded_sides(
     """
     traces = tuple(read(word) for word in request.what)
     _refuse_of_run(request)
-    sides = request.sides or tuple(_side_of(request, k, trace) for k, trace in enumerate(traces))
+    sides = request.sides
+    if not sides:
+        sides = tuple(_side_of(request, k, trace) for k, trace in enumerate(traces))
     if len(sides) == 1:
         sides = (*sides, _other_side(request, sides[0]))
     again = recorded_scenario(*traces)

@@ -12,10 +12,11 @@ from ..compare.agreement import WitnessResult
 from ..compare.perturbed import ChaosFloor
 from ..measures import QUANTITIES
 from ..measures.text import NONE, grouped, milliseconds, quantity, sentence
-from ..page import Block, Code, Figures, Items, Page, Section, Table, TableCell, Text, Verdict
+from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
 from ..witness import SAME_READING
 from . import template, why
 from .finding import (
+    Event,
     events_of,
     events_table,
     floor_words,
@@ -169,7 +170,7 @@ def _where_from(comparison: Comparison, command: str) -> Section:
 
 def _over_time(
     comparison: Comparison,
-    events: Sequence[Figures],
+    events: Sequence[Event],
     explanation: Explanation | None,
     floor: ChaosFloor | None,
 ) -> BothRuns:

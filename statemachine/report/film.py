@@ -205,7 +205,9 @@ def frames(
     sides = [
         motion_of(trace, model, timing.times) for trace, model in zip(traces, models, strict=True)
     ]
-    return drawn(sides, size, camera or camera_for(sides, size[0] / size[1]), renderer)
+    if camera is None:
+        camera = camera_for(sides, size[0] / size[1])
+    return drawn(sides, size, camera, renderer)
 
 
 def motion_of(trace: Trace, model: Model, times: Array) -> Motion:

@@ -14,9 +14,9 @@ from ..compare.series import NORMAL, normal_forces, total_forces
 from ..interface import Array
 from ..measures import distances, same_pairs
 from ..measures.text import figure, quantity, reading, short_time
-from ..page import Figures, Interactive, Traces
+from ..page import Interactive, Traces
 from . import template
-from .finding import long_labels, name_of, traces_of
+from .finding import Event, long_labels, name_of, traces_of
 from .template import slots_of
 
 CHARTS_SHOWN = 20  # of a page or a figure
@@ -118,7 +118,7 @@ class BothRuns(Interactive):
 
     comparison: Comparison
     start: float
-    events: tuple[Figures, ...]
+    events: tuple[Event, ...]
     charts: tuple[QuantityChart, ...]
     lead: tuple[int, ...]
 

@@ -284,7 +284,7 @@ def draw(plot: TracePlot) -> Any:
         alignment="left",
         frameon=False,
     )
-    grid = figure.add_gridspec(max(1, len(heights)), 2, height_ratios=heights or None)
+    grid = figure.add_gridspec(max(1, len(heights)), 2, height_ratios=heights if heights else None)
     for k, row in enumerate(plot.rows):
         for column, picture in enumerate(row):
             axes = figure.add_subplot(grid[k, column if len(row) > 1 else slice(None)])

@@ -95,12 +95,15 @@ def _contact_cells(contact: PairContacts) -> tuple[str, ...]:
     """Return the cells of a pair of bodies on one side."""
     if contact.first is None:
         return NONE, NONE, NONE, NONE, "never touches"
+    last = "in the end"
+    if not contact.ends and contact.last is not None:
+        last = short_time(contact.last)
     return (
         figure(contact.force),
         figure(contact.total),
         quantity(contact.deepest, "m"),
         moment(contact.deepest_at),
-        "in the end" if contact.ends else short_time(contact.last or 0.0),
+        last,
     )
 
 
@@ -159,9 +162,10 @@ def also_open(headline: Headline, played: Comparison | None) -> Headline:
 def _cells(agreement: Agreement | None) -> tuple[str, str]:
     if agreement is None:
         return NONE, NONE
-    note = agreement.note if agreement.kind == "contact" else ""
     verdict = TableCell(agreement.verdict, verdict=agreement.verdict)
-    return verdict, note or quantity(agreement.max, agreement.unit)
+    if agreement.kind == "contact" and agreement.note:
+        return verdict, agreement.note
+    return verdict, quantity(agreement.max, agreement.unit)
 
 
 def emulated(comparison: Comparison) -> list[Block]:

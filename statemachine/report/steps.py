@@ -289,7 +289,7 @@ def one_step(result: OneStep, labels: tuple[str, str], experiment: str) -> Page:
             _null_of(result),
             _step_tables_of(result),
             _verdict_of(result),
-            _first_of(result),
+            _first_stage_of(result),
             _others_of(result),
         ),
     )
@@ -339,8 +339,13 @@ class _Null:
 
 def _null_of(result: OneStep) -> _Null:
     compared = [gap for gap in result.stages if gap.told and gap.unit]
-    most = max(compared, key=lambda gap: gap.null / (gap.tolerance or 1e-300))
+    most = max(compared, key=_null_tolerances)
     return _Null(quantity(most.null, most.unit), most.stage)
+
+
+def _null_tolerances(gap: StageGap) -> float:
+    """Return how many tolerances the null of a stage is; a tolerance of zero is next to nothing."""
+    return gap.null / (gap.tolerance if gap.tolerance else 1e-300)
 
 
 @dataclass(frozen=True)
@@ -467,7 +472,7 @@ class _FirstStage:
     where: str | None = None
 
 
-def _first_of(result: OneStep) -> _FirstStage:
+def _first_stage_of(result: OneStep) -> _FirstStage:
     gap = result.first
     if gap is None:
         return _FirstStage()

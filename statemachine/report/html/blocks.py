@@ -113,10 +113,11 @@ def _section(block: Section, stage: Html, level: int) -> Html:
     inside = drawn(block.blocks, stage, level + 1)
     if block.folded:
         return tag("details", tag("summary", block.heading), inside)
-    name = block.name or None
-    labelled = f"{name}-heading" if name else None
+    if not block.name:
+        return tag("section", tag(f"h{level}", block.heading), inside)
+    labelled = f"{block.name}-heading"
     heading = tag(f"h{level}", block.heading, id=labelled)
-    return tag("section", heading, inside, id=name, aria_labelledby=labelled)
+    return tag("section", heading, inside, id=block.name, aria_labelledby=labelled)
 
 
 def headline_as_html(headline: Headline) -> Html:

@@ -233,8 +233,13 @@ def _drawings(
             return notes, [*drawings, *drawings]
         why_not = look if isinstance(look, str) else None
         drawings.append(bones_of(trace) if isinstance(look, str) else look)
-        left_out = ", ".join(drawings[-1].left_out) or None
-        notes += template.texts("html/scene_side", left_out=left_out, label=label, why_not=why_not)
+        left_out = drawings[-1].left_out
+        notes += template.texts(
+            "html/scene_side",
+            left_out=", ".join(left_out) if left_out else None,
+            label=label,
+            why_not=why_not,
+        )
     return notes, drawings
 
 
