@@ -39,6 +39,7 @@ from statemachine.page import (
     Text,
     Verdict,
 )
+from statemachine.report.compare import PageParts
 from statemachine.report.compare import page as compared
 from statemachine.report.finding import events_of, headline, leading, subject
 from statemachine.report.html import Look, check_target, report, write_report
@@ -68,7 +69,7 @@ def of(one: Trace, two: Trace) -> Made:
 
 
 def page_of(made: Made, looks: Any = None, **more: Any) -> str:
-    return report(compared(made[0], **more), looks or made[3:] * 2)
+    return report(compared(made[0], parts=PageParts(**more)), looks or made[3:] * 2)
 
 
 def recorded(name: str, kind: Any = "model") -> Made:
