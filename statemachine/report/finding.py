@@ -17,7 +17,7 @@ from ..page import Block, Figures, Headline, Table, TableCell
 from ..runs import Trace
 from . import template
 from .template import if_true
-from .why import answer, proofs
+from .why_answer import answer, proofs
 
 if TYPE_CHECKING:
     from ..compare.why import Explanation
