@@ -18,7 +18,7 @@ from ..page import Block, Headline, Table, TableCell
 from ..runs import Trace
 from . import template
 from .template import if_true, slots_of
-from .why import answer, proofs
+from .why_answer import answer, proofs
 
 if TYPE_CHECKING:
     from ..compare.why import Explanation

@@ -23,7 +23,7 @@ from ..runs import Header, Trace
 from . import template
 from .finding import long_labels, moment, name_of, short_labels, traces_of, window
 from .template import if_true
-from .why import missing
+from .why_answer import missing
 
 _PAIRS_SHOWN = 3  # pairs of bodies that have rows: those that press hardest
 # Of the promises that a backend may emulate, those that move the arm, in plain words.
