@@ -27,7 +27,6 @@ from ..installed import raise_if_interrupted
 if TYPE_CHECKING:
     from ..drawing.scene import Camera, Drawer
     from ..interface import Array, Data, Model
-    from ..page import Figures
     from .call_watch import CallWatch
     from .description.records import Robot
     from .measured import Phrases
@@ -35,7 +34,10 @@ if TYPE_CHECKING:
         Counterparts,
         Dials,
         Edit,
+        EngineTerm,
         ModelDifference,
+        UncommandedJoint,
+        WayBack,
     )
 
 _ROOMS: dict[str, str] = {
@@ -112,42 +114,25 @@ class RawEngine:
 
     # The engine as it comes. Nothing here goes through an adapter that emulates the contract.
 
-    def terms(self, model: Model) -> tuple[Figures, ...]:
-        """What the interface calls things, and what the engine does.
-
-        Returns:
-            thing: What is meant; ours: what the interface has for it; engine: what the engine has.
-        """
+    def terms(self, model: Model) -> tuple[EngineTerm, ...]:
+        """Return what the interface calls things, and what the engine does."""
         return ()
 
-    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[Figures, ...]:
-        """A joint that nobody commands, after some time [s], on four freshly loaded models.
+    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[UncommandedJoint, ...]:
+        """Return how a joint moves that nobody commands, on four freshly loaded models.
 
         As it comes; with the model's gravity; without the engine's own motors too; and
         without the damping of joints.
 
-        Returns:
-            label: What was done to the engine before.
-            time: Simulated time [s].
-            position: Of the joint then [rad; of a slide, m].
-            motor: What the engine's own motor exerts on it [N·m or N].
-            explicit: Largest h·D/M of the joint damping that the engine applies explicitly;
-                above 2 a joint gains speed from being damped.
-            gravity: Length of the gravity of a fresh world [m/s²].
-            widest: How far any joint of the robot is from zero then [rad or m].
-            turns: In how many steps the joint's velocity changed its sign.
-            steps: Of how many.
+        Args:
+            model: A Model on this engine.
+            seconds: Simulated time.
+            joint: Id of a hinge or slide.
         """
         return ()
 
-    def ways_back(self, model: Model) -> tuple[Figures, ...]:
-        """Which of the engine's own ways to go back to an earlier state is exact.
-
-        Returns:
-            name: What is done.
-            difference: Of the second future from the first: the largest of a coordinate; zero
-                means the same bits.
-        """
+    def ways_back(self, model: Model) -> tuple[WayBack, ...]:
+        """Return which of the engine's own ways to go back to an earlier state is exact."""
         return ()
 
     def unlike_its_users(self, model: Model) -> list[str]:
