@@ -23,9 +23,7 @@ from statemachine.errors import (
     UnknownNameError,
 )
 from statemachine.interface import MOCAP
-from statemachine.lessons import LESSONS
 from statemachine.lessons.hold import OLDER
-from statemachine.lessons.session import take
 from statemachine.releases import is_release
 from statemachine.runs import (
     COLUMNS,
@@ -42,7 +40,7 @@ from statemachine.runs import (
 )
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import ROOT, Cli, assert_has, opened, refused, runs_in_silence
+from .conftest import ROOT, Cli, assert_has, lesson_result, opened, refused, runs_in_silence
 from .small_models import ROTOR_PENDULUM, mjcf, model_of
 
 INPUTS = ("time", "qpos", "qvel", "ctrl")
@@ -431,11 +429,9 @@ def test_the_recorded_run_of_an_older_release_is_what_it_does(
     monkeypatch: pytest.MonkeyPatch, mujoco_scene: sm.Model
 ) -> None:
     _is_as_recorded(f"hold.{OLDER}", monkeypatch)
-    run: Any = take(LESSONS["hold"], mujoco_scene, "mujoco", {})
-    here = run.result.older
+    here = lesson_result("hold", mujoco_scene).older
     monkeypatch.setenv("STATEMACHINE_ENGINES", "nowhere")
-    again: Any = take(LESSONS["hold"], mujoco_scene, "mujoco", {})
-    recorded = vars(again.result.older)
+    recorded = vars(lesson_result("hold", mujoco_scene).older)
     assert recorded["recorded"]
     for name, value in vars(here).items():
         if isinstance(value, float):
