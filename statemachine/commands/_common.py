@@ -10,13 +10,13 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import errors
 from ..errors import (
     BadInputError,
     MissingEngineError,
     ModelError,
     StateMachineError,
     UnsupportedError,
+    printable,
     refuse,
 )
 from ..installed import DEFAULT
@@ -33,16 +33,8 @@ SAYS_NO, BAD_INPUT, MISSING, FAULT, NO_OUTPUT = 1, 2, 3, 70, 74
 
 def complain(error: Exception | str, code: int) -> int:
     """Say it in one line on standard error; returns `code`."""
-    print(f"{PROGRAM}: {one_line(error)}", file=sys.stderr)
+    print(f"{PROGRAM}: {printable(error)}", file=sys.stderr)
     return code
-
-
-def one_line(text: object) -> str:
-    """Text in one line, with nothing in it that a terminal would do instead of show.
-
-    A name may come from a file that somebody else made.
-    """
-    return "".join(c if c.isprintable() else "?" for c in errors.one_line(text))
 
 
 @contextmanager
@@ -226,6 +218,22 @@ def seed_of(what: str) -> Row:
     return "--seed", "N", f"random seed of {what} (0)", {"default": 0}
 
 
+# As `scenarios.SCENARIOS`, which needs NumPy; a test compares them.
+EXPERIMENTS = {
+    "hold": "the servos go to one pose and hold it",
+    "gravity": "actuators off: what can move falls",
+    "droop": "nobody writes ctrl: the servos keep their first targets",
+    "fall": "actuators off, and nothing can touch",
+    "box": "the SO-101 swings with a box in its jaws",
+    "waves": "every actuator follows waves that a seed draws",
+}
+
+
+def experiments() -> str:
+    """Return a line for each experiment."""
+    return "\n".join(f"  {name:<9} {says}" for name, says in EXPERIMENTS.items())
+
+
 class TerminalReporter:
     """A `Reporter` that shows a bar of progress and prints each note, on standard error."""
 
@@ -279,6 +287,11 @@ def add_seconds(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--seconds", type=typed_float, metavar="S", help="simulated time")
 
 
+def add_timestep(parser: argparse._ActionsContainer) -> None:
+    """Add --timestep, the length of a step."""
+    parser.add_argument("--timestep", type=typed_float, metavar="S", help="length of a step [s]")
+
+
 def add_jobs(parser: argparse._ActionsContainer) -> None:
     """Add --jobs, the number of processes."""
     says = "parallel processes (default: one a processor)"
@@ -306,6 +319,22 @@ def add_menagerie(parser: argparse._ActionsContainer) -> None:
     folder = os.environ.get("MENAGERIE") or None
     says = "look the model up in this folder of public models (default $MENAGERIE)"
     parser.add_argument("--menagerie", default=folder, metavar="DIR", help=says)
+
+
+def word_of_one_backend(words: Sequence[str] | None, what: str) -> str:
+    """Return the one backend that --backend names, as it was typed; MuJoCo where nothing was.
+
+    Args:
+        words: What was typed.
+        what: The command, for the message.
+
+    Raises:
+        BadInputError: Several are named.
+        UnknownNameError: There is no such backend.
+    """
+    from ..backends.chosen import one_backend
+
+    return str(one_backend(words or [DEFAULT], what))
 
 
 def chosen_backends(words: Sequence[str] | None) -> list[BackendChoice]:

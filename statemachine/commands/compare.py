@@ -12,6 +12,7 @@ from . import _compare_files as files
 from . import _compare_questions as questions
 from ._common import (
     EXCLUDES,
+    EXPERIMENTS,
     NEEDS,
     PARTS,
     PROGRAM,
@@ -25,6 +26,7 @@ from ._common import (
     backend_of,
     chosen_backends,
     complain,
+    experiments,
     json_of,
     menagerie,
     pairs_of,
@@ -153,21 +155,6 @@ RULES: tuple[Rule, ...] = (
     ("versions", EXCLUDES, "one_step converge"),
     (_OF_RUN, EXCLUDES, "models", "{flag} is of a run, and --models runs nothing"),
 )
-
-# As `scenarios.SCENARIOS`, which needs NumPy; a test compares them.
-EXPERIMENTS = {
-    "hold": "the servos go to one pose and hold it",
-    "gravity": "actuators off: what can move falls",
-    "droop": "nobody writes ctrl: the servos keep their first targets",
-    "fall": "actuators off, and nothing can touch",
-    "box": "the SO-101 swings with a box in its jaws",
-    "waves": "every actuator follows waves that a seed draws",
-}
-
-
-def experiments() -> str:
-    """A line for each experiment."""
-    return "\n".join(f"  {name:<9} {says}" for name, says in EXPERIMENTS.items())
 
 
 def run_options() -> tuple[Row, ...]:

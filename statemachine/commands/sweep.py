@@ -18,6 +18,7 @@ from ._common import (
     add_table,
     backend_of,
     complain,
+    experiments,
     flag_of,
     json_of,
     menagerie,
@@ -27,7 +28,6 @@ from ._common import (
     shorten_help,
     show,
 )
-from .compare import experiments
 
 
 def add(parser: argparse.ArgumentParser) -> None:

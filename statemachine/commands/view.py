@@ -11,7 +11,7 @@ import threading
 from contextlib import suppress
 from typing import Any
 
-from ..errors import BadInputError, TraceError
+from ..errors import BadInputError, TraceError, printable
 from ..installed import DEFAULT
 from ..typed_numbers import is_count, typed_float
 from ._common import (
@@ -21,7 +21,6 @@ from ._common import (
     chosen_backends,
     complain,
     menagerie,
-    one_line,
     refuse,
     refuse_given,
 )
@@ -198,7 +197,7 @@ def _announce(options: argparse.Namespace, port: int, token: str, what: str, dra
     if options.port not in (0, port):
         print(f"port {options.port} is taken, so it is {port}")
     print(address)
-    print(one_line(f"shows {what}; Ctrl-C ends it"))
+    print(printable(f"shows {what}; Ctrl-C ends it"))
     if everywhere or not here:
         print(f"whoever has this address and reaches port {port} here can move the sliders")
     else:
