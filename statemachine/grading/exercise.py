@@ -127,6 +127,20 @@ def run(
         return judge.judge(file, progress, None if folder is None else in_folder(folder))
 
 
+def check_settings(backend: str, time_limit: float) -> None:
+    """Check what files are judged with.
+
+    Raises:
+        BadInputError: The time limit is out of range, or the backend is a release.
+    """
+    if not 0 < time_limit <= 3600:
+        raise BadInputError(
+            f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
+        )
+    if is_release(backend):
+        raise BadInputError("exercises are judged on engines that are installed")
+
+
 class ExerciseJudge(ExitStack):
     """Judges files on one backend. What is right is worked out once, for all of them.
 
@@ -144,13 +158,7 @@ class ExerciseJudge(ExitStack):
     ) -> None:
         """Arguments as `run` has them."""
         super().__init__()
-        refuse(
-            (
-                not 0 < time_limit <= 3600,
-                f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}",
-            ),
-            (is_release(backend), "exercises are judged on engines that are installed"),
-        )
+        check_settings(backend, time_limit)
         engine = backend_engine(backend)
         self.backend = backend
         self.versions = {"statemachine": __version__, "python": sys.version.split()[0]}
