@@ -107,12 +107,17 @@ class _HelpAll(argparse.Action):
         parser.exit()
 
 
-def shorten_help(parser: argparse.ArgumentParser, *first: str) -> None:
-    """Let --help show the options that are needed first, and --help-all all of them."""
+def shorten_help(parser: argparse.ArgumentParser, first: Collection[str]) -> None:
+    """Let --help show the options that are needed first, and --help-all all of them.
+
+    Args:
+        parser: Of the command, with all its options.
+        first: The names of those that are needed first.
+    """
     later = {
         action: action.help
         for action in parser._actions
-        if action.dest not in ("help", *first) and action.help != argparse.SUPPRESS
+        if action.dest != "help" and action.dest not in first and action.help != argparse.SUPPRESS
     }
     for action in later:
         action.help = argparse.SUPPRESS

@@ -116,21 +116,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     ):
         add_table(parser.add_argument_group(title), *rows)
     add_rules(parser, *RULES)
-    shorten_help(
-        parser,
-        *(
-            "what",
-            "backend",
-            "why",
-            "html",
-            "converge",
-            "seconds",
-            "tolerance",
-            "one_step",
-            "versions",
-        ),
-        *("models", "json"),
-    )
+    first = ("what", "backend", "why", "html", "converge", "seconds", "tolerance", "one_step")
+    shorten_help(parser, first=(*first, "versions", "models", "json"))
 
 
 _OF_RUN = (

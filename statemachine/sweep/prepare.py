@@ -16,7 +16,7 @@ from .. import __version__
 from ..backends import backend_names, parse_backend
 from ..backends.starts import overlap_warning, places_in
 from ..compare.perturbed import EXACT, parse_uncertainty
-from ..errors import MissingEngineError, StateMachineError, refuse
+from ..errors import BadInputError, MissingEngineError, StateMachineError, refuse
 from ..installed import require_extra
 from ..interface import Model, make_data
 from ..interface.options import checked_options
@@ -49,30 +49,11 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     require_parquet()
     require_extra("joblib", "a sweep", "joblib", "sweep")
     typed = parse_vary(sweep.vary)
-    least = {"seeds": 1, "samples": 0, "design-seed": 0, "every": 1, "moments": 1}
-    values = {flag: getattr(sweep, flag.replace("-", "_")) for flag in least}
-    refuse(
-        *(
-            (values[flag] < smallest, f"--{flag} must be at least {smallest}; got {values[flag]}")
-            for flag, smallest in least.items()
-        ),
-        (
-            not 0 < sweep.timeout <= 86400 * 7,
-            f"--timeout must be above 0 s; got {sweep.timeout:g}",
-        ),
-    )
     function = is_function(sweep.what)
     usual = MODEL_OF_A_FUNCTION if function else scenario(sweep.what).model
     varied = [str(value) for vary in typed if vary.label == MODEL for value in vary.values]
-    of_a_function = f"is of a FUNCTION; {sweep.what} is an experiment"
-    refuse(
-        (not function and sweep.every != 1, f"--every {of_a_function}"),
-        (not function and sweep.keyframe is not None, f"--keyframe {of_a_function}"),
-        (
-            varied and sweep.model is not None,
-            "one model is named, and --vary model=… says several: leave one out",
-        ),
-    )
+    if varied and sweep.model is not None:
+        raise BadInputError("one model is named, and --vary model=… says several: leave one out")
     sweep = dataclasses.replace(
         sweep,
         what=os.path.abspath(sweep.what) if function else sweep.what,

@@ -16,7 +16,7 @@ from ..interface.options import index_of
 from ..measures.text import command
 from ..runs.controllers import function_scenario, is_function
 from ..runs.robot import scalar_joint
-from ..runs.scenarios import Scenario, scenario
+from ..runs.scenarios import SCENARIOS, Scenario, scenario
 from ..typed_numbers import is_count
 from .design import Design, Value, Vary, digest
 from .rows import columns_of
@@ -64,6 +64,24 @@ class Sweep:
     spread: str = "1deg,1mm"
     moments: int = 20
     timeout: float = 600.0
+
+    def __post_init__(self) -> None:
+        least = {"seeds": 1, "samples": 0, "design_seed": 0, "every": 1, "moments": 1}
+        for name, smallest in least.items():
+            if getattr(self, name) < smallest:
+                flag = name.replace("_", "-")
+                raise BadInputError(
+                    f"--{flag} must be at least {smallest}; got {getattr(self, name)}"
+                )
+        if not 0 < self.timeout <= 86400 * 7:
+            raise BadInputError(f"--timeout must be above 0 s; got {self.timeout:g}")
+        if is_function(self.what):
+            return
+        check_name("experiment", self.what, SCENARIOS)
+        if self.every != 1:
+            raise BadInputError(f"--every is of a FUNCTION; {self.what} is an experiment")
+        if self.keyframe is not None:
+            raise BadInputError(f"--keyframe is of a FUNCTION; {self.what} is an experiment")
 
     def scenario(self, parameters: Mapping[str, Any]) -> Scenario:
         """What is done, and for how long, with some values of the function's parameters.
