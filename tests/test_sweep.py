@@ -215,8 +215,11 @@ def test_what_is_refused_before_anything_runs(
 ) -> None:
     monkeypatch.chdir(Path(policy).parent)
     given = asked if isinstance(asked, dict) else {"vary": asked}
-    sweep = dataclasses.replace(small("hold"), **given)
-    refused((StateMachineError, re.escape(says), lambda: prepared(sweep)))
+
+    def prepare() -> object:
+        return prepared(dataclasses.replace(small("hold"), **given))
+
+    refused((StateMachineError, re.escape(says), prepare))
 
 
 def test_many_cells_are_told_beforehand() -> None:

@@ -17,7 +17,6 @@ from ..errors import (
     StateMachineError,
     UnsupportedError,
     printable,
-    refuse,
 )
 from ..installed import DEFAULT
 from ..typed_numbers import typed_float, typed_int
@@ -55,15 +54,26 @@ def resumable(written: Path | None, what: str, but: str = "") -> Iterator[None]:
         raise
 
 
+def is_given(options: argparse.Namespace, name: str) -> bool:
+    """Tell whether an option is given that is None, False or empty where it is not."""
+    value = getattr(options, name)
+    return value is not None and value is not False and value != []  # 0 is given
+
+
 def refuse_given(options: argparse.Namespace, names: Iterable[str], text: str) -> None:
-    """Raise BadInputError for the first of these options that is given; {} is its flag."""
-    values = {name: getattr(options, name) for name in names}
-    refuse(
-        *(
-            (value is not None and value is not False and value != [], text.format(flag_of(name)))
-            for name, value in values.items()  # 0 is given, and refused later
-        )
-    )
+    """Refuse options that have no meaning for what was asked.
+
+    Args:
+        options: Those of the command.
+        names: Of the options.
+        text: What is said of one; {} is its flag.
+
+    Raises:
+        BadInputError: One of them is given.
+    """
+    for name in names:
+        if is_given(options, name):
+            raise BadInputError(text.format(flag_of(name)))
 
 
 # Of options: their names, whether they need one of the others or exclude them all, the others'

@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, StateMachineError
+from ..errors import BadInputError, StateMachineError, refuse
 from ..installed import PAIR
 from ._common import (
     JOBS,
@@ -24,7 +24,6 @@ from ._common import (
     chosen_backends,
     complain,
     pairs_of,
-    refuse,
     show,
 )
 from ._compare_files import write_tests

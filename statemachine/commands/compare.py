@@ -6,7 +6,7 @@ import argparse
 import shlex
 from typing import Any
 
-from ..errors import BadInputError, EndedEarlyError
+from ..errors import BadInputError, EndedEarlyError, refuse
 from ..installed import PAIR
 from . import _compare_files as files
 from . import _compare_questions as questions
@@ -30,7 +30,6 @@ from ._common import (
     json_of,
     menagerie,
     pairs_of,
-    refuse,
     refuse_given,
     seed_of,
     shorten_help,

@@ -11,7 +11,7 @@ from itertools import dropwhile
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, MissingEngineError
+from ..errors import BadInputError, MissingEngineError, refuse
 from ..lessons import BESIDE, LESSONS, PATH, Lesson
 from ..page import Heading
 from ._common import (
@@ -26,7 +26,6 @@ from ._common import (
     json_of,
     menagerie,
     on_each_backend,
-    refuse,
     show,
 )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import BadInputError
+from ..models import AnyPath
 from ..processes import checked_jobs
 from ..runs.reporter import QUIET, Reporter
 from . import prepared, run_sweep
@@ -31,7 +32,7 @@ class SweepRequest:
     """
 
     sweep: Sweep
-    folder: str | os.PathLike[str]
+    folder: AnyPath
     jobs: int | None = None
     scheduler: str | None = None
     extend: bool = False
@@ -55,7 +56,7 @@ class SweepReportRequest:
             it has.
     """
 
-    folder: str | os.PathLike[str]
+    folder: AnyPath
     quantity: str | None = None
     backends: tuple[str, ...] = ()
 
@@ -103,4 +104,4 @@ def answer_report(request: SweepReportRequest) -> SweepEffects:
         UnknownNameError: The dataset has no such engine or quantity.
         MissingEngineError: A package is missing.
     """
-    return effects(request.folder, request.quantity, request.backends)
+    return effects(Path(request.folder), request.quantity, request.backends)
