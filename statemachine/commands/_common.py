@@ -145,8 +145,8 @@ Row = tuple[Any, ...]
 REPEATED = {"action": "append", "default": []}
 
 
-def _numbers(text: str) -> list[float]:
-    """Numbers of a list like 0,-0.6,1.2, as an option's type."""
+def number_list(text: str) -> list[float]:
+    """Read numbers of a list like 0,-0.6,1.2, as an option's type."""
     try:
         return [typed_float(part) for part in text.replace(",", " ").split()]
     except ValueError:
@@ -158,7 +158,7 @@ _TYPES: dict[str | None, Any] = {
     "N": typed_int,
     "S": typed_float,
     "X": typed_float,
-    "X,X,…": _numbers,
+    "X,X,…": number_list,
 }
 
 
