@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ..errors import BadInputError, printable
 from ..installed import DEFAULT
 from ..typed_numbers import typed_float, typed_int
-from ._common import PROGRAM, TerminalReporter, add_backend, add_menagerie, refuse_given
+from ._common import PROGRAM, TerminalReporter, add_backend, add_menagerie, flag_of, is_given
 
 if TYPE_CHECKING:
     from ..view.request import RecordingRequest, ServerSettings, SimulationRequest, View
@@ -110,8 +110,9 @@ def request_of(options: argparse.Namespace) -> SimulationRequest | RecordingRequ
             keyframe=options.keyframe,
             site=options.site,
         )
-    of_one = "{} is for a simulation, and a trace is a recording"
-    refuse_given(options, ("backend", "keyframe", "site"), of_one)
+    for name in ("backend", "keyframe", "site"):
+        if is_given(options, name):
+            raise BadInputError(f"{flag_of(name)} is for a simulation, and a trace is a recording")
     return RecordingRequest(tuple(traces), model, options.menagerie)
 
 
