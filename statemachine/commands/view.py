@@ -15,7 +15,7 @@ from ..typed_numbers import typed_float, typed_int
 from ._common import PROGRAM, TerminalReporter, add_backend, add_menagerie, flag_of, is_given
 
 if TYPE_CHECKING:
-    from ..view.request import RecordingRequest, ServerSettings, SimulationRequest, View
+    from ..view.request import BrowserView, RecordingRequest, ServerSettings, SimulationRequest
 
 _PORT = 8080
 _MODEL = "so101/scene_box"
@@ -134,7 +134,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _announce(options: argparse.Namespace, view: View, port: int, token: str) -> None:
+def _announce(options: argparse.Namespace, view: BrowserView, port: int, token: str) -> None:
     """Print the address of the page, who can reach it, and what is not drawn."""
     everywhere = options.host in ("0.0.0.0", "::")
     here = everywhere or options.host in ("127.0.0.1", "::1", "localhost")

@@ -94,7 +94,7 @@ class ServerSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class BrowserView:
     """What is shown in the browser.
 
     Attributes:
@@ -113,7 +113,7 @@ class View:
 @contextmanager
 def open_view(
     request: SimulationRequest | RecordingRequest, reporter: Reporter = QUIET
-) -> Iterator[View]:
+) -> Iterator[BrowserView]:
     """Open what is to be shown, and close it at the end of the block.
 
     Raises:
@@ -130,10 +130,10 @@ def open_view(
         reporter.note(text)
     engines = " and ".join(f"{engine_of(model.backend)} {model.engine_version}" for model in models)
     with LiveSession(models, keyframe, request.site) as session:
-        yield View(session, drawing_of(models[0]), keyframe, f"{request.model} on {engines}")
+        yield BrowserView(session, drawing_of(models[0]), keyframe, f"{request.model} on {engines}")
 
 
-def _recording(request: RecordingRequest, reporter: Reporter) -> View:
+def _recording(request: RecordingRequest, reporter: Reporter) -> BrowserView:
     """Open recorded runs."""
     session = TraceSession([read(path) for path in request.files])
     header = session.header
@@ -150,7 +150,7 @@ def _recording(request: RecordingRequest, reporter: Reporter) -> View:
         raise TraceError(f"the trace is of another model than {name}: name it behind the trace")
     run = f"{header.experiment or 'a run'} of {name}"
     what = f"{run}, recorded on {' and '.join(session.labels)}"
-    return View(session, drawing_of(model), None, what)
+    return BrowserView(session, drawing_of(model), None, what)
 
 
 def _keyframe(name: str | None, model: Model) -> int | None:

@@ -10,12 +10,12 @@ from types import FrameType
 
 from . import server as serving
 from .live import Live
-from .request import ServerSettings, View
+from .request import BrowserView, ServerSettings
 from .viser_front import ViserFront
 
 
 def serve(
-    view: View,
+    view: BrowserView,
     settings: ServerSettings,
     port: int,
     label: str,
