@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Literal, NoReturn
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from ..runs.controllers import function_scenario, is_function
 from ..runs.files import SUFFIXES
 from ..runs.scenarios import SCENARIOS, Scenario, scenario
 from ..typed_numbers import typed_float
-from .labels import typed_option
+from .labels import OptionValue, typed_option
 from .matching import match_models
 
 _OPTION = re.compile(r"[A-Za-z_]+=\S*")
@@ -52,7 +52,7 @@ class Side:
     file: str
     engine: str = DEFAULT
     defaults: Literal["model", "engine"] = "model"
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
     menagerie: str | None = None
     taken: TakenParts | None = None
 
@@ -71,7 +71,7 @@ class Side:
         options = (typed_option(name, value) for name, value in self.options.items())
         return " ".join([f"{_typed(self.file)}@{self.chosen_backend()}", *options])
 
-    def load(self, **options: Any) -> Model:
+    def load(self, **options: OptionValue) -> Model:
         """The Model; `options` are those of an experiment, over which its own win.
 
         Raises:
@@ -129,8 +129,8 @@ def _renamed(
 
 
 def with_options(
-    sides: Sequence[Side], options: Mapping[str, Any]
-) -> tuple[list[Side], dict[str, Any]]:
+    sides: Sequence[Side], options: Mapping[str, OptionValue]
+) -> tuple[list[Side], dict[str, OptionValue]]:
     """Sides with what only they are given, and the options that both have.
 
     Args:
@@ -146,7 +146,9 @@ def with_options(
     return [_without(sides[0], left, both), _without(sides[1], right, both)], both
 
 
-def _without(side: Side, options: Mapping[str, Any], common: Mapping[str, Any]) -> Side:
+def _without(
+    side: Side, options: Mapping[str, OptionValue], common: Mapping[str, OptionValue]
+) -> Side:
     """Return a side with those of some options that are not among the common ones."""
     own = {name: value for name, value in options.items() if name not in common}
     return replace(side, options=own)
@@ -226,7 +228,13 @@ def _refuse_mistyped(word: str) -> None:
         raise BadInputError(f"{word} is an option of a side: type {word}=VALUE")
 
 
-def _option(text: str) -> tuple[str, Any]:
+def _option(text: str) -> tuple[str, OptionValue]:
+    """Return the name and the value of an option, as typed.
+
+    Raises:
+        UnknownNameError: There is no such option.
+        BadInputError: It has no value, or an invalid one.
+    """
     name, _, given = text.partition("=")
     check_name("option", name, OPTIONS)
     if not given:
@@ -274,7 +282,7 @@ class Request:
     menagerie: str | None = None
     seconds: float | None = None
     seed: int = 0
-    options: dict[str, Any] = field(default_factory=dict)
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
     sides: tuple[Side, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     every: int = 1

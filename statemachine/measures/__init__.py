@@ -101,9 +101,10 @@ class Deviation:
 
     Attributes:
         unit: Of the distances: "rad" or "m".
-        worst: The largest distance at any moment; at: when [s].
-        rms: Root of the mean square over the moments.
-        end: At the last moment.
+        worst: The largest distance at any moment [unit].
+        at: When that is [s].
+        rms: Root of the mean square over the moments [unit].
+        end: At the last moment [unit].
     """
 
     unit: str
@@ -125,7 +126,8 @@ class JointPlaces:
     """Where in qpos each kind of joint has its numbers.
 
     Attributes:
-        hinges, slides: Of each hinge [rad] and each slide [m].
+        hinges: Of each hinge [rad].
+        slides: Of each slide [m].
         balls: Where the quaternion of each ball joint starts.
         free: Where the position of each free body starts; its quaternion follows.
     """
@@ -160,17 +162,20 @@ class JointPlaces:
 
 
 def joint_gap(
-    names: Sequence[str], types: Sequence[int] | Ints, addresses: Sequence[int] | Ints,
-    left: Array, right: Array,
-) -> Gap | None:  # fmt: skip
-    """The hinge that differs most between two moments, or the slide where there is no hinge.
+    names: Sequence[str],
+    types: Sequence[int] | Ints,
+    addresses: Sequence[int] | Ints,
+    left: Array,
+    right: Array,
+) -> Gap | None:
+    """Return the gap of the hinge that differs most, or of the slide where there is no hinge.
 
     Args:
-        names: Of the joints; types, addresses: their `JointType`s and places in qpos.
-        types: See names.
-        addresses: See names.
-        left: (nq,) one moment; right: the other.
-        right: See left.
+        names: Of the joints.
+        types: Their `JointType`s.
+        addresses: Their places in qpos.
+        left: (nq,) one moment.
+        right: (nq,) the other.
     """
     kinds, places = np.asarray(types), np.asarray(addresses)
     for kind, unit in ((JointType.HINGE, "rad"), (JointType.SLIDE, "m")):
@@ -221,7 +226,8 @@ class Common:
 
     Attributes:
         time: (n,) since the start [s].
-        left, right: (n,) rows of the runs.
+        left: (n,) rows of the one run.
+        right: (n,) rows of the other.
     """
 
     time: Array
@@ -235,8 +241,8 @@ def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Com
     Timesteps of 1/200 and 1/240 s meet every 25 ms; what happens between is left out.
 
     Args:
-        left: (n,) ascending, when the rows of a run are [s]; right: those of the other.
-        right: See left.
+        left: (n,) ascending, when the rows of a run are [s].
+        right: (m,) those of the other.
         steps: The timesteps of both [s].
 
     Raises:
@@ -247,7 +253,7 @@ def common_moments(left: Array, right: Array, steps: tuple[float, float]) -> Com
     # A time is a sum of timesteps: its rounding grows with their number.
     slack = SAME * min(steps) + 1e-12 * np.arange(len(times[0]))
     rows = np.flatnonzero(np.abs(times[1][near] - times[0]) <= slack)
-    if len(rows) < min(_FEW, *map(len, times)):
+    if len(rows) < min(_FEW, len(left), len(right)):
         raise TraceError(
             f"timesteps of {steps[0]:g} and {steps[1]:g} s have only {len(rows)} moments "
             "in common: record one of them with the other's timestep"
