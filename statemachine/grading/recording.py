@@ -107,16 +107,12 @@ def record(
     job.write_text(json.dumps(facts), encoding="utf-8")
     outcome = sandbox.run(
         [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
-        cpu=limits.cpu,
-        wall=limits.wall,
+        sandbox.Limits(limits.cpu, limits.wall, START, START, memory_most=_MEMORY_MOST),
         started=lambda: bool(content(answers, 1)),
-        start=START,
-        start_cpu=START,
         cwd=scratch,
         env=environment(backend),
         writable=folder,
         view=view_of(backend, [own]),
-        memory_most=_MEMORY_MOST,
         stop=stop,
     )
     recording = FunctionRecording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))

@@ -236,8 +236,7 @@ def _run(
         )  # where no test looks for it
         outcome = sandbox.run(
             command,
-            cpu=seconds,
-            wall=clock,
+            sandbox.Limits(cpu=seconds, wall=clock),
             started=lambda: record.stat().st_size > 0,
             cwd=path.parent,
             env=env,
