@@ -122,17 +122,22 @@ def record(
         return bool(content(answers, 1))
 
     outcome = sandbox.run(
+<<<<<<< HEAD
         command,
         cpu=limits.cpu,
         wall=limits.wall,
         started=has_begun,
         start=START,
         start_cpu=START,
+=======
+        [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
+        sandbox.Limits(limits.cpu, limits.wall, START, START, memory_most=_MEMORY_MOST),
+        started=lambda: bool(content(answers, 1)),
+>>>>>>> wt-d
         cwd=scratch,
         env=environment(backend),
         writable=folder,
         view=view_of(backend, [own]),
-        memory_most=_MEMORY_MOST,
         stop=stop,
     )
     recording = FunctionRecording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))
