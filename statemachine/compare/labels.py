@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..interface import Array
+from ..interface.options import OptionValue
 from ..measures import SAME, Common
 from ..measures.text import few, milliseconds, numbers, significant
 from ..runs import Header, Trace
 from .series import joint_columns, tell
 
 Two = tuple[str, str]
-OptionValue = bool | float | str | Sequence[float] | Array  # of what `Model.replace` takes
 # Columns that are compared, and what a page calls them.
 _COMPARED = {
     "site_xpos": "fingertip",

@@ -20,6 +20,7 @@ from ..engines import room
 from ..errors import BadInputError, StateMachineError, check_name, shown, unknown_name
 from ..installed import DEFAULT, PAIR
 from ..interface import OPTIONS, Model
+from ..interface.options import OptionValue
 from ..measures.text import command, listed
 from ..models import SUFFIXES as MODELS
 from ..models import resolve
@@ -27,7 +28,7 @@ from ..runs.controllers import function_scenario, is_function
 from ..runs.files import SUFFIXES
 from ..runs.scenarios import SCENARIOS, Scenario, scenario
 from ..typed_numbers import typed_float
-from .labels import OptionValue, typed_option
+from .labels import typed_option
 from .matching import match_models
 
 _OPTION = re.compile(r"[A-Za-z_]+=\S*")

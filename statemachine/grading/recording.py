@@ -122,18 +122,9 @@ def record(
         return bool(content(answers, 1))
 
     outcome = sandbox.run(
-<<<<<<< HEAD
         command,
-        cpu=limits.cpu,
-        wall=limits.wall,
-        started=has_begun,
-        start=START,
-        start_cpu=START,
-=======
-        [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
         sandbox.Limits(limits.cpu, limits.wall, START, START, memory_most=_MEMORY_MOST),
-        started=lambda: bool(content(answers, 1)),
->>>>>>> wt-d
+        started=has_begun,
         cwd=scratch,
         env=environment(backend),
         writable=folder,
