@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypedDict
 
 import numpy as np
@@ -151,7 +151,20 @@ def record(
         columns["energy"], energy_by = energies(
             model, metadata.defaults, inputs["qpos"], inputs["qvel"], gravity
         )
-    header = Header(
+    header = replace(
+        _header(model, controller, start, metadata),
+        energy_by=energy_by,
+        rewritten=rewritten,
+        ended=ended,
+    )
+    return Trace(header, columns)
+
+
+def _header(
+    model: Model, controller: Controller | None, start: RunStart, metadata: RunMetadata
+) -> Header:
+    """Return what is known of a run before it begins."""
+    return Header(
         experiment=_experiment(metadata, controller),
         says=metadata.says,
         command=metadata.command,
@@ -163,11 +176,7 @@ def record(
         substeps=model.substeps,
         gravity=tuple(model.gravity.tolist()),
         **layout_of(model),
-        energy_by=energy_by,
-        rewritten=rewritten,
-        ended=ended,
     )
-    return Trace(header, columns)
 
 
 def _experiment(metadata: RunMetadata, controller: Controller | None) -> str:
