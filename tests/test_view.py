@@ -24,7 +24,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
 from statemachine.measures import Gap
-from statemachine.runs import record, write
+from statemachine.runs import RunMetadata, RunStart, record, write
 from statemachine.view import server as serving
 from statemachine.view.live import Command, Live, Tempo
 from statemachine.view.server import Door
@@ -543,7 +543,13 @@ def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(
     mujoco_box: sm.Model, tmp_path: Path
 ) -> None:
     file = write(
-        record(mujoco_box, seconds=0.1, keyframe=0, experiment="box"), tmp_path / "box.npz"
+        record(
+            mujoco_box,
+            seconds=0.1,
+            start=RunStart(keyframe=0),
+            metadata=RunMetadata(experiment="box"),
+        ),
+        tmp_path / "box.npz",
     )
     port = str(_free_pair())
     with Viewer(tmp_path, str(file), str(file), "--port", port, "--seconds", "0.3") as viewer:
