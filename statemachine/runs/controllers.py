@@ -148,7 +148,13 @@ def function_scenario(
     begins = "the default state" if keyframe is None else f"the keyframe {keyframe!r}"
     says = f"{called} is asked for ctrl at {steps}. It starts in {begins}."
     return Scenario(
-        *(called, says, "", 2.0, controller_of, says, lambda _model: None),
+        name=called,
+        says=says,
+        model="",
+        seconds=2.0,
+        controller=controller_of,
+        elsewhere=says,
+        needs=lambda _model: None,
         keyframe=keyframe,
         own=True,
     )
