@@ -27,7 +27,7 @@ class CompareRequest:
     """
 
     run: Request
-    tolerances: Mapping[str, float] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = field(default_factory=dict[str, float])
     uncertainty: Uncertainty | None = EXACT
 
     @property
