@@ -43,7 +43,7 @@ class _Parser(argparse.ArgumentParser):
     def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, args: Any = None, namespace: Any = None
     ) -> Any:
-        """As argparse does it, but words behind an option are taken where words are wanted.
+        """Parse as argparse does, but take words behind an option where words are wanted.
 
         What argparse leaves over goes to the positionals that take several words, or have none yet.
         What still is over is refused here, by the parser that knows its options.
@@ -108,13 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     program, with a traceback. 74: nowhere to write. 130: interrupted. 141: the reader of a pipe
     left.
     """
-    # Closed by the caller, as by >&- or 2>&-.
-    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    codecs.register_error("spelled", spelled)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
-            stream.reconfigure(errors="spelled")
+    _prepare_streams()
     warnings.showwarning = _show_warning
     try:
         options = _options(list(sys.argv[1:] if arguments is None else arguments))
@@ -133,10 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _let_go_of_output()
         return 141
     except OSError as error:
-        if error.filename is not None:  # a file that cannot be read or written
-            return complain(f"{error.filename}: {error.strerror or error}", BAD_INPUT)
-        _let_go_of_output()
-        return complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
+        return _report_file(error)
     except MemoryError:
         return complain("this takes more memory than there is", BAD_INPUT)
     except UnicodeError as error:  # a name in a file, or of one
@@ -147,6 +138,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:  # while something was imported, which made that fail
             return 130
         return _report_fault(error)
+
+
+def _prepare_streams() -> None:
+    """Let both streams be there, and take letters that their encoding lacks."""
+    # Closed by the caller, as by >&- or 2>&-.
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    codecs.register_error("spelled", spelled)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
+            stream.reconfigure(errors="spelled")
+
+
+def _report_file(error: OSError) -> int:
+    """Say which file cannot be read or written, or that the output cannot be."""
+    if error.filename is not None:
+        return complain(f"{error.filename}: {error.strerror or error}", BAD_INPUT)
+    _let_go_of_output()
+    return complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
 
 
 def _report_fault(error: Exception) -> int:
@@ -163,6 +175,7 @@ def _report_fault(error: Exception) -> int:
 
 
 def _options(words: list[str]) -> argparse.Namespace:
+    """Parse the words of a command line."""
     named = next((word for word in words if word in COMMANDS), "lesson")
     parser = _parser([named])
     if named == "lesson":
@@ -178,7 +191,7 @@ def _options(words: list[str]) -> argparse.Namespace:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:
-    """What an engine warns of in one line; where in our code it came up is no help."""
+    """Print what an engine warns of in one line; where in our code it came up is no help."""
     if issubclass(category, EngineWarning):
         if str(message) not in _SAID:  # a lesson may load a model more than once
             _SAID.add(str(message))
@@ -188,12 +201,12 @@ def _show_warning(message: Warning | str, category: type[Warning], *where: Any) 
 
 
 def _let_go_of_output() -> None:
-    """Nothing more can be said there; without this, Python would try once more at its end."""
+    """Write no more there; without this, Python would try once more at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser(wanted: Collection[str]) -> argparse.ArgumentParser:
-    """A parser that knows all commands, and the options of some."""
+    """Return a parser that knows all commands, and the options of some."""
     more = [name for name in COMMANDS if name not in FIRST]
     parser = _Parser(
         prog=PROGRAM,

@@ -16,7 +16,7 @@ from statemachine.cli import main
 from statemachine.compare import Request, run_sides
 from statemachine.compare import compare as compare_traces
 from statemachine.errors import BadInputError, DivergedError, UnsupportedError
-from statemachine.interface.options import HUGE
+from statemachine.interface.checks import HUGE
 from statemachine.report import compare as report
 
 from .conftest import (

@@ -19,7 +19,7 @@ import statemachine as sm
 from statemachine import backends, errors, rotations
 from statemachine.compare import parse_sides
 from statemachine.engines.mujoco.description import read_file
-from statemachine.interface.options import as_vector
+from statemachine.interface.checks import as_vector
 from statemachine.models import models_dir, resolve
 from statemachine.report.as_json import dumps
 from statemachine.robots import find

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..interface import Array, Ints
+from .controls import ctrl_owners
 
 # What the controls of an actuator with several are: bits of its ctrlspec, in their order.
 _INPUTS = {
@@ -22,11 +23,6 @@ _CHARTS = {
     int(mujoco.mjtCtrlChart.mjCHART_EXPMAP): ("x", "y", "z"),
     int(mujoco.mjtCtrlChart.mjCHART_QUAT): ("w", "x", "y", "z"),
 }
-
-
-def ctrl_owners(m: mujoco.MjModel) -> Ints:
-    """Return the actuator (nu,) of each number of ctrl; one may take several."""
-    return np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
 
 
 def servos(m: mujoco.MjModel) -> tuple[Ints, NDArray[np.bool_]]:

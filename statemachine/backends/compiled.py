@@ -29,8 +29,9 @@ from ..errors import EngineWarning, ModelError, one_line, shown
 from ..interface import Array, Ints, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
 from ..models import AnyPath, mesh_file
-from .actuators import control_names, ctrl_owners, delay_steps, servos
+from .actuators import control_names, delay_steps, servos
 from .binary import is_binary, read_binary
+from .controls import ctrl_owners
 
 # For `fastest`: in a step [rad, or the model's extent]; at least [rad/s or m/s]; about a day [s].
 _FAR, _FAST, _DAY = 1000.0, 1e5, 1e5

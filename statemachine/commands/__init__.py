@@ -1,7 +1,9 @@
-"""The commands of the command line, one file each; importing them loads no engine.
+"""The commands of the command line, a file or a folder each; importing them loads no engine.
 
 A command is a module of this package, imported when it is typed, with two functions: `add(parser)`
 gives the parser its options, and `run(options)` takes the parsed ones and returns the exit code.
+What was typed becomes a Request in one place, `request_of(options)`; the room that the Request is
+of answers it, and the command shows the answer.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ..sweep.questions import SweepReportRequest, SweepRequest
 
 # Options of a run, which the report of a dataset has no use for, and what they are by default.
-_OF_A_RUN = {
+_OF_A_RUN: dict[str, object] = {
     "model": None,
     "vary": [],
     "seeds": 1,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.actuators import ctrl_owners
+from ..backends.controls import ctrl_owners
 from ..engines import room
 from ..engines.description.match import Matching, Pair, match, renamed
 from ..engines.description.records import Robot

@@ -25,7 +25,7 @@ from ..interface import (
     reset,
     step,
 )
-from ..interface.options import unsupported
+from ..interface.checks import unsupported
 from ..interface.records import Arrays
 from ..measures.quantities import readings
 

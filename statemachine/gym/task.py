@@ -19,13 +19,7 @@ from ..errors import BadInputError, shown
 from ..installed import DEFAULT
 from ..interface import Array, Data, Model, forward, make_data
 from ..interface import reset as reset_data
-from ..interface.options import (
-    HUGE,
-    as_count,
-    as_numbers,
-    as_switch,
-    as_vector,
-)
+from ..interface.checks import HUGE, as_count, as_numbers, as_switch, as_vector
 from ..models import AnyPath
 
 RENDER_MODES = ("rgb_array",)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..drawing.scene import Camera
 from ..errors import BadInputError, DivergedWarning, check_name, shown
 from ..interface import Array, Model
-from ..interface.options import as_count
+from ..interface.checks import as_count
 from ..models import AnyPath
 from ..worlds import forward, make_worlds, reset, step
 from .pictures import Pictures

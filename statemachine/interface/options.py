@@ -8,20 +8,14 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import BadInputError, UnsupportedError, check_name, shown, unknown_name
-from .checks import (  # noqa: F401 (some are imported from here)
-    HUGE,
+from .checks import (
     HasCapabilities,
     as_count,
     as_numbers,
     as_scalar,
     as_switch,
     as_vector,
-    check_entries,
-    check_state,
-    index_of,
-    kind_of,
     unsupported,
-    whole_number,
 )
 from .records import OPTIONS, Array, Ints, JointType
 

@@ -18,7 +18,7 @@ from ..drawing.scene import posed
 from ..errors import BadInputError, ModelError, UnknownNameError
 from ..installed import WITNESS
 from ..interface import Array, JointType, Model, make_data
-from ..interface.options import as_count
+from ..interface.checks import as_count
 from ..kinematics import Kind, Kinematics, shared_joints
 from ..measures import largest_or_inf
 from ..models import AnyPath

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..interface import Array, Model
-from ..interface.options import as_scalar
+from ..interface.checks import as_scalar
 from ..measures import largest
 from ..measures.text import count, millimetres, short_time, vector
 from ..page import Block, Table

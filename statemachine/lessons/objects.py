@@ -13,7 +13,7 @@ import numpy as np
 from ..backends import load
 from ..errors import BadInputError
 from ..interface import Array, Data, Model, make_data, step
-from ..interface.options import as_count
+from ..interface.checks import as_count
 from ..measures.text import count, duration
 from ..page import Block, Table
 from ..runs.drive import Progress, part_of

@@ -14,7 +14,7 @@ from ..engines import room
 from ..engines.records import WayBack
 from ..errors import BadInputError, UnsupportedError, check_name
 from ..interface import Array, Ints, JointType, Model, get_state
-from ..interface.options import as_count
+from ..interface.checks import as_count
 from ..measures import largest
 from ..measures.text import count, degrees, millimetres
 from ..page import Block, Table

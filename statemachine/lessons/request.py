@@ -37,7 +37,7 @@ class LessonRequest:
     model: str | None = None
     backends: tuple[str, ...] = (DEFAULT,)
     menagerie: AnyPath | None = None
-    options: Mapping[str, OptionValue] = field(default_factory=dict)
+    options: Mapping[str, OptionValue] = field(default_factory=dict[str, OptionValue])
     calls: bool = False
 
     def __post_init__(self) -> None:

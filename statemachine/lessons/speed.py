@@ -9,7 +9,7 @@ from typing import Any
 from ..backends import load as load_model
 from ..engines import room
 from ..interface import Data, Model
-from ..interface.options import as_count
+from ..interface.checks import as_count
 from ..measures.text import count, duration
 from ..page import Block, Table
 from ..runs.drive import Progress

@@ -13,7 +13,7 @@ from ..backends import load as load_model
 from ..interface import Data, Model, make_data
 from ..interface import reset as reset_data
 from ..interface import step as step_data
-from ..interface.options import as_count
+from ..interface.checks import as_count
 from ..measures.text import count, duration
 from ..page import Block, Table, Traces
 from ..processes import free_memory, resident_memory

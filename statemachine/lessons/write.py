@@ -22,7 +22,7 @@ from ..interface import (
     set_state,
     step,
 )
-from ..interface.options import as_scalar
+from ..interface.checks import as_scalar
 from ..measures.text import count, position
 from ..page import Block, Table
 from ..runs.drive import Progress

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import BadInputError, DivergedError, shown
 from ..interface import Array, Data, Model, State, get_state, make_data, reset, set_state, step
-from ..interface.options import as_count
+from ..interface.checks import as_count
 from ..measures import JointPlaces, farthest, largest_or_inf, turns
 from ..measures.text import rough
 from ..release_names import engine_of

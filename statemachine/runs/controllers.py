@@ -15,7 +15,7 @@ from typing import Any
 
 from ..errors import BadInputError, did_you_mean
 from ..interface import Data, Model
-from ..interface.options import as_vector
+from ..interface.checks import as_vector
 from ..measures.text import count, few
 from ..models import what_is_there
 from .drive import Controller

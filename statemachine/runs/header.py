@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import TraceError
 from ..interface import OPTIONS, JointType
-from ..interface.options import HUGE
+from ..interface.checks import HUGE
 from ..release_names import engine_of
 from .provenance import Provenance
 

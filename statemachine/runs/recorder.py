@@ -35,7 +35,7 @@ from ..interface import (
     set_state,
     step,
 )
-from ..interface.options import HUGE
+from ..interface.checks import HUGE
 from ..interface.records import Arrays, Defaults
 from .drive import Controller, Progress, drive, part_of, silent, steps_in
 from .header import Header

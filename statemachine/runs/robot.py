@@ -22,7 +22,7 @@ from ..interface import (
     make_data,
     reset,
 )
-from ..interface.options import check_entries
+from ..interface.checks import check_entries
 from ..measures import ContactNames
 from ..measures.text import few
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import TraceError
 from ..interface import MOCAP, Array, Ints
-from ..interface.options import HUGE, index_of
+from ..interface.checks import HUGE, index_of
 from ..measures import ContactNames, overlaps
 from ..measures.text import grouped
 from .header import COLUMNS, CONTACTS, INPUTS, Header

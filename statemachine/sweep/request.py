@@ -11,7 +11,8 @@ import numpy as np
 from ..compare.perturbed import Uncertainty, displaced
 from ..errors import BadInputError, check_name
 from ..interface import Array, JointType, Model
-from ..interface.options import OptionValue, index_of
+from ..interface.checks import index_of
+from ..interface.options import OptionValue
 from ..measures.text import command
 from ..runs.controllers import function_scenario, is_function
 from ..runs.robot import scalar_joint

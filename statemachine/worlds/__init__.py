@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import BadInputError, check_name, shown
 from ..interface import Array, Model
-from ..interface.options import as_count, as_scalar, kind_of, whole_number
+from ..interface.checks import as_count, as_scalar, kind_of, whole_number
 from ..interface.worlds import BATCHED, Worlds
 from .verbs import (
     forward,

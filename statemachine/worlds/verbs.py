@@ -20,7 +20,8 @@ from ..errors import (
     shown,
 )
 from ..interface import Ints, Model, State
-from ..interface.options import as_count, as_vector, check_state, checked_options, kind_of
+from ..interface.checks import as_count, as_vector, check_state, kind_of
+from ..interface.options import checked_options
 from ..interface.records import Arrays, Errors
 from ..interface.turns import alone
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world, without

@@ -26,7 +26,7 @@ class CompareRequest:
     """
 
     run: Request
-    tolerances: Mapping[str, float] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = field(default_factory=dict[str, float])
     uncertainty: Uncertainty | None = EXACT
 
     @property
@@ -67,15 +67,19 @@ class CompareResult:
             "floor": self.floor,
         }
         if self.request.names_sides:
-            matched = self.run.matched
-            figures |= {
-                "sides": self.request.run.both_sides(""),
-                "commands": self.run.commands,
-                "open_loop": self.comparison if self.played is None else self.played,
-                "unmatched": self.run.unmatched,
-                "only": ({}, {}) if matched is None else matched.only,
-            }
+            figures |= self._figures_of_sides()
         return figures
+
+    def _figures_of_sides(self) -> dict[str, object]:
+        """Return what JSON shows of the sides that were named."""
+        matched = self.run.matched
+        return {
+            "sides": self.request.run.both_sides(""),
+            "commands": self.run.commands,
+            "open_loop": self.comparison if self.played is None else self.played,
+            "unmatched": self.run.unmatched,
+            "only": ({}, {}) if matched is None else matched.only,
+        }
 
 
 def answer(request: CompareRequest, reporter: Reporter = QUIET) -> CompareResult:

@@ -26,8 +26,8 @@ class ModelsRequest:
 
     files: tuple[AnyPath, AnyPath]
     engines: tuple[str | None, str | None] = (None, None)
-    frames: Mapping[str, str] = field(default_factory=dict)
-    names: Mapping[str, str] = field(default_factory=dict)
+    frames: Mapping[str, str] = field(default_factory=dict[str, str])
+    names: Mapping[str, str] = field(default_factory=dict[str, str])
     seed: int = 0
     menagerie: AnyPath | None = None
 

@@ -31,7 +31,7 @@ class VersionsRequest:
     run: Request
     versions: str
     bisect: bool = False
-    tolerances: Mapping[str, float] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __post_init__(self) -> None:
         check_runs(self.run, "--versions")

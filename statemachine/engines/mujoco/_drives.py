@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...backends.controls import ctrl_owners
 from ...installed import require
 from ..records import Counterparts, Edit, ModelDifference
 from ._sides import Sides, name_of, plain, same, zeros
@@ -35,8 +36,6 @@ _STILL = (
 def drives(sides: Sides) -> Iterator[ModelDifference]:
     """Actuators, by their gains, ranges, laws and what they drive."""
     left, right = sides.raws
-    from ...backends.actuators import ctrl_owners
-
     owners = ctrl_owners(left), ctrl_owners(right)
     places = sides.pairs.actuators
     actuators = sorted({(int(owners[0][a]), int(owners[1][b])) for a, b in places})

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ...backends.controls import ctrl_owners
 from ...errors import ModelError
 from ...installed import require
 from ...interface import Array
@@ -73,8 +74,6 @@ def _pairs_of_elements(sides: Sides) -> dict[str, Pairs]:
 
 def _pairs_of_actuators(sides: Sides) -> Pairs:
     """Return pairs of ids of actuators: of those that take two places in ctrl that are one."""
-    from ...backends.actuators import ctrl_owners  # here: it loads MuJoCo
-
     ours, theirs = ctrl_owners(sides.left), ctrl_owners(sides.right)
     return sorted({(int(ours[a]), int(theirs[b])) for a, b in sides.pairs.actuators})
 

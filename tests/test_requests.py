@@ -1,0 +1,165 @@
+"""Requests: what was typed becomes one, it checks itself, and Python can make it as well."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import cli
+from statemachine.compare import Request, Side
+from statemachine.compare.questions.causes import ExplainRequest
+from statemachine.compare.questions.converge import ConvergeRequest
+from statemachine.compare.questions.gap import CompareRequest
+from statemachine.compare.questions.models import ModelsRequest
+from statemachine.compare.questions.one_step import OneStepRequest
+from statemachine.compare.questions.versions import VersionsRequest
+from statemachine.errors import StateMachineError
+from statemachine.grading.request import CheckRequest, FaultsRequest
+from statemachine.lessons.fingertip_request import FingertipRequest
+from statemachine.lessons.request import LessonRequest
+from statemachine.probes.conventions.request import CallsRequest, ConventionsRequest
+from statemachine.report.releases import ReleasesRequest
+from statemachine.robots.request import RobotsRequest
+from statemachine.runs.reporter import QUIET
+from statemachine.runs.request import RecordRequest, answer_record
+from statemachine.sweep import Sweep
+from statemachine.sweep.questions import SweepReportRequest, SweepRequest
+from statemachine.view.request import RecordingRequest, ServerSettings, SimulationRequest
+
+from .conftest import of_python
+
+HOLD = Request(("hold",))
+FINE = Side("so101", options={"timestep": 0.002})
+TWO_SIDES = Request(("hold",), sides=(FINE, Side("so101", "pybullet")))
+TYPED = [
+    ("conventions gravity", ConventionsRequest(("gravity",))),
+    ("conventions --calls --backend mujoco", CallsRequest(("mujoco",))),
+    ("robots models --seconds 5 --quick", RobotsRequest(("models",), seconds=5.0, quick=True)),
+    ("fingertip --poses 20 --seed 3", FingertipRequest(poses=20, seed=3)),
+    ("engines", ReleasesRequest()),
+    ("check step_loop.py --time-limit 2", CheckRequest("step_loop.py", time_limit=2.0)),
+    (
+        "lesson write --value 0.3",
+        LessonRequest("write", "so101/scene", options={"joint": None, "value": 0.3}),
+    ),
+    (
+        "sweep hold --vary kp=1,2 --out d --jobs 2",
+        SweepRequest(Sweep("hold", ["kp=1,2"]), "d", jobs=2),
+    ),
+    ("view --keyframe held", SimulationRequest(keyframe="held")),
+    ("view a.npz b.npz so101", RecordingRequest(("a.npz", "b.npz"), "so101")),
+    ("compare hold", CompareRequest(HOLD)),
+    ("compare hold --tolerance tip=2mm", CompareRequest(HOLD, {"tip": 0.002})),
+    ("compare hold --no-chaos", CompareRequest(HOLD, uncertainty=None)),
+    ("compare hold --why --budget 7", ExplainRequest(HOLD, budget=7)),
+    ("compare hold --one-step", OneStepRequest(HOLD)),
+    ("compare hold --converge", ConvergeRequest(HOLD)),
+    ("compare hold --versions 3.3.7", VersionsRequest(HOLD, "3.3.7")),
+    ("compare --models so101 so101/scene", ModelsRequest(("so101", "so101/scene"))),
+    ("compare hold so101 timestep=0.002 so101@pybullet", CompareRequest(TWO_SIDES)),
+]
+
+
+@pytest.mark.parametrize(("typed", "request_made"), TYPED, ids=[typed for typed, _ in TYPED])
+def test_what_is_typed_is_a_request(
+    typed: str, request_made: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("MENAGERIE", raising=False)
+    words = typed.split()
+    options = cli._options(words)
+    command = importlib.import_module(f"statemachine.commands.{words[0]}")
+    requests = importlib.import_module(command.run.__module__)
+    assert requests.request_of(options) == request_made
+
+
+REFUSED: list[tuple[Callable[[], object], str]] = [
+    (lambda: ConventionsRequest(("foo",)), "no question named 'foo'"),
+    (lambda: CallsRequest(()), "no engine is named"),
+    (lambda: RobotsRequest(("models",), seconds=0.0), "seconds must be above 0"),
+    (lambda: RobotsRequest(("models",), jobs=0), "jobs must be at least 1"),
+    (lambda: RobotsRequest(("models",), table=Path("t.foo")), "a table ends in"),
+    (lambda: FingertipRequest(poses=1), "poses must be from 2"),
+    (lambda: FingertipRequest(backends=("foo",)), "no backend named 'foo'"),
+    (lambda: CheckRequest("a.py", "mujoco:engine"), "exercises are judged on mujoco"),
+    (lambda: CheckRequest("a.py", time_limit=0.0), "the time limit must be above 0 s"),
+    (lambda: FaultsRequest("a.py", only=("foo",)), "no fault named 'foo'"),
+    (lambda: LessonRequest("foo"), "no lesson named 'foo'"),
+    (lambda: LessonRequest("write", options={"foo": 1}), "no option of the lesson write"),
+    (lambda: LessonRequest("write", backends=("pybullet:engine",)), "keep the contract"),
+    (lambda: RecordRequest("foo"), "no experiment named 'foo'"),
+    (lambda: RecordRequest("hold", backend="all"), "trace record takes one --backend"),
+    (lambda: Sweep("hold", seeds=0), "--seeds must be at least 1"),
+    (lambda: Sweep("hold", every=2), "--every is of a FUNCTION"),
+    (lambda: SweepRequest(Sweep("hold"), ""), "the folder of a sweep has no name"),
+    (lambda: SweepReportRequest("d", backends=("a", "b", "c")), "a report is of one engine"),
+    (lambda: SimulationRequest(backends=("mujoco",) * 3), "view shows one engine or two"),
+    (lambda: RecordingRequest(()), "view shows one trace or two"),
+    (lambda: ServerSettings(seconds=0.0), "seconds must be above 0"),
+    (lambda: ServerSettings(speed=0.0), "speed must be from"),
+    (lambda: ExplainRequest(HOLD, budget=0), "--budget wants a number of runs"),
+    (lambda: OneStepRequest(Request(("a.npz",))), "--one-step runs both sides"),
+    (lambda: VersionsRequest(Request(("hold",), sides=(Side("a"), Side("b"))), "3"), "one model"),
+    (lambda: ModelsRequest(("a", "b"), seed=-1), "--seed must not be negative"),
+    (lambda: ModelsRequest(("a", "a"), ("mujoco", "mujoco")), "name two engines, or two files"),
+]
+
+
+@pytest.mark.parametrize(("make", "says"), REFUSED, ids=[says for _, says in REFUSED])
+def test_a_request_checks_itself(make: Callable[[], object], says: str) -> None:
+    with pytest.raises(StateMachineError) as refusal:
+        make()
+    assert says in str(refusal.value)
+
+
+def test_a_function_of_the_users_is_recorded_as_that_of_a_file(tmp_path: Path) -> None:
+    def policy(model: sm.Model, data: sm.Data) -> Any:
+        return np.full(model.nu, 0.1 * data.time)
+
+    file = tmp_path / "policy.py"
+    file.write_text(
+        "import numpy as np\n\n\ndef policy(model, data):\n"
+        "    return np.full(model.nu, 0.1 * data.time)\n",
+        encoding="utf-8",
+    )
+    of_file = answer_record(RecordRequest(f"{file}:policy", "so101", seconds=0.05))
+    of_function = answer_record(RecordRequest(policy, "so101", seconds=0.05))
+    assert np.array_equal(of_function.ctrl, of_file.ctrl)
+    assert of_function.ctrl.any()
+    assert of_function.header.experiment == "policy"
+
+
+def test_a_function_that_takes_something_else_is_refused() -> None:
+    with pytest.raises(StateMachineError, match=r"takes \(state\), and is called with"):
+        answer_record(RecordRequest(lambda state: state, "so101", seconds=0.05))
+
+
+def test_a_note_that_nobody_hears_is_a_warning() -> None:
+    with pytest.warns(UserWarning, match="said"):
+        QUIET.note("said")
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "compare.questions.gap",
+        "compare.questions.causes",
+        "grading.request",
+        "lessons.request",
+        "lessons.fingertip_request",
+        "probes.conventions.request",
+        "robots.request",
+        "runs.request",
+        "sweep.questions",
+        "view.request",
+    ],
+)
+def test_a_request_imports_no_engine(module: str) -> None:
+    engines = "{'mujoco', 'pybullet', 'pinocchio', 'viser', 'rich', 'matplotlib'}"
+    code = f"import sys, statemachine.{module}; print({engines} & set(sys.modules))"
+    assert of_python("-c", code).stdout.strip() == "set()"
