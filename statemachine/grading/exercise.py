@@ -147,7 +147,7 @@ def check_settings(backend: str, time_limit: float) -> None:
 
 
 class ExerciseJudge(ExitStack):
-    """Judges files on one backend. What is right is worked out once, for all of them.
+    """Judge of files on one backend. What is right is worked out once, for all of them.
 
         with ExerciseJudge("mujoco") as judge:
             grades = [judge.judge(file) for file in files]
@@ -204,7 +204,8 @@ class ExerciseJudge(ExitStack):
             raise BadInputError(refusal_of(Path(file), Path(file).name))
         path = _python_file(Path(file))
         folder = Path(tempfile.mkdtemp(dir=self._folder))
-        copy = _copied(path, own or named_by(path), folder / "own")
+        files = own if own else named_by(path)
+        copy = _copied(path, files, folder / "own")
         judgements = self._judge_functions(copy, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)
         return Grade(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ..grading.class_table import ClassEntry, verdict_word
 from ..grading.exercise import Grade
 from ..grading.faults.run import Examination, FaultTrial
-from ..grading.judges import JUDGES
+from ..grading.judges import JUDGES, Judgement
 from ..measures.text import count
 from ..page import Page, Table
 from ..show.templates import PageContent, render
@@ -210,25 +210,33 @@ def gradescope_results(grade: Grade | None, refusal: str = "") -> str:
         grade: Of the submission; None where it could not be judged.
         refusal: Why it could not, shown to the student.
     """
-    judgements = {judgement.function: judgement for judgement in grade.functions} if grade else {}
-    tests = []
-    for name in JUDGES:
-        judgement = judgements.get(name)
-        passed = judgement is not None and judgement.passed  # a point each
-        remarks = [refusal] if judgement is None else [verdict_word(judgement), *judgement.remarks]
-        tests.append(
-            {
-                "name": name,
-                "score": float(passed),
-                "max_score": 1.0,
-                "status": "passed" if passed else "failed",
-                "output": "\n".join(remarks),
-                "visibility": "visible",
-            }
-        )
-    versions = grade.versions if grade else {}
-    output = versions_of(versions) or refusal
+    judgements: dict[str, Judgement] = {}
+    output = ""
+    if grade is not None:
+        judgements = {judgement.function: judgement for judgement in grade.functions}
+        output = versions_of(grade.versions)
+    if not output:
+        output = refusal
     if grade is not None and grade.is_watched:
         output += f"\n{ONLY_WATCHED}"
+    tests = [_gradescope_test(name, judgements.get(name), refusal) for name in JUDGES]
     document = {"tests": tests, "output": output, "visibility": "visible"}
     return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
+
+
+def _gradescope_test(
+    function: str, judgement: Judgement | None, refusal: str
+) -> dict[str, str | float]:
+    """Return a function as Gradescope's test, of a point each; without a judgement it failed."""
+    passed, remarks = False, [refusal]
+    if judgement is not None:
+        passed = judgement.passed
+        remarks = [verdict_word(judgement), *judgement.remarks]
+    return {
+        "name": function,
+        "score": float(passed),
+        "max_score": 1.0,
+        "status": "passed" if passed else "failed",
+        "output": "\n".join(remarks),
+        "visibility": "visible",
+    }

@@ -184,7 +184,8 @@ def examine(
         folder = stack.enter_context(
             tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True)
         )
-        copied = copied_to(Path(folder).resolve(), path, own or named_by(path, _has_tests))
+        files = own if own else named_by(path, _has_tests)
+        copied = copied_to(Path(folder).resolve(), path, files)
         healthy = _run(copied, backend, None, seconds, clock)
         for failure in healthy.failures:
             if failure.test == IMPORT and failure.why:

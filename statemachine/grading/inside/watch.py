@@ -90,7 +90,7 @@ def _is_same_state(one: Inputs, two: Inputs) -> bool:
 
 
 class StudentWatch:
-    """What was done while a function ran.
+    """Record of what was done while a function ran.
 
     Attributes:
         runs: In the order in which they began.
@@ -204,10 +204,9 @@ def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[.
 
     @functools.wraps(original)
     def seen(data: Any, model: Any, advance: Callable[..., None], *more: Any) -> None:
-        seen_by_engine = model.backend == telling
-        original(
-            data, model, advance if seen_by_engine else _seen_step(advance, (model, data)), *more
-        )
+        if model.backend != telling:
+            advance = _seen_step(advance, (model, data))
+        original(data, model, advance, *more)
         if _watch is not None:
             _watch.meet(data)
 
@@ -221,10 +220,11 @@ def _seen_step(
 
     @functools.wraps(original)
     def seen(m: Any, d: Any, nstep: int = 1) -> Any:
-        given = (m, d) if nstep == 1 else (m, d, nstep)
+        arguments = (m, d) if nstep == 1 else (m, d, nstep)
         if _watch is None:
-            return original(*given)
-        return _watch.step(*(of or (m, d)), functools.partial(original, *given), nstep)
+            return original(*arguments)
+        model, data = (m, d) if of is None else of
+        return _watch.step(model, data, functools.partial(original, *arguments), nstep)
 
     return seen
 
@@ -233,10 +233,10 @@ def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
     """What recomputes what is derived of a Data, or of the engine's own, its last argument."""
 
     @functools.wraps(original)
-    def seen(*given: Any, **named: Any) -> Any:
-        result = original(*given, **named)
+    def seen(*arguments: Any, **named: Any) -> Any:
+        result = original(*arguments, **named)
         if _watch is not None:
-            _watch.recomputed(named["d"] if "d" in named else given[-1])
+            _watch.recomputed(named["d"] if "d" in named else arguments[-1])
         return result
 
     return seen
