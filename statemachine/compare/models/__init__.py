@@ -6,7 +6,8 @@
   an engine's own is read by its room
 - `ledger`: the list. Every figure has a key, element and quantity
 - `compiled`: what the files differ in as compiled models, by key; `..why` explains a gap with that
-- `diff`: walks two readings and enters their figures; by subject in `geometry` and `figures`
+- `diff`: walks two readings and enters their figures; by subject in `geometry`, `shapes` and
+  `figures`
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from ...engines.description.records import SCALAR, RobotJoint
 from ...engines.description.tree import Group, GroupTree
 from ...measures.text import rounded
 from ...rotations import HERE
-from . import figures, geometry
+from . import figures, geometry, shapes
 from .ledger import Figure, Ledger
 
 POSES = 100  # at which the same positions are put into both
@@ -68,7 +68,7 @@ def diff(
     notes = [*matching.notes(), *_structure(book, left, right, matching), *_suggestions(matching)]
     for pair in matching.pairs:
         notes += geometry.of_masses(book, pair, left, right, reach)
-        geometry.of_shapes(book, pair, left, right, reach)
+        shapes.of_shapes(book, pair, left, right, reach)
         a, b = pair.left.joint, pair.right.joint
         if pair.by == "root" or a is None or b is None:
             continue
