@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -242,7 +242,7 @@ def _nudged(values: Array, draw: np.random.Generator) -> Array:
 def nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
     """A controller whose commands differ by rounding, and what is commanded without one."""
 
-    def nudging(time: float, data: Data) -> Any:
+    def nudging(time: float, data: Data) -> Array | None:
         ctrl = None if controller is None else controller(time, data)
         return None if ctrl is None else _nudged(np.asarray(ctrl, dtype=np.float64), draw)
 
