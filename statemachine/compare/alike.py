@@ -10,7 +10,7 @@ import numpy as np
 from ..backends import load
 from ..errors import StateMachineError, TraceError
 from ..interface import MOCAP, Array, Data, Model
-from ..runs import SideStart, Trace, model_file, start_of
+from ..runs import Header, SideStart, Trace, model_file, start_of
 from ..runs.recorder import layout_of
 from ..runs.scenarios import Controller
 from .matching import Matched, Pairs, match_models
@@ -52,15 +52,8 @@ def named_as_left(left: Trace, right: Trace, matched: Matched) -> tuple[Trace, T
         matched: Which is which.
     """
     a, b = left.header, right.header
-    joints, bodies = a.joint_labels, a.body_labels
-    left_header = replace(a, joints=joints, bodies=bodies)
-    right_header = replace(
-        b,
-        joints=_renamed(joints, b.joint_labels, matched.joints),
-        bodies=_renamed(bodies, b.body_labels, matched.bodies),
-        sites=_renamed(a.sites, b.sites, matched.sites),
-        actuators=_renamed(a.actuators, b.actuators, matched.actuators),
-    )
+    left_header = replace(a, joints=a.joint_labels, bodies=a.body_labels)
+    right_header = _named_as(left_header, b, matched)
     left_columns, right_columns = dict(left.columns), dict(right.columns)
     if any(only.get("joint") for only in matched.only):
         left_columns.pop("energy", None)
@@ -68,13 +61,25 @@ def named_as_left(left: Trace, right: Trace, matched: Matched) -> tuple[Trace, T
     order = [there for _, there in matched.actuators]
     if len(order) == a.nu == b.nu:
         right_columns["ctrl"] = right_columns["ctrl"][:, order]
-        right_header = replace(
-            right_header,
-            actuators=tuple(right_header.actuators[there] for there in order),
-            actuator_jntid=tuple(b.actuator_jntid[there] for there in order),
-            ctrlrange=tuple(b.ctrlrange[there] for there in order),
-        )
+        right_header = _with_actuators_in(order, right_header)
     return Trace(left_header, left_columns), Trace(right_header, right_columns)
+
+
+def _named_as(left: Header, right: Header, matched: Matched) -> Header:
+    """Return the header of the right with the names of the left for what both have."""
+    joints = _renamed(left.joints, right.joint_labels, matched.joints)
+    bodies = _renamed(left.bodies, right.body_labels, matched.bodies)
+    sites = _renamed(left.sites, right.sites, matched.sites)
+    actuators = _renamed(left.actuators, right.actuators, matched.actuators)
+    return replace(right, joints=joints, bodies=bodies, sites=sites, actuators=actuators)
+
+
+def _with_actuators_in(order: Sequence[int], header: Header) -> Header:
+    """Return a header with its actuators in another order, given by their numbers."""
+    actuators = tuple(header.actuators[number] for number in order)
+    joints = tuple(header.actuator_jntid[number] for number in order)
+    ranges = tuple(header.ctrlrange[number] for number in order)
+    return replace(header, actuators=actuators, actuator_jntid=joints, ctrlrange=ranges)
 
 
 def translated(trace: Trace, matched: Matched, start: SideStart) -> Trace:
