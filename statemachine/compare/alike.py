@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ..backends import load
 from ..errors import StateMachineError, TraceError
 from ..interface import MOCAP, Array, Data, Model
-from ..runs import SideStart, Trace, model_file, start_of
+from ..runs import Header, SideStart, Trace, model_file, start_of
 from ..runs.recorder import layout_of
 from ..runs.scenarios import Controller
 from .matching import Matched, Pairs, match_models
@@ -53,32 +52,38 @@ def named_as_left(left: Trace, right: Trace, matched: Matched) -> tuple[Trace, T
         matched: Which is which.
     """
     a, b = left.header, right.header
-    joints, bodies = a.joint_labels, a.body_labels
-    renamed: dict[str, Any] = {
-        "joints": _renamed(joints, b.joint_labels, matched.joints),
-        "bodies": _renamed(bodies, b.body_labels, matched.bodies),
-        "sites": _renamed(a.sites, b.sites, matched.sites),
-        "actuators": _renamed(a.actuators, b.actuators, matched.actuators),
-    }
-    ours, columns = dict(left.columns), dict(right.columns)
+    left_header = replace(a, joints=a.joint_labels, bodies=a.body_labels)
+    right_header = _named_as(left_header, b, matched)
+    left_columns, right_columns = dict(left.columns), dict(right.columns)
     if any(only.get("joint") for only in matched.only):
-        for side in (ours, columns):
-            side.pop("energy", None)
+        left_columns.pop("energy", None)
+        right_columns.pop("energy", None)
     order = [there for _, there in matched.actuators]
     if len(order) == a.nu == b.nu:
-        columns["ctrl"] = columns["ctrl"][:, order]
-        for name, values in (
-            ("actuators", renamed["actuators"]),
-            ("actuator_jntid", b.actuator_jntid),
-            ("ctrlrange", b.ctrlrange),
-        ):
-            renamed[name] = tuple(values[there] for there in order)
-    first = Trace(replace(a, joints=joints, bodies=bodies), ours)
-    return first, Trace(replace(b, **renamed), columns)
+        right_columns["ctrl"] = right_columns["ctrl"][:, order]
+        right_header = _with_actuators_in(order, right_header)
+    return Trace(left_header, left_columns), Trace(right_header, right_columns)
 
 
-def translated(trace: Trace, matched: Matched, start: tuple[Array, Array, Array]) -> Trace:
-    """The start and the commands of a run of the first Model, as the second takes them.
+def _named_as(left: Header, right: Header, matched: Matched) -> Header:
+    """Return the header of the right with the names of the left for what both have."""
+    joints = _renamed(left.joints, right.joint_labels, matched.joints)
+    bodies = _renamed(left.bodies, right.body_labels, matched.bodies)
+    sites = _renamed(left.sites, right.sites, matched.sites)
+    actuators = _renamed(left.actuators, right.actuators, matched.actuators)
+    return replace(right, joints=joints, bodies=bodies, sites=sites, actuators=actuators)
+
+
+def _with_actuators_in(order: Sequence[int], header: Header) -> Header:
+    """Return a header with its actuators in another order, given by their numbers."""
+    actuators = tuple(header.actuators[number] for number in order)
+    joints = tuple(header.actuator_jntid[number] for number in order)
+    ranges = tuple(header.ctrlrange[number] for number in order)
+    return replace(header, actuators=actuators, actuator_jntid=joints, ctrlrange=ranges)
+
+
+def translated(trace: Trace, matched: Matched, start: SideStart) -> Trace:
+    """Return the start and the commands of a run of the first Model, as the second takes them.
 
     Args:
         trace: The run.
@@ -93,16 +98,15 @@ def translated(trace: Trace, matched: Matched, start: tuple[Array, Array, Array]
         for name, pose in poses.items()
         if name in trace
     }
-    return replace_layout(trace, matched.right, *matched.start(recorded, SideStart(*start)), led)
+    return replace_layout(trace, matched.right, *matched.start(recorded, start), led)
 
 
 def for_left(trace: Trace, model: Model, request: Request) -> Trace:
     """A trace as one of the left's Model; matched by the model that it was recorded with."""
     header = trace.header
     own = layout_of(model)
-    if all(
-        getattr(header, name) == own[name] for name in ("joints", "actuators", "jnt_type", "nmocap")
-    ):
+    compared = ("joints", "actuators", "jnt_type", "nmocap")
+    if all(getattr(header, name) == own[name] for name in compared):
         led = {name: trace[name] for name in MOCAP if name in trace}
         return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl, led)
     try:
@@ -120,7 +124,8 @@ def in_terms_of_right(left: Trace, right: Trace, matched: Matched | None) -> Tra
     """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
     if matched is None:
         return left
-    return translated(left, matched, (right.qpos[0], right.qvel[0], right.ctrl[0]))
+    start = SideStart(right.qpos[0], right.qvel[0], right.ctrl[0])
+    return translated(left, matched, start)
 
 
 def same_commands(theirs: Trace, right: Trace) -> bool:
@@ -178,8 +183,10 @@ def controller_for_right(controller: Controller, matched: Matched, start: Array)
         start: (nu,) ctrl of the right, for the actuators that have no counterpart.
     """
 
-    def translate(time: float, data: Data) -> Any:
+    def translate(time: float, data: Data) -> Array | None:
         ctrl = controller(time, data)
-        return None if ctrl is None else matched.moved("ctrl", np.asarray(ctrl, np.float64), start)
+        if ctrl is None:
+            return None
+        return matched.moved("ctrl", np.asarray(ctrl, np.float64), start)
 
     return translate

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -242,7 +242,7 @@ def _nudged(values: Array, draw: np.random.Generator) -> Array:
 def nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
     """A controller whose commands differ by rounding, and what is commanded without one."""
 
-    def nudging(time: float, data: Data) -> Any:
+    def nudging(time: float, data: Data) -> Array | None:
         ctrl = None if controller is None else controller(time, data)
         return None if ctrl is None else _nudged(np.asarray(ctrl, dtype=np.float64), draw)
 
@@ -350,19 +350,19 @@ def chaos_floor(
     runs = RUNS if runs is None else runs
     if runs < 1:
         raise BadInputError(f"the chaos floor wants at least one run; got {runs}")
-    traces = comparison.left.trace, comparison.right.trace
-    common = common_moments(
-        traces[0].time, traces[1].time, (traces[0].timestep, traces[1].timestep)
-    )
+    left, right = comparison.left.trace, comparison.right.trace
+    common = common_moments(left.time, right.time, (left.timestep, right.timestep))
     sides = tuple(side for side, rerun in enumerate(reruns) if rerun is not None)
     if not sides:
         raise BadInputError("the chaos floor runs a side again, and both are recorded runs")
     work: list[Callable[[], _Departure]] = []
-    for rerun, trace, rows in zip(reruns, traces, (common.left, common.right), strict=True):
+    for rerun, trace, rows in zip(reruns, (left, right), (common.left, common.right), strict=True):
         if rerun is not None:
-            for k in range(runs):
-                draw = partial(perturbed_run, rerun, k, seed=seed, uncertain=uncertain)
-                work.append(partial(_departure, draw, trace, comparison, rows))
+            draws = [
+                partial(perturbed_run, rerun, k, seed=seed, uncertain=uncertain)
+                for k in range(runs)
+            ]
+            work += [partial(_departure, draw, trace, comparison, rows) for draw in draws]
     gaps = _gaps_of(comparison)
     widths = {name: np.zeros(len(gap)) for name, gap in gaps.items()}
     ended = 0
@@ -371,15 +371,10 @@ def chaos_floor(
         for name, distance in _named_as(gaps, departure.distances).items():
             if name in widths:
                 widths[name] = np.maximum(widths[name], distance)
-    reach = round(_WINDOW * (len(common.time) - 1))
-    bands = []
-    for agreement in comparison.agreements:
-        width, moments = widths[agreement.name], common.time
-        if agreement.kind == "contact":
-            moments = np.zeros(1)
-        else:
-            width = _largest_nearby(width, reach)
-        bands.append(_band(agreement, gaps[agreement.name], width, moments))
+    bands = [
+        _band(agreement, gaps[agreement.name], widths[agreement.name], common.time)
+        for agreement in comparison.agreements
+    ]
     return ChaosFloor(
         runs=runs,
         sides=sides,
@@ -500,10 +495,14 @@ def _band(agreement: Agreement, gap: Array, width: Array, moments: Array) -> Ban
 
     Args:
         agreement: Of the two sides.
-        gap: (n,) how far apart they are.
-        width: (n,) of the band.
+        gap: (n,) how far apart they are; (1,) of a first touch.
+        width: Of the same length, how far a perturbed run gets from its side at the most.
         moments: (n,) since the start [s].
     """
+    if agreement.kind == "contact":
+        moments = np.zeros(1)
+    else:
+        width = _largest_nearby(width, round(_WINDOW * (len(moments) - 1)))
     outside = np.flatnonzero(~(gap <= width))
     last = int(outside[-1]) + 1 if len(outside) else 0
     inside_from = float(moments[last]) if last < len(moments) else None

@@ -14,7 +14,7 @@ import numpy as np
 
 from ... import __version__
 from ...errors import BadInputError
-from ...interface import Ints
+from ...interface import Array, Ints
 from ...measures.text import figure, on, reading, short_time
 from ...page import Block, Interactive, Items, Page, Section, Text
 from ...runs.whole import check_place, replace_text
@@ -23,7 +23,7 @@ from ..over_time import BothRuns, QuantityChart, spans
 from ..terminal import non_breaking
 from .blocks import Html, data_of, drawn, filled, headline_as_html, joined, tag, template
 from .geometry import packed
-from .scene import Look, moments_of, scene_of
+from .scene import Look, Scene, moments_of, scene_of
 
 SUFFIXES = (".html", ".htm")
 _SCRIPTS = ("gl.js", "scene.js", "page.js")
@@ -165,7 +165,7 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> Stage:
         runs: The runs.
         looks: What each is drawn as.
     """
-    until, site = runs.comparison.until, runs.comparison.tip
+    until = runs.comparison.until
     # Of these moments the page tells: they must be among those that can be shown.
     agreements = runs.comparison.agreements
     moments = {agreement.at for agreement in agreements}
@@ -184,6 +184,20 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> Stage:
         "lead": list(runs.lead),
         "scene": scene.data,
     }
+    slots = _stage_slots(runs, scene, times, start)
+    return Stage(filled("stage.html", slots), data, scene.notes)
+
+
+def _stage_slots(runs: BothRuns, scene: Scene, times: Array, start: int) -> dict[str, object]:
+    """Return the slots of the template of the stage.
+
+    Args:
+        runs: The runs.
+        scene: What is drawn of them.
+        times: (n,) the moments that are shown [s].
+        start: The moment that the page opens at, among them.
+    """
+    until, site = runs.comparison.until, runs.comparison.tip
     now, (left, right) = float(times[start]), long_labels(runs.comparison)
     short_left, short_right = short_labels(runs.comparison)
     tip, arrows, still = site, "", Html("")
@@ -199,7 +213,7 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> Stage:
     on_left = non_breaking(f"{until:g} s {on(left)}")
     on_right = on(right)
     spoken_time = short_time(now)
-    slots = {
+    return {
         "left": left,
         "right": right,
         "short_left": short_left,
@@ -215,7 +229,6 @@ def staged(runs: BothRuns, looks: Sequence[Look]) -> Stage:
         "still": still,
         "lanes": _lanes(runs),
     }
-    return Stage(filled("stage.html", slots), data, scene.notes)
 
 
 def _lanes(runs: BothRuns) -> Html:
