@@ -218,6 +218,36 @@ class Tendons:
         ]
 
 
+class TiedLengths(NamedTuple):
+    """An equality of a joint or tendon with a constant, or with a polynomial of another one.
+
+    Attributes:
+        kind: What the constraint is like.
+        moments: J (n,) of the one, and of the other if there is one.
+        zero: Their lengths in the default state [rad or m].
+        factors: (5,) of the polynomial, from the constant on.
+    """
+
+    kind: Soft
+    moments: list[Array]
+    zero: list[float]
+    factors: list[float]
+
+
+class TiedPlaces(NamedTuple):
+    """A connect or a weld.
+
+    Attributes:
+        eq: MuJoCo's id of the equality.
+        kinds: What each of its constraints is like: 3 of a connect, 6 of a weld.
+        places: The two sides.
+    """
+
+    eq: int
+    kinds: list[Soft]
+    places: list[TiedPlace]
+
+
 class Equalities:
     """The equality constraints of a tree that are in force."""
 
@@ -230,8 +260,8 @@ class Equalities:
         off: Mapping[str, bool],
     ) -> None:
         self._raw, self._world, self._tree = raw, world, tree
-        self._sums: list[tuple[Soft, list[Array], list[float], list[float]]] = []
-        self._places: list[tuple[int, list[Soft], list[TiedPlace]]] = []
+        self._sums: list[TiedLengths] = []
+        self._places: list[TiedPlaces] = []
         shortest = shortest_time(raw, off)
         active = raw.eq_active0 & (not (off["equality"] or off["constraint"]))
         for eq in np.flatnonzero(active).tolist():
@@ -243,9 +273,11 @@ class Equalities:
             if kind in PLACES:
                 weights = raw.body_invweight0[bodies].sum(axis=0)
                 move, turn = (soft(*style, weights[[k]], shortest) for k in (0, 1))
-                kinds = move * 3 + turn * 3 * int(kind == _EQ.mjEQ_WELD)
+                kinds = move * 3
+                if kind == _EQ.mjEQ_WELD:
+                    kinds += turn * 3
                 places = [TiedPlace(raw, eq, side, body) for side, body in enumerate(bodies)]
-                self._places.append((eq, kinds, places))
+                self._places.append(TiedPlaces(eq, kinds, places))
                 continue
             ends = [int(end) for end in ends if end >= 0]
             if kind == _EQ.mjEQ_JOINT:
@@ -256,13 +288,14 @@ class Equalities:
                 moments = [tendons.moments[end] for end in ends]
                 zero, weight = raw.tendon_length0[ends], raw.tendon_invweight0[ends]
             (own,) = soft(*style, weight.sum(keepdims=True), shortest)
-            self._sums.append((own, moments, zero.tolist(), raw.eq_data[eq, :5].tolist()))
+            factors = raw.eq_data[eq, :5].tolist()
+            self._sums.append(TiedLengths(own, moments, zero.tolist(), factors))
 
     def __bool__(self) -> bool:
         return bool(self._sums or self._places)
 
     def rows(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
-        """Their rows, where the tree's qpos are q, its angles (n,) and its velocities (n,)."""
+        """Return their rows, where the tree's qpos are q, its angles and velocities (n,)."""
         rows, free = [], (-math.inf, math.inf)
         for kind, moments, zero, factors in self._sums:
             lengths = [
