@@ -20,7 +20,8 @@ import numpy as np
 from ..interface import Array
 from ..rotations import matrix_from_quat
 from . import _dense as dense
-from ._bullet_constraints import Tendons, bounds_of
+from ._bullet_constraints import Tendons
+from ._bullet_soft import bounds_of
 from ._bullet_world import Tree, World
 from .compiled import gravity
 
