@@ -18,88 +18,10 @@ from ..interface import Array
 from ..rotations import INVERSE, matrix_from_quat, times
 from . import _dense as dense
 from ._bullet_plan import PLACES, SITE, ends_of, linear_sum, movers
+from ._bullet_soft import Soft, SoftRow, bounds_of, shortest_time, soft, soft_row
 from ._bullet_world import Tree, World
 
-_TINY = 1e-300  # for a power that is too small for a float
 _EQ = mujoco.mjtEq
-
-
-class SoftRow(NamedTuple):
-    """One constraint, which has a force F along J.
-
-    Attributes:
-        jacobian: J (n,).
-        softness: R, by which it yields to its own force.
-        reference: What J·a + R·F is to be.
-        least, most: Bounds of F.
-    """
-
-    jacobian: Array
-    softness: float
-    reference: float
-    least: float
-    most: float
-
-
-class SoftRows(NamedTuple):
-    """Several constraints, as arrays with a row for each.
-
-    Attributes:
-        jacobian: J (m, n).
-        softness: R (m,).
-        reference: (m,) what J·a + R·F is to be.
-        least, most: (m,) bounds of F.
-    """
-
-    jacobian: Array
-    softness: Array
-    reference: Array
-    least: Array
-    most: Array
-
-    @classmethod
-    def of(cls, rows: Sequence[SoftRow]) -> SoftRows:
-        """Put m rows, at least one, into arrays."""
-        return cls(*(np.array(column) for column in zip(*rows, strict=True)))
-
-    def followed_by(self, others: SoftRows) -> SoftRows:
-        """Return these constraints, and others after them."""
-        return SoftRows(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
-
-
-# The curve of a constraint's impedance; damping b, stiffness k and inverse weight.
-Soft = tuple[list[float], list[float]]
-
-
-def soft(solref: Array, solimp: Array, weight: Array, shortest: float) -> list[Soft]:
-    """Of each of m constraints, from its solref (m, 2), solimp (m, 5) and inverse weight (m,)."""
-    damping, stiffness = springs(solref, solimp, shortest)
-    constants = np.column_stack([damping, stiffness, weight]).tolist()
-    return list(zip(curves(solimp), constants, strict=True))
-
-
-def soft_row(
-    kind: Soft,
-    jacobian: Array,
-    gap: float,
-    speed: float,
-    bounds: tuple[float, float] = (0.0, math.inf),
-    distance: float | None = None,
-) -> SoftRow:
-    """The row of a constraint.
-
-    Args:
-        kind: What it is like.
-        jacobian: J (n,).
-        gap: By how much it is not met.
-        speed: J·v.
-        bounds: Of its force.
-        distance: What its impedance depends on; by default the gap.
-    """
-    curve, (damping, stiffness, weight) = kind
-    strength = impedance(curve, gap if distance is None else distance)
-    goal = -damping * speed - stiffness * strength * gap
-    return SoftRow(jacobian, softness(strength, weight), goal, *bounds)
 
 
 def _related(raw: mujoco.MjModel, dofs: Any) -> Any:
@@ -218,6 +140,36 @@ class Tendons:
         ]
 
 
+class TiedLengths(NamedTuple):
+    """An equality of a joint or tendon with a constant, or with a polynomial of another one.
+
+    Attributes:
+        kind: What the constraint is like.
+        moments: J (n,) of the one, and of the other if there is one.
+        zero: Their lengths in the default state [rad or m].
+        factors: (5,) of the polynomial, from the constant on.
+    """
+
+    kind: Soft
+    moments: list[Array]
+    zero: list[float]
+    factors: list[float]
+
+
+class TiedPlaces(NamedTuple):
+    """A connect or a weld.
+
+    Attributes:
+        eq: MuJoCo's id of the equality.
+        kinds: What each of its constraints is like: 3 of a connect, 6 of a weld.
+        places: The two sides.
+    """
+
+    eq: int
+    kinds: list[Soft]
+    places: list[TiedPlace]
+
+
 class Equalities:
     """The equality constraints of a tree that are in force."""
 
@@ -230,8 +182,8 @@ class Equalities:
         off: Mapping[str, bool],
     ) -> None:
         self._raw, self._world, self._tree = raw, world, tree
-        self._sums: list[tuple[Soft, list[Array], list[float], list[float]]] = []
-        self._places: list[tuple[int, list[Soft], list[TiedPlace]]] = []
+        self._sums: list[TiedLengths] = []
+        self._places: list[TiedPlaces] = []
         shortest = shortest_time(raw, off)
         active = raw.eq_active0 & (not (off["equality"] or off["constraint"]))
         for eq in np.flatnonzero(active).tolist():
@@ -243,9 +195,11 @@ class Equalities:
             if kind in PLACES:
                 weights = raw.body_invweight0[bodies].sum(axis=0)
                 move, turn = (soft(*style, weights[[k]], shortest) for k in (0, 1))
-                kinds = move * 3 + turn * 3 * int(kind == _EQ.mjEQ_WELD)
+                kinds = move * 3
+                if kind == _EQ.mjEQ_WELD:
+                    kinds += turn * 3
                 places = [TiedPlace(raw, eq, side, body) for side, body in enumerate(bodies)]
-                self._places.append((eq, kinds, places))
+                self._places.append(TiedPlaces(eq, kinds, places))
                 continue
             ends = [int(end) for end in ends if end >= 0]
             if kind == _EQ.mjEQ_JOINT:
@@ -256,13 +210,14 @@ class Equalities:
                 moments = [tendons.moments[end] for end in ends]
                 zero, weight = raw.tendon_length0[ends], raw.tendon_invweight0[ends]
             (own,) = soft(*style, weight.sum(keepdims=True), shortest)
-            self._sums.append((own, moments, zero.tolist(), raw.eq_data[eq, :5].tolist()))
+            factors = raw.eq_data[eq, :5].tolist()
+            self._sums.append(TiedLengths(own, moments, zero.tolist(), factors))
 
     def __bool__(self) -> bool:
         return bool(self._sums or self._places)
 
     def rows(self, q: Sequence[float], angles: Array, speed: Array) -> list[SoftRow]:
-        """Their rows, where the tree's qpos are q, its angles (n,) and its velocities (n,)."""
+        """Return their rows, where the tree's qpos are q, its angles and velocities (n,)."""
         rows, free = [], (-math.inf, math.inf)
         for kind, moments, zero, factors in self._sums:
             lengths = [
@@ -363,54 +318,3 @@ class TiedPlace:
             if weld and not side:
                 self.quat = data[6:10]
         self.still = bool(raw.body_treeid[body] < 0)
-
-
-def shortest_time(raw: mujoco.MjModel, off: Mapping[str, bool]) -> float:
-    """The least time constant of a constraint [s]: two steps, where MuJoCo takes care of it."""
-    return 0.0 if off["refsafe"] else 2 * float(raw.opt.timestep)
-
-
-def bounds_of(ranges: Array, limited: Any) -> tuple[Array, Array]:
-    low, high = np.where(limited[:, None], ranges, [-np.inf, np.inf]).T
-    return low, high
-
-
-def curves(solimp: Array) -> list[list[float]]:
-    """Rows of solimp, each number within what MuJoCo takes; then the scales of both halves.
-
-    Their powers are Python's: the last bits of NumPy's are those of the processor.
-    """
-    least, most = [1e-4, 1e-4, 1e-15, 1e-4, 1.0], [0.9999, 0.9999, 9e9, 0.9999, 9e9]
-    curves = []
-    for low, high, width, middle, power in np.clip(solimp, least, most).tolist():
-        scales = [math.pow(part, power - 1) or _TINY for part in (middle, 1 - middle)]
-        curves.append([low, high, width, middle, power, *scales])
-    return curves
-
-
-def impedance(curve: Sequence[float], distance: float) -> float:
-    """d(r) of a curve [MuJoCo's manual, chapter Modeling, Solver parameters]."""
-    low, high, width, middle, power, rising, falling = curve
-    if width <= 1e-15:
-        return (low + high) / 2
-    x = min(abs(distance) / width, 1.0)
-    part = math.pow(x, power) / rising if x <= middle else 1 - math.pow(1 - x, power) / falling
-    return low + part * (high - low)
-
-
-def softness(impedance: float, inverse_weight: float) -> float:
-    """R, by which a constraint yields to its own force."""
-    return max((1 - impedance) / impedance * inverse_weight, 1e-15)
-
-
-def springs(solref: Array, solimp: Array, shortest: float) -> tuple[Array, Array]:
-    """Damping b and stiffness k of the reference acceleration, of solref (n, 2)."""
-    time, ratio = solref.T
-    most = np.clip(solimp[:, 1], 1e-4, 0.9999)
-    given = time <= 0  # then they are stiffness and damping, negated
-    time = np.where(given, 1.0, np.maximum(time, shortest))
-    damping = np.where(given, -ratio / most, 2 / (most * time))
-    stiffness = np.where(
-        given, -solref[:, 0] / most**2, 1 / (most * time * np.where(given, 1, ratio)) ** 2
-    )
-    return damping, stiffness

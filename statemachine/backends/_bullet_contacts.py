@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -64,6 +64,22 @@ class Touch:
     force: Array
 
 
+class PairFriction(NamedTuple):
+    """The largest friction of the contacts of two solids.
+
+    Attributes:
+        left, right: Places of the solids in `Surfaces.solids`.
+        slide: Sliding friction.
+        spin, roll: Torsional and rolling friction [m].
+    """
+
+    left: int
+    right: int
+    slide: float
+    spin: float
+    roll: float
+
+
 class Surfaces:
     """The solids of a model.
 
@@ -86,14 +102,15 @@ class Surfaces:
         several: list[str] = []
         self.pairs: dict[tuple[int, int], bool] = {}
         self.meeting: list[tuple[int, int]] = []
-        wanted = []  # friction (3,) of each pair that meets
+        wanted: list[PairFriction] = []
         for (i, left), (j, right) in combinations(enumerate(self.solids), 2):
             meet = self.pairs[i, j] = bool(meets[left.geoms[0], right.geoms[0]])
             if meet:
                 meeting = [(a, b) for a in left.geoms for b in right.geoms]
                 self.meeting += meeting
                 frictions = np.array([_friction(raw, a, b) for a, b in meeting])
-                wanted.append((i, j, frictions.max(axis=0)))
+                slide, spin, roll = frictions.max(axis=0)
+                wanted.append(PairFriction(i, j, slide, spin, roll))
                 if np.ptp(frictions[:, 0]) > _CLOSE * frictions[:, 0].max():
                     several.append(
                         f"friction of {self._label(i, j)} is {frictions[:, 0].max():.3g} for all "
@@ -124,14 +141,15 @@ class Surfaces:
 
         return f"{name(self.solids[i])} and {name(self.solids[j])}"
 
-    def _solve(self, wanted: list[tuple[int, int, Array]]) -> None:
-        """Frictions of solids from those of pairs, as well as it goes."""
+    def _solve(self, wanted: list[PairFriction]) -> None:
+        """Find frictions of solids from those of pairs, as well as it goes."""
         count = len(self.solids)
         rows, right = [], []
-        for i, j, (slide, _, _) in wanted:
-            if slide > 0:
-                rows.append(np.isin(np.arange(count), (i, j)).astype(np.float64))
-                right.append(math.log(slide))
+        for pair in wanted:
+            if pair.slide > 0:
+                both = np.isin(np.arange(count), (pair.left, pair.right))
+                rows.append(both.astype(np.float64))
+                right.append(math.log(pair.slide))
         self.slide = np.zeros(count)
         if rows and np.ptp(right) == 0 and len(rows) == len(wanted):
             self.slide += math.exp(right[0] / 2)  # one friction for all: no need to solve
@@ -139,9 +157,10 @@ class Surfaces:
             logs = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
             rubs = np.any(rows, axis=0)  # what meets nothing with friction has none
             self.slide = np.where(rubs, [math.exp(x) for x in np.round(logs, 12)], 0.0)
-        self.spin, self.roll = (self._turning(wanted, k) for k in (1, 2))
-        self.differences = []
-        for i, j, (slide, spin, roll) in wanted:
+        self.spin = self._turning(wanted, [pair.spin for pair in wanted])
+        self.roll = self._turning(wanted, [pair.roll for pair in wanted])
+        self.differences: list[str] = []
+        for i, j, slide, spin, roll in wanted:
             sliding = min(self.slide[i] * self.slide[j], _MOST)
             spinning, rolling = self._combined(self.spin, i, j), self._combined(self.roll, i, j)
             self._compare("friction", i, j, sliding, slide)
@@ -158,11 +177,12 @@ class Surfaces:
         """What PyBullet makes of the spinning or rolling friction of two."""
         return float(turning[i] * self.slide[j] + turning[j] * self.slide[i])
 
-    def _turning(self, wanted: list[tuple[int, int, Array]], which: int) -> Array:
+    def _turning(self, wanted: list[PairFriction], of_pairs: list[float]) -> Array:
+        """Find the spinning or rolling friction of solids from that of each pair."""
         matrix = np.zeros((len(wanted), len(self.solids)))
-        for row, (i, j, _) in enumerate(wanted):
+        for row, (i, j, *_) in enumerate(wanted):
             matrix[row, i], matrix[row, j] = self.slide[j], self.slide[i]
-        right = np.array([friction[which] for _, _, friction in wanted])
+        right = np.array(of_pairs)
         if not right.any():
             return np.zeros(len(self.solids))
         frictions = np.linalg.lstsq(matrix, right, rcond=None)[0]

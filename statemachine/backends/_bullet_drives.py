@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,7 +20,8 @@ import numpy as np
 from ..interface import Array
 from ..rotations import matrix_from_quat
 from . import _dense as dense
-from ._bullet_constraints import Tendons, bounds_of
+from ._bullet_constraints import Tendons
+from ._bullet_soft import bounds_of
 from ._bullet_world import Tree, World
 from .compiled import gravity
 
@@ -36,6 +37,20 @@ DYNAMICS = [
 ]
 MUSCLE = int(mujoco.mjtGain.mjGAIN_MUSCLE)
 _NUDGE = 1e-5  # [m/s] of speed, for the slope of a muscle's gain: pieces of parabolas
+
+
+class PathDrive(NamedTuple):
+    """An actuator that pulls on a tendon whose path goes through space.
+
+    Attributes:
+        column: Its place among the actuators of the tree.
+        gear: Its gear.
+        tendon: Place of the tendon among those of the tree.
+    """
+
+    column: int
+    gear: float
+    tendon: int
 
 
 class Drives:
@@ -82,11 +97,11 @@ class Drives:
         self._on_joints = np.abs(self._across) * ~on_tendon[ids, None]
         self._tendons, self._later = tendons, later
         # Of what pulls on a path through space: its column, gear and tendon.
-        self._paths: list[tuple[int, float, int]] = []
+        self._paths: list[PathDrive] = []
         for column, a in enumerate(ids):
             if on_tendon[a] and (tendon := tendons.ids.index(target[a])) in tendons.bent:
                 gear = float(raw.actuator_gear[raw.actuator_outadr[a], 0])
-                self._paths.append((column, gear, tendon))
+                self._paths.append(PathDrive(column, gear, tendon))
         affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]

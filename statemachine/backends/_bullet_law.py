@@ -36,11 +36,11 @@ from ..interface import Array
 from ..interface.records import Arrays
 from ..rotations import matrix_from_quat
 from . import _dense as dense
-from ._bullet_constraints import (
-    Equalities,
+from ._bullet_constraints import Equalities, Tendons
+from ._bullet_drives import Drives, Medium
+from ._bullet_soft import (
     SoftRow,
     SoftRows,
-    Tendons,
     bounds_of,
     curves,
     impedance,
@@ -50,7 +50,6 @@ from ._bullet_constraints import (
     softness,
     springs,
 )
-from ._bullet_drives import Drives, Medium
 from ._bullet_world import Tree, World
 
 _OFF = mujoco.mjtDisableBit

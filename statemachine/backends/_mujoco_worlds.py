@@ -195,7 +195,8 @@ class MujocoWorlds(Worlds):
         raw = data = None
         for world in worlds.tolist():
             raw = self._batch.get_model(world, raw)
-            data = data or mujoco.MjData(raw)
+            if data is None:
+                data = mujoco.MjData(raw)
             mujoco.mj_resetData(raw, data)
             alarms = Alarms(raw, data)
             row = self._batch.state[world].copy()

@@ -317,10 +317,13 @@ class PybulletModel(HiddenModel):
 
     @property
     def shared_worlds(self) -> dict[str, World]:
-        """Worlds that its Data share, of those that were needed so far, by what they are."""
-        ahead = cast("DrivenWorld | None", self._look_ahead.world)
-        worlds = {"still copy": self.plan.ghost, "look-ahead": ahead and ahead.raw}
-        return {name: world for name, world in worlds.items() if world is not None}
+        """Return the worlds that its Data share, of those that were needed so far."""
+        worlds: dict[str, World] = {}
+        if self.plan.ghost is not None:
+            worlds["still copy"] = self.plan.ghost
+        if (ahead := cast("DrivenWorld | None", self._look_ahead.world)) is not None:
+            worlds["look-ahead"] = ahead.raw
+        return worlds
 
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
         substeps = options.get("substeps", self.substeps)
