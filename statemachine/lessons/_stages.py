@@ -15,7 +15,7 @@ from ..page import Block, Pipeline, Table, Traces
 from ..probes import conventions
 from ..runs.drive import Progress
 from ..runs.robot import hold_ctrl
-from ._robot import Tip, read_derived, read_stored
+from ._readings import Tip, read_derived, read_stored
 
 _STORED = (*INPUTS, "time")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind

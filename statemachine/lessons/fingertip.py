@@ -28,7 +28,7 @@ from ..runs.drive import Progress, silent
 from ..runs.header import Provenance, provenance
 from ..runs.robot import carried_by
 from ..witness import OWN_READING, labels
-from ._robot import Tip, tips_of
+from ._readings import Tip, tips_of
 
 _MOST = 1_000_000
 _WIDE = 100.0  # a range beyond this [m or rad] is not a limit

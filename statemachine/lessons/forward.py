@@ -18,7 +18,8 @@ from ..measures.text import count, millimetres, short_time, vector
 from ..page import Block, Table
 from ..runs.drive import Progress, steps_in
 from ..runs.provenance import Provenance, provenance
-from ._robot import coordinate, tips_of, usual_tip, with_joint
+from ._readings import tips_of, usual_tip
+from ._robot import coordinate, with_joint
 from ._stages import (
     ArrayChange,
     Lag,

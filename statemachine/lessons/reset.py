@@ -15,7 +15,7 @@ from ..page import Block, Table
 from ..runs.drive import Progress
 from ..runs.header import Provenance, provenance
 from ..runs.robot import body_pairs, carried_by, moved_by_actuators
-from ._robot import read_derived, read_stored
+from ._readings import read_derived, read_stored
 from .session import CodeRun, Options
 from .template import differences, emulated
 

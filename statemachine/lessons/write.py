@@ -27,7 +27,8 @@ from ..measures.text import count, position
 from ..page import Block, Table
 from ..runs.drive import Progress
 from ..runs.header import Provenance, provenance
-from ._robot import coordinate, read_derived, with_joint
+from ._readings import read_derived
+from ._robot import coordinate, with_joint
 from .session import CodeRun, Options
 from .template import emulated
 
